@@ -1,0 +1,99 @@
+"""Errors and warnings: one base, one-line children, messages with a next step.
+
+A message says what was wrong and where; ``hint`` says what to do next. The command line
+prints both and exits with code 1; it never shows a traceback for a :class:`GeofieldError`.
+"""
+
+from __future__ import annotations
+
+
+class GeofieldError(Exception):
+    """Base of every error that geofield raises on purpose.
+
+    Parameters
+    ----------
+    message : str
+        What was wrong, and where.
+    hint : str, optional
+        The next step for the user.
+    """
+
+    def __init__(self, message: str, *, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.hint}" if self.hint else self.message
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only arguments are lost by the default, and pools pickle errors.
+        return (_rebuild, (type(self), self.message, self.hint))
+
+
+def _rebuild(cls: type[GeofieldError], message: str, hint: str | None) -> GeofieldError:
+    return cls(message, hint=hint)
+
+
+class SettingsError(GeofieldError):
+    """A setting is unknown, of the wrong type or out of its range."""
+
+
+class CRSError(GeofieldError):
+    """A coordinate reference system is missing, unknown or unfit."""
+
+
+class CRSMismatchError(CRSError):
+    """Two values that must share a coordinate reference system do not."""
+
+
+class GridError(GeofieldError):
+    """A raster's shape or transform is impossible."""
+
+
+class PointOutsideError(GeofieldError):
+    """The point lies outside the picture, or where the picture has no data."""
+
+
+class ImageryError(GeofieldError):
+    """A picture cannot be found, read or used."""
+
+
+class FieldError(GeofieldError):
+    """No field can be taken from the scene at the point."""
+
+
+class ObstacleError(GeofieldError):
+    """Obstacles cannot be detected or understood."""
+
+
+class TrackError(GeofieldError):
+    """Tracks cannot be planned as asked."""
+
+
+class FormatError(GeofieldError):
+    """A product cannot be written, read or validated."""
+
+
+class OutputExistsError(FormatError):
+    """The product is there already and overwriting was not asked for."""
+
+
+class GeofieldWarning(UserWarning):
+    """Base of every warning that geofield gives."""
+
+
+class FieldWarning(GeofieldWarning):
+    """The outline of a field should not be trusted unseen."""
+
+
+class ObstacleWarning(GeofieldWarning):
+    """Detection ran outside the range in which it is known to work."""
+
+
+class TrackWarning(GeofieldWarning):
+    """The tracks are valid but not all that was asked for."""
+
+
+class FormatWarning(GeofieldWarning):
+    """A format cannot carry something, or a file leaves room for doubt."""
