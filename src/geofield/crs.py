@@ -1,0 +1,141 @@
+"""Coordinate reference systems: lon/lat, the metric CRS of a place, transformers.
+
+Positions for people are WGS 84 longitude and latitude in degrees, in this order. Lengths,
+widths, areas and buffers are measured in the *metric CRS*: the UTM zone of the field.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+from pyproj import CRS, Geod, Transformer
+from pyproj.exceptions import CRSError as ProjCRSError
+
+from geofield.errors import CRSError
+
+LONLAT = CRS.from_epsg(4326)
+WEB_MERCATOR = CRS.from_epsg(3857)
+
+#: Latitude at which the Web Mercator square ends, degrees.
+WEB_MERCATOR_MAX_LAT = 85.0511287798066
+
+
+def parse_crs(value: Any) -> CRS:
+    """Any CRS description (EPSG code, WKT, PROJ string, CRS object) as a `pyproj.CRS`.
+
+    Raises
+    ------
+    CRSError
+        When there is none, or PROJ does not know it.
+    """
+    if value is None:
+        raise CRSError(
+            "There is no coordinate reference system.", hint="Name one, for instance EPSG:32633."
+        )
+    try:
+        return CRS.from_user_input(value)
+    except ProjCRSError as error:
+        raise CRSError(
+            f"Unknown coordinate reference system {str(value)[:80]!r}.",
+            hint="Give an EPSG code such as EPSG:32633, or WKT.",
+        ) from error
+
+
+def utm_crs(lon: float, lat: float) -> CRS:
+    """The WGS 84 UTM zone of a place; the polar stereographic CRS beyond 84 N and 80 S.
+
+    The zone grid has the standard exceptions for south-west Norway (32V) and Svalbard.
+
+    Parameters
+    ----------
+    lon, lat : float
+        Degrees, WGS 84.
+    """
+    if not (math.isfinite(lon) and math.isfinite(lat) and abs(lat) <= 90 and abs(lon) <= 360):
+        raise CRSError(
+            f"lon {lon}, lat {lat} is not a place on earth.",
+            hint="Longitude is -180 to 180, latitude -90 to 90 degrees.",
+        )
+    lon = (lon + 180.0) % 360.0 - 180.0
+    if lat >= 84.0:
+        return CRS.from_epsg(5041)
+    if lat < -80.0:
+        return CRS.from_epsg(5042)
+    zone = int((lon + 180.0) // 6.0) + 1
+    if 56.0 <= lat < 64.0 and 3.0 <= lon < 12.0:
+        zone = 32
+    elif lat >= 72.0 and 0.0 <= lon < 42.0:
+        zone = 31 + 2 * int((lon + 3.0) // 12.0) if lon >= 9.0 else 31
+    return CRS.from_epsg((32600 if lat >= 0 else 32700) + zone)
+
+
+def is_utm(crs: CRS) -> bool:
+    """Whether a CRS is a UTM zone in metres, of whatever datum."""
+    return crs.utm_zone is not None and is_metric(crs)
+
+
+def is_metric(crs: CRS) -> bool:
+    """Whether a CRS is projected, in metres, and not the length-stretching Web Mercator."""
+    return (
+        crs.is_projected
+        and all(axis.unit_conversion_factor == 1.0 for axis in crs.axis_info[:2])
+        and "pseudo" not in crs.name.lower()
+        and "web mercator" not in crs.name.lower()
+    )
+
+
+def metric_crs(lon: float, lat: float, own: CRS | None = None) -> CRS:
+    """The CRS in which lengths at a place are measured.
+
+    Parameters
+    ----------
+    lon, lat : float
+        Degrees, WGS 84.
+    own : CRS, optional
+        The CRS of the data. Where it is a UTM zone already (for instance NAD83 or ETRS89)
+        it is kept, so that outlines stay exactly on the picture's pixels.
+    """
+    if own is not None and is_utm(own):
+        return own
+    return utm_crs(lon, lat)
+
+
+@lru_cache(maxsize=256)
+def _transformer(source: str, target: str) -> Transformer:
+    return Transformer.from_crs(CRS.from_wkt(source), CRS.from_wkt(target), always_xy=True)
+
+
+@lru_cache(maxsize=256)
+def _wkt(crs: CRS) -> str:
+    return str(crs.to_wkt())
+
+
+def transformer(source: CRS, target: CRS) -> Transformer:
+    """A transformer between two CRS; always x (easting, longitude) before y."""
+    return _transformer(_wkt(source), _wkt(target))
+
+
+def authority_name(crs: CRS) -> str:
+    """A short name for people and files: ``EPSG:32633``, else the CRS's own name."""
+    authority = crs.to_authority(min_confidence=100)
+    return ":".join(authority) if authority else str(crs.name)
+
+
+def grid_north_deg(crs: CRS, x: float, y: float) -> float:
+    """The true heading of grid north at a place: degrees clockwise from true north.
+
+    A heading measured in the grid becomes a true heading by adding this angle (the
+    meridian convergence; up to about 2 degrees within a UTM zone at mid latitudes).
+
+    Parameters
+    ----------
+    crs : CRS
+        A projected CRS.
+    x, y : float
+        The place, in that CRS.
+    """
+    lon, lat = transformer(crs, LONLAT).transform([x, x], [y - 50.0, y + 50.0])
+    azimuth, _, _ = Geod(ellps="WGS84").inv(lon[0], lat[0], lon[1], lat[1])
+    return float(azimuth)

@@ -1,0 +1,18 @@
+"""Values that the stages hand to each other: scene, field, obstacles, tracks, dataset."""
+
+from geofield.model.dataset import Dataset, Provenance
+from geofield.model.field import Field, FieldQuality
+from geofield.model.obstacles import ObstacleShapes
+from geofield.model.scene import ImagerySource, Scene
+from geofield.model.tracks import Tracks
+
+__all__ = [
+    "Dataset",
+    "Field",
+    "FieldQuality",
+    "ImagerySource",
+    "ObstacleShapes",
+    "Provenance",
+    "Scene",
+    "Tracks",
+]

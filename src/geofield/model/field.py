@@ -1,0 +1,139 @@
+"""Field: the polygon of the target field, in the metric CRS, with its evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+from shapely import Polygon
+
+from geofield.crs import LONLAT, authority_name, is_metric, parse_crs, transformer
+from geofield.errors import CRSError, FieldError
+from geofield.grid import Grid
+
+
+@dataclass(frozen=True, slots=True)
+class FieldQuality:
+    """How far an outline can be trusted, and why.
+
+    Attributes
+    ----------
+    score : float
+        0 (do not trust) to 1.
+    reasons : tuple of str
+        What speaks against the outline, in plain words; empty when nothing does.
+    figures : tuple of (str, float)
+        The measured evidence, by name.
+    trusted : bool
+        False when a person should look before a machine drives.
+    """
+
+    score: float = 1.0
+    reasons: tuple[str, ...] = ()
+    figures: tuple[tuple[str, float], ...] = ()
+    trusted: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A field.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        Valid and not empty, in `crs`; may have holes.
+    crs : CRS
+        Projected, in true ground metres.
+    name, field_id : str
+        For people and files; `field_id` is made from the place where none is given.
+    method : str
+        How the outline came to be: ``study``, ``auto``, ``boundary``, ``drawn``, ...
+    quality : FieldQuality or None
+        None for an outline that nobody measured.
+    imagery, licence : str
+        Name and licence of the picture behind it.
+    imagery_date : str or None
+        ISO 8601.
+    """
+
+    polygon: Polygon
+    crs: CRS
+    name: str = ""
+    field_id: str = ""
+    method: str = "given"
+    quality: FieldQuality | None = None
+    imagery: str = ""
+    imagery_date: str | None = None
+    licence: str = ""
+
+    def __post_init__(self) -> None:
+        crs = parse_crs(self.crs)
+        object.__setattr__(self, "crs", crs)
+        if not is_metric(crs):
+            raise CRSError(
+                f"A field is measured in metres; {authority_name(crs)} is not a metric CRS.",
+                hint="Reproject to the UTM zone: GeoSeries.to_crs(series.estimate_utm_crs()).",
+            )
+        if not isinstance(self.polygon, Polygon) or self.polygon.is_empty:
+            raise FieldError("A field is one polygon that is not empty.")
+        if not self.polygon.is_valid:
+            raise FieldError(
+                f"The field's outline is not valid: {shapely.is_valid_reason(self.polygon)}.",
+                hint="Repair it with shapely.make_valid, or Fix geometries in QGIS.",
+            )
+        object.__setattr__(self, "polygon", shapely.force_2d(shapely.orient_polygons(self.polygon)))
+        if not self.field_id:
+            object.__setattr__(self, "field_id", _place_id(self.polygon, crs))
+        if not self.name:
+            object.__setattr__(self, "name", self.field_id)
+
+    @property
+    def area_ha(self) -> float:
+        """Area without holes, hectares."""
+        return float(self.polygon.area) / 10_000.0
+
+    @property
+    def perimeter_m(self) -> float:
+        """Length of the outer ring, metres."""
+        return float(shapely.length(shapely.get_exterior_ring(self.polygon)))
+
+    @property
+    def polygon_lonlat(self) -> Polygon:
+        """The polygon in longitude and latitude, degrees."""
+        project = transformer(self.crs, LONLAT)
+        return shapely.transform(
+            self.polygon, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
+        )
+
+    def polygon_px(self, grid: Grid) -> Polygon:
+        """The polygon in the pixel coordinates of a grid."""
+        return shapely.transform(
+            self.polygon, lambda c: np.column_stack(grid.from_crs(c[:, 0], c[:, 1], self.crs))
+        )
+
+    def mask(self, grid: Grid, *, holes: bool = True) -> NDArray[np.bool_]:
+        """Pixels of a grid whose centre lies in the field (rows, columns).
+
+        Parameters
+        ----------
+        grid : Grid
+        holes : bool
+            False fills the holes: what stage 3 searches.
+        """
+        from rasterio.features import rasterize
+
+        polygon = self.polygon_px(grid)
+        if not holes:
+            polygon = Polygon(polygon.exterior)
+        return np.asarray(rasterize([(polygon, 1)], out_shape=grid.shape, dtype="uint8"), bool)
+
+
+def _place_id(polygon: Polygon, crs: CRS) -> str:
+    """An id that is the same whenever the same field is found again: its place to ~10 m."""
+    point = polygon.representative_point()
+    lon, lat = transformer(crs, LONLAT).transform(point.x, point.y)
+    north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
+    return f"{abs(lat):.4f}{north}{abs(lon):.4f}{east}"

@@ -1,0 +1,217 @@
+"""Obstacles: a table of what no vehicle may enter, one row each.
+
+The geometry of a row is the *buffer*: the footprint (a circle of `radius_m`, or a polygon)
+grown by `buffer_m`. Columns are those of `geofield.schema.OBSTACLES`, in the metric CRS.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, transformer
+from geofield.errors import ObstacleError
+from geofield.grid import Grid
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+FloatArray = NDArray[np.float64]
+
+#: Straight pieces per quarter circle in the polygon that stands for a circle.
+QUARTER_SEGMENTS = 16
+#: A polygon whose area differs more than this from its row's circle was redrawn by a person.
+_CIRCLE_TOLERANCE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleShapes:
+    """What tracks are clipped against: true circles and polygons.
+
+    Attributes
+    ----------
+    circles : float array (n, 3)
+        Centre x, centre y, radius, metres, in the metric CRS.
+    circle_no : int array (n,)
+        The obstacle numbers of the circles.
+    polygons : object array (m,)
+        Shapely polygons.
+    polygon_no : int array (m,)
+    """
+
+    circles: FloatArray
+    circle_no: NDArray[np.int64]
+    polygons: NDArray[np.object_]
+    polygon_no: NDArray[np.int64]
+
+
+def circle_polygons(x: ArrayLike, y: ArrayLike, radius: ArrayLike) -> NDArray[np.object_]:
+    """Polygons that stand for circles, 64 vertices each, all on the circle."""
+    points = shapely.points(np.asarray(x, float), np.asarray(y, float))
+    return np.atleast_1d(
+        shapely.buffer(points, np.asarray(radius, float), quad_segs=QUARTER_SEGMENTS)
+    )
+
+
+def from_circles_px(
+    x_px: ArrayLike,
+    y_px: ArrayLike,
+    radius_px: ArrayLike,
+    grid: Grid,
+    *,
+    buffer_m: float,
+    confidence: ArrayLike | None = None,
+    crs: CRS | None = None,
+) -> gpd.GeoDataFrame:
+    """Detected circles in a picture as obstacles of kind `tree`, numbered from 1.
+
+    Parameters
+    ----------
+    x_px, y_px, radius_px : array (n,)
+        Pixels, origin at the corner of the top-left pixel.
+    grid : Grid
+    buffer_m : float
+        Safety margin, metres.
+    confidence : array (n,), optional
+        0 to 1.
+    crs : CRS, optional
+        The metric CRS; the grid's own when not given.
+    """
+    x_px, y_px = np.asarray(x_px, float), np.asarray(y_px, float)
+    radius_px = np.asarray(radius_px, float)
+    target = grid.metric_crs if crs is None else crs
+    x, y = (np.asarray(v) for v in grid.to_crs(x_px, y_px, target))
+    lon, lat = (np.asarray(v) for v in grid.to_lonlat(x_px, y_px))
+    radius_m = radius_px * np.asarray(grid.metric_scale(x_px, y_px))
+    count = len(x_px)
+    return schema.table(
+        schema.OBSTACLES,
+        {
+            "obstacle_no": np.arange(1, count + 1),
+            "kind": ["tree"] * count,
+            "status": ["detected"] * count,
+            "radius_m": radius_m,
+            "buffer_m": np.full(count, float(buffer_m)),
+            "confidence": confidence,
+            "x_px": x_px,
+            "y_px": y_px,
+            "radius_px": radius_px,
+            "lat": lat,
+            "lon": lon,
+        },
+        circle_polygons(x, y, radius_m + buffer_m) if count else [],
+        target,
+    )
+
+
+def from_polygons(
+    footprints: ArrayLike,
+    crs: CRS,
+    *,
+    buffer_m: float,
+    grid: Grid | None = None,
+    confidence: ArrayLike | None = None,
+    status: str = "detected",
+    first_no: int = 1,
+) -> gpd.GeoDataFrame:
+    """Footprints that are not round as obstacles of kind `other`.
+
+    `radius_m` is missing; the position columns hold the footprint's centroid.
+    """
+    shapes = np.asarray(footprints, dtype=object)
+    count = len(shapes)
+    if not count:
+        return schema.empty(schema.OBSTACLES, crs)
+    centre = shapely.centroid(shapes)
+    x, y = shapely.get_x(centre), shapely.get_y(centre)
+    lon, lat = transformer(crs, LONLAT).transform(x, y)
+    missing = np.full(count, np.nan)
+    x_px, y_px = grid.from_crs(x, y, crs) if grid is not None else (missing, missing)
+    grown = shapely.buffer(shapes, buffer_m, quad_segs=8) if buffer_m else shapes
+    return schema.table(
+        schema.OBSTACLES,
+        {
+            "obstacle_no": np.arange(first_no, first_no + count),
+            "kind": ["other"] * count,
+            "status": [status] * count,
+            "buffer_m": np.full(count, float(buffer_m)),
+            "confidence": confidence,
+            "x_px": x_px,
+            "y_px": y_px,
+            "lat": lat,
+            "lon": lon,
+        },
+        grown,
+        crs,
+    )
+
+
+def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
+    """The shapes to avoid: rows that are not rejected, circles as true circles.
+
+    A row is a circle when its polygon still is the circle of `radius_m + buffer_m` (it may
+    have been moved); where a person reshaped it, the polygon as drawn counts.
+
+    Raises
+    ------
+    ObstacleError
+        When a radius or safety margin is negative or infinite.
+    """
+    frame = obstacles
+    if "status" in frame.columns:
+        frame = frame[frame["status"] != "rejected"]
+    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
+    frame, geometry = frame[present], geometry[present]
+    count = len(geometry)
+    numbers = _numbers(frame)
+    radius = _floats(frame, "radius_m", count)
+    margin = np.nan_to_num(_floats(frame, "buffer_m", count), nan=0.0)
+    if np.any(np.isinf(radius) | (radius < 0) | ~np.isfinite(margin) | (margin < 0)):
+        raise ObstacleError(
+            "An obstacle's radius_m or buffer_m is negative or infinite.",
+            hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
+        )
+    total = radius + margin
+    area = shapely.area(geometry)
+    vertices = 4 * QUARTER_SEGMENTS
+    circle_area = 0.5 * vertices * np.sin(2 * np.pi / vertices) * total**2
+    hull_is_round = np.abs(4 * np.pi * area - shapely.length(geometry) ** 2) <= 0.02 * (
+        4 * np.pi * area
+    )
+    with np.errstate(invalid="ignore"):
+        is_circle = (
+            (shapely.get_type_id(geometry) == shapely.GeometryType.POLYGON.value)
+            & (np.abs(area - circle_area) <= _CIRCLE_TOLERANCE * circle_area)
+            & hull_is_round
+        )
+    centre = shapely.centroid(geometry[is_circle])
+    return ObstacleShapes(
+        np.column_stack([shapely.get_x(centre), shapely.get_y(centre), total[is_circle]]),
+        numbers[is_circle],
+        geometry[~is_circle],
+        numbers[~is_circle],
+    )
+
+
+def _floats(frame: gpd.GeoDataFrame, column: str, count: int) -> FloatArray:
+    if column not in frame.columns:
+        return np.full(count, np.nan)
+    return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))
+
+
+def _numbers(frame: Any) -> NDArray[np.int64]:
+    """Obstacle numbers; rows without one (drawn by a person) get the next free ones."""
+    if "obstacle_no" not in frame.columns:
+        return np.arange(1, len(frame) + 1)
+    numbers = frame["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan)
+    missing = np.isnan(numbers)
+    start = int(np.nanmax(numbers, initial=0)) + 1
+    numbers[missing] = np.arange(start, start + int(missing.sum()))
+    return np.asarray(numbers, dtype=np.int64)

@@ -1,0 +1,187 @@
+"""Scene: the picture that a field is found in, with its source, date and terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import ImageryError, PointOutsideError
+from geofield.grid import Grid
+
+#: What a band can show.
+ROLES = ("red", "green", "blue", "nir", "grey", "other")
+
+#: Weights of red, green and blue in the grey picture (METHOD.md, section 2).
+GREY_WEIGHTS = (0.298, 0.587, 0.114)
+
+
+@dataclass(frozen=True, slots=True)
+class ImagerySource:
+    """Where a picture comes from and what its terms allow.
+
+    Attributes
+    ----------
+    name : str
+        The source's name, or the file's, without folders.
+    date : str or None
+        When the picture was taken, ISO 8601; None where nobody knows.
+    attribution, licence : str
+        As they must travel with every product.
+    may_derive, may_cache : bool
+        Whether the terms allow deriving geodata, and keeping tiles.
+    zoom : int or None
+        Of tiled sources.
+    details : tuple of (str, str)
+        Further facts, for instance the fetch date; never a key or password.
+    """
+
+    name: str = ""
+    date: str | None = None
+    attribution: str = ""
+    licence: str = ""
+    may_derive: bool = True
+    may_cache: bool = True
+    zoom: int | None = None
+    details: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A georeferenced picture in memory.
+
+    Attributes
+    ----------
+    grid : Grid
+        Where its pixels lie.
+    bands : uint8 array (bands, rows, columns)
+        Values scaled to 0..255; the scaling is in `scaling`.
+    roles : tuple of str
+        What each band shows, one of `ROLES`.
+    valid : bool array (rows, columns)
+        False where the picture has no data.
+    source : ImagerySource
+    scaling : (float, float) or None
+        The file's values that became 0 and 255; None where the file held 8 bits.
+    notes : tuple of str
+        What was done to the picture on the way in (reprojected, rescaled, cut off).
+    """
+
+    grid: Grid
+    bands: NDArray[np.uint8]
+    roles: tuple[str, ...]
+    valid: NDArray[np.bool_]
+    source: ImagerySource = field(default_factory=ImagerySource)
+    scaling: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.bands.ndim != 3 or self.bands.shape[0] != len(self.roles) or not self.roles:
+            raise ImageryError(
+                f"{self.bands.shape} bands do not fit the {len(self.roles)} roles {self.roles}."
+            )
+        if self.bands.shape[1:] != self.grid.shape or self.valid.shape != self.grid.shape:
+            raise ImageryError(
+                f"Bands {self.bands.shape[1:]} and mask {self.valid.shape} do not fit the grid "
+                f"{self.grid.shape}."
+            )
+        unknown = set(self.roles) - set(ROLES)
+        if unknown:
+            raise ImageryError(f"Unknown band role {sorted(unknown)[0]!r}.", hint=f"Use {ROLES}.")
+
+    def band(self, role: str) -> NDArray[np.uint8] | None:
+        """The first band of a role, or None."""
+        return self.bands[self.roles.index(role)] if role in self.roles else None
+
+    @property
+    def is_colour(self) -> bool:
+        """Whether red, green and blue are all there."""
+        return {"red", "green", "blue"} <= set(self.roles)
+
+    @property
+    def nir(self) -> NDArray[np.uint8] | None:
+        """The near infrared band, or None."""
+        return self.band("nir")
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """Red, green and blue (rows, columns, 3); one band repeated where there is no colour."""
+        if self.is_colour:
+            index = [self.roles.index(role) for role in ("red", "green", "blue")]
+        else:
+            index = [self._grey_index()] * 3
+        return np.ascontiguousarray(np.moveaxis(self.bands[index], 0, -1))
+
+    @property
+    def grey(self) -> NDArray[np.float32]:
+        """Brightness 0..255: ``0.298 R + 0.587 G + 0.114 B`` (METHOD.md, section 2)."""
+        if not self.is_colour:
+            return np.asarray(self.bands[self._grey_index()], np.float32)
+        grey = np.zeros(self.grid.shape, np.float32)
+        for role, weight in zip(("red", "green", "blue"), GREY_WEIGHTS, strict=True):
+            grey += np.float32(weight) * self.bands[self.roles.index(role)]
+        return grey
+
+    def _grey_index(self) -> int:
+        for role in ("grey", "green", "red", "blue", "other", "nir"):
+            if role in self.roles:
+                return self.roles.index(role)
+        raise ImageryError("The picture has no band.")
+
+    def crop(self, column: int, row: int, width_px: int, height_px: int) -> Scene:
+        """The part that starts at a column and row; cut at the picture's edge."""
+        c0, r0 = max(column, 0), max(row, 0)
+        c1 = min(column + width_px, self.grid.width_px)
+        r1 = min(row + height_px, self.grid.height_px)
+        if c1 <= c0 or r1 <= r0:
+            raise ImageryError("The part lies outside the picture.")
+        return Scene(
+            self.grid.crop(c0, r0, c1 - c0, r1 - r0),
+            self.bands[:, r0:r1, c0:c1],
+            self.roles,
+            self.valid[r0:r1, c0:c1],
+            self.source,
+            self.scaling,
+            self.notes,
+        )
+
+    def pixel_of(self, *, lat: float, lon: float) -> tuple[float, float]:
+        """The pixel position of a point that must lie on the picture's data.
+
+        Parameters
+        ----------
+        lat, lon : float
+            Degrees, WGS 84.
+
+        Raises
+        ------
+        PointOutsideError
+            Outside the picture (says so when latitude and longitude look swapped), or
+            where it has no data.
+        """
+        x, y = self.grid.from_lonlat(lon, lat)
+        if not self.grid.contains_px(x, y):
+            raise PointOutsideError(*_outside_message(self.grid, lat, lon))
+        if not self.valid[int(y), int(x)]:
+            raise PointOutsideError(
+                f"The point lat {lat}, lon {lon} (pixel {x:.0f}, {y:.0f}) lies where the picture "
+                "has no data.",
+                hint="Choose a point on the picture itself.",
+            )
+        return float(x), float(y)
+
+
+def _outside_message(grid: Grid, lat: float, lon: float) -> tuple[str, ...]:
+    corners = grid.corners_lonlat()
+    lons, lats = [c[0] for c in corners], [c[1] for c in corners]
+    message = (
+        f"The point lat {lat}, lon {lon} lies outside the picture, which covers lat "
+        f"{min(lats):.6f} to {max(lats):.6f}, lon {min(lons):.6f} to {max(lons):.6f}."
+    )
+    swapped = (
+        abs(lon) <= 90 and grid.contains_px(*grid.from_lonlat(lat, lon))  # lat as lon and back
+    )
+    if swapped:
+        message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+    return (message,)

@@ -1,0 +1,119 @@
+"""Tracks: the lines to drive, their segments and gaps, and the points along them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, transformer
+from geofield.grid import Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import geopandas as gpd
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """Planned tracks of one field.
+
+    Attributes
+    ----------
+    lines, segments, gaps : GeoDataFrame
+        Layers `tracks`, `segments`, `gaps` of `geofield.schema`, in the metric CRS.
+    heading_deg : float
+        Of track 1, degrees clockwise from true north, 0 <= heading < 180.
+    spacing_m : float
+        Between neighbouring tracks, ground metres.
+    step_m : float
+        Between track points along a segment; both ends are always points.
+    grid : Grid or None
+        Gives the points their pixel position.
+    notes : tuple of str
+        What the planner had to tell.
+    """
+
+    lines: gpd.GeoDataFrame
+    segments: gpd.GeoDataFrame
+    gaps: gpd.GeoDataFrame
+    heading_deg: float
+    spacing_m: float
+    step_m: float = 1.0
+    grid: Grid | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def crs(self) -> CRS:
+        """The metric CRS."""
+        return CRS(self.segments.crs)
+
+    @cached_property
+    def points(self) -> gpd.GeoDataFrame:
+        """Layer `track_points`, computed when first asked for."""
+        import pandas as pd
+
+        chunks = list(self.point_chunks())
+        if not chunks:
+            return schema.empty(schema.TRACK_POINTS, self.crs)
+        return pd.concat(chunks, ignore_index=True)
+
+    def point_chunks(self, rows: int = 200_000) -> Iterator[gpd.GeoDataFrame]:
+        """The track points in tables of about `rows` rows, for streaming."""
+        coordinates = shapely.get_coordinates(self.segments.geometry.to_numpy()).reshape(-1, 2, 2)
+        length = np.hypot(*(coordinates[:, 1] - coordinates[:, 0]).T)
+        # A rest shorter than a micrometre is rounding, not a further point.
+        counts = np.ceil(length / self.step_m - 1e-6).astype(np.int64).clip(min=1) + 1
+        track_no = self.segments["track_no"].to_numpy(dtype=np.int64)
+        segment_no = self.segments["segment_no"].to_numpy(dtype=np.int64)
+        batches = np.cumsum(counts) // rows
+        done = 0
+        for batch in np.unique(batches):
+            part = np.flatnonzero(batches == batch)
+            number = counts[part]
+            total = int(number.sum())
+            first = np.repeat(np.cumsum(number) - number, number)
+            along = np.minimum(
+                (np.arange(total) - first) * self.step_m, np.repeat(length[part], number)
+            )
+            start = np.repeat(coordinates[part, 0], number, axis=0)
+            direction = (coordinates[part, 1] - coordinates[part, 0]) / length[part, None]
+            xy = start + along[:, None] * np.repeat(direction, number, axis=0)
+            yield self._point_table(
+                xy,
+                np.arange(done + 1, done + total + 1),
+                np.repeat(track_no[part], number),
+                np.repeat(segment_no[part], number),
+            )
+            done += total
+
+    def _point_table(
+        self, xy: np.ndarray, point_no: np.ndarray, track_no: np.ndarray, segment_no: np.ndarray
+    ) -> gpd.GeoDataFrame:
+        lon, lat = transformer(self.crs, LONLAT).transform(xy[:, 0], xy[:, 1])
+        missing = np.full(len(xy), np.nan)
+        x_px, y_px = (
+            (missing, missing)
+            if self.grid is None
+            else self.grid.from_crs(xy[:, 0], xy[:, 1], self.crs)
+        )
+        return schema.table(
+            schema.TRACK_POINTS,
+            {
+                "point_no": point_no,
+                "track_no": track_no,
+                "segment_no": segment_no,
+                "x_px": x_px,
+                "y_px": y_px,
+                "lat": lat,
+                "lon": lon,
+            },
+            shapely.points(xy),
+            self.crs,
+        )
