@@ -11,7 +11,7 @@ comparisons, not for claims about real fields.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -166,8 +166,8 @@ def simulate_fields(
     *,
     obstacle_counts: Sequence[int] | None = None,
     equal_brightness_every: int = 3,
-) -> list[SimulatedField]:
-    """Draw several fields; every third has neighbours of its own grey level.
+) -> Iterator[SimulatedField]:
+    """Draw several fields, one at a time; every third has neighbours of its own grey level.
 
     Parameters
     ----------
@@ -179,15 +179,13 @@ def simulate_fields(
         0 for never.
     """
     settings = settings or SimulationSettings()
-    fields = []
     for index in range(count):
         one = settings
         if obstacle_counts:
             one = replace(one, obstacles=int(obstacle_counts[index % len(obstacle_counts)]))
         if equal_brightness_every and index % equal_brightness_every == 0:
             one = replace(one, equal_brightness=True)
-        fields.append(simulate_field(seed * 100_003 + index, one))
-    return fields
+        yield simulate_field(seed * 100_003 + index, one)
 
 
 def _grid(settings: SimulationSettings) -> Grid:

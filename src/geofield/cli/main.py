@@ -1,0 +1,110 @@
+"""The ``geofield`` command: finds subcommands by name and turns errors into exit codes.
+
+Subcommands are imported only when they run, so that ``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import warnings
+from typing import Any
+
+import click
+
+from geofield import __version__
+from geofield.errors import GeofieldError, GeofieldWarning
+
+#: Name, "module:function" and the one line of help, in the order of the work.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("geofield.cli.run:run", "The main job: picture and point in, all products out."),
+    "tiles": ("geofield.cli.tiles:tiles", "Stage 1: get imagery as a GeoTIFF."),
+    "field": ("geofield.cli.field:field", "Stage 2: find the field's outline."),
+    "obstacles": ("geofield.cli.obstacles:obstacles", "Stage 3: find the obstacles in it."),
+    "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
+    "export": ("geofield.cli.export:export", "Write other formats from a plan."),
+    "simulate": ("geofield.cli.simulate:simulate", "Make synthetic fields with known truth."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that imports a subcommand when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The subcommand of a name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, function = COMMANDS[cmd_name][0].partition(":")
+        command: click.Command = getattr(importlib.import_module(module), function)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As in click, with a suggestion for a mistyped name."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            import difflib
+
+            close = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            hint = f" Did you mean {close[0]!r}?" if close else " See `geofield --help`."
+            raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield run sample_data/field.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield tracks out/field.gpkg --spacing 6 -o wider.gpkg
+""",
+)
+@click.version_option(__version__, prog_name="geofield")
+def cli() -> None:
+    """From a point in a farm field and a picture of it to drivable geodata.
+
+    The field's outline, the obstacles in it and the tracks to drive, as files that QGIS,
+    geopandas and farm terminals open.
+    """
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    if issubclass(category, GeofieldWarning):
+        click.secho(f"Note: {message}", fg="yellow", err=True)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", GeofieldWarning)
+        warnings.showwarning = _show_warning
+        try:
+            cli.main(args=args, prog_name="geofield", standalone_mode=False)
+        except click.exceptions.Exit as stop:
+            sys.exit(stop.exit_code)
+        except click.ClickException as error:
+            error.show()
+            sys.exit(error.exit_code)
+        except (click.Abort, KeyboardInterrupt):
+            click.echo("Stopped; nothing half-written is left.", err=True)
+            sys.exit(1)
+        except GeofieldError as error:
+            click.secho(f"Error: {error.message}", fg="red", err=True)
+            if error.hint:
+                click.echo(error.hint, err=True)
+            sys.exit(1)
+        except BrokenPipeError:
+            # The reader of our output (head, less) has gone: not our failure.
+            sys.stderr.close()
+            sys.exit(0)

@@ -1,0 +1,125 @@
+"""Options that commands share, and options made from a section of the settings.
+
+A setting is described once, in `geofield.settings`; :func:`section_options` turns a
+section into click options with the same types, defaults and help.
+"""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeVar
+
+import click
+from pydantic.fields import FieldInfo
+
+from geofield.settings import Settings, Stage
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_UNITS = ("_m", "_deg", "_px", "_ha")
+_SEPARATOR = "__"
+
+
+class LatitudeType(click.FloatRange):
+    """A latitude in degrees."""
+
+    name = "degrees"
+
+    def __init__(self, limit: float) -> None:
+        super().__init__(-limit, limit)
+
+
+def point_options(command: Command) -> Command:
+    """Add ``--lat`` and ``--lon``, both required."""
+    command = click.option(
+        "--lon", type=LatitudeType(180), required=True, help="Longitude of a point in the field."
+    )(command)
+    return click.option(
+        "--lat", type=LatitudeType(90), required=True, help="Latitude of a point in the field."
+    )(command)
+
+
+def settings_option(command: Command) -> Command:
+    """Add ``--settings FILE``."""
+    return click.option(
+        "--settings",
+        "settings_file",
+        type=click.Path(exists=True, dir_okay=False),
+        help="TOML file with a table per stage; geofield.toml here is read by itself.",
+    )(command)
+
+
+def section_options(section: Stage, *, only: tuple[str, ...] = ()) -> Callable[[Command], Command]:
+    """Add an option for each setting of a section, or for some of them.
+
+    ``tracks.spacing_m`` becomes ``--spacing``; its value arrives as ``tracks__spacing_m`` and
+    is None when not given, so that file and environment keep their say.
+    :func:`section_values` collects them.
+    """
+
+    def add(command: Command) -> Command:
+        model = Settings.model_fields[section].annotation
+        for name, field in reversed(model.model_fields.items()):  # type: ignore[union-attr]
+            if not only or name in only:
+                command = _option(section, name, field)(command)
+        return command
+
+    return add
+
+
+def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The values of :func:`section_options`, by section; those not given are left out."""
+    sections: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        section, separator, name = key.partition(_SEPARATOR)
+        if separator and value is not None and value != ():
+            sections.setdefault(section, {})[name] = value
+    return sections
+
+
+def _option(section: str, name: str, field: FieldInfo) -> Callable[[Command], Command]:
+    extra = field.json_schema_extra
+    flag = extra.get("option") if isinstance(extra, dict) else None
+    if not isinstance(flag, str):
+        flag = "--" + name.removesuffix(next((u for u in _UNITS if name.endswith(u)), ""))
+        flag = flag.replace("_", "-")
+    arguments: dict[str, Any] = {"help": _help(field), **_click_type(field.annotation)}
+    if arguments.pop("is_flag", False):
+        return click.option(
+            f"{flag}/--no-{flag[2:]}", f"{section}{_SEPARATOR}{name}", default=None, **arguments
+        )
+    return click.option(flag, f"{section}{_SEPARATOR}{name}", default=None, **arguments)
+
+
+def _help(field: FieldInfo) -> str:
+    default = field.get_default()
+    if default is None or default == ():
+        return field.description or ""
+    if isinstance(default, tuple):
+        default = " ".join(str(part) for part in default)
+    elif isinstance(default, bool):
+        default = "on" if default else "off"
+    elif isinstance(default, float):
+        default = f"{default:g}"
+    return f"{field.description}  [default: {default}]"
+
+
+def _click_type(annotation: Any) -> dict[str, Any]:
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is typing.Annotated:
+        return _click_type(arguments[0])
+    if origin in (types.UnionType, typing.Union):
+        plain = [each for each in arguments if each is not type(None)]
+        return _click_type(plain[0]) if len(plain) == 1 else {"type": str}
+    if origin is Literal:
+        return {"type": click.Choice([str(each) for each in arguments])}
+    if origin is tuple:
+        inner = _click_type(arguments[0])
+        if len(arguments) == 2 and arguments[1] is Ellipsis:
+            return {**inner, "multiple": True}
+        return {"type": tuple(_click_type(each).get("type", str) for each in arguments)}
+    if annotation is bool:
+        return {"is_flag": True}
+    return {"type": annotation if annotation in (int, float, str) else str}

@@ -1,0 +1,172 @@
+"""Settings: one section per stage, from a TOML file, the environment and the command line.
+
+Later sources win: defaults, ``geofield.toml``, ``GEOFIELD_TRACKS__SPACING_M=3`` and the like
+in the environment, options of the command line. A section's field names are the keyword
+arguments of its stage, so that each figure is described once, here.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from geofield.errors import SettingsError
+
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class Section(BaseModel):
+    """Base of the sections: unknown names are refused, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ImagerySettings(Section):
+    """Stage 1: the picture."""
+
+    size_m: PositiveFloat | None = Field(
+        None,
+        description="Side of the window read around the point, metres; all of a small picture.",
+    )
+    bands: tuple[str, ...] | None = Field(
+        None,
+        description="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
+    )
+
+
+class FieldSettings(Section):
+    """Stage 2: the outline."""
+
+    method: str = Field("auto", description="How the outline is found: auto, study.")
+
+
+class ObstacleSettings(Section):
+    """Stage 3: the obstacles."""
+
+    strategy: str = Field(
+        "auto",
+        description="How obstacles are found: auto, single, t_range, max_of_all, dlc, consensus.",
+    )
+    radius_m: tuple[PositiveFloat, PositiveFloat] = Field(
+        (2.0, 9.0), description="Smallest and largest crown radius, metres."
+    )
+    buffer_m: NonNegative = Field(1.0, description="Safety margin around each obstacle, metres.")
+
+
+class TrackSettings(Section):
+    """Stage 4: the tracks."""
+
+    spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
+    step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
+
+
+class ExportSettings(Section):
+    """What is written."""
+
+    formats: tuple[str, ...] = Field(
+        ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
+    )
+
+
+class Settings(BaseSettings):
+    """All settings of a run.
+
+    Examples
+    --------
+    >>> Settings(tracks={"spacing_m": 3}).tracks.spacing_m
+    3.0
+    """
+
+    model_config = SettingsConfigDict(
+        env_prefix="GEOFIELD_",
+        env_nested_delimiter="__",
+        extra="forbid",
+        frozen=True,
+        nested_model_default_partial_update=True,
+    )
+
+    imagery: ImagerySettings = ImagerySettings()
+    field: FieldSettings = FieldSettings()
+    obstacles: ObstacleSettings = ObstacleSettings()
+    tracks: TrackSettings = TrackSettings()
+    export: ExportSettings = ExportSettings()
+
+
+SECTIONS = ("imagery", "field", "obstacles", "tracks", "export")
+Stage = Literal["imagery", "field", "obstacles", "tracks", "export"]
+
+
+def load_settings(
+    path: str | Path | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+) -> Settings:
+    """Settings from a TOML file, the environment and explicit values, the last one winning.
+
+    Parameters
+    ----------
+    path : path, optional
+        A TOML file with a table per section. ``geofield.toml`` in the working folder is read
+        when it exists and no path is given.
+    overrides : mapping of section to mapping, optional
+        Values that win over everything else; None values are passed over.
+
+    Raises
+    ------
+    SettingsError
+        Naming the setting, its value and what would be right.
+    """
+    values = _read_toml(path)
+    try:
+        base = Settings()
+        merged = base.model_dump(exclude_unset=False)
+        environment = base.model_dump(exclude_unset=True)
+        for section, settings in values.items():
+            if section not in SECTIONS:
+                raise SettingsError(
+                    f"Unknown section [{section}] in the settings file.",
+                    hint=f"Sections: {', '.join(SECTIONS)}.",
+                )
+            merged[section] |= settings
+        for source in (environment, overrides or {}):
+            for section, settings in source.items():
+                merged[section] |= {k: v for k, v in settings.items() if v is not None}
+        return Settings(**merged)
+    except ValidationError as error:
+        raise SettingsError(_explain(error)) from None
+
+
+def from_mapping(values: Mapping[str, Any]) -> Settings:
+    """Settings as a product recorded them; names that are gone since are passed over."""
+    known: dict[str, Any] = {}
+    for section in SECTIONS:
+        fields = Settings.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
+        recorded = values.get(section, {})
+        known[section] = {name: recorded[name] for name in recorded if name in fields}
+    try:
+        return Settings(**known)
+    except ValidationError as error:
+        raise SettingsError(_explain(error)) from None
+
+
+def _read_toml(path: str | Path | None) -> dict[str, Any]:
+    file = Path(path) if path is not None else Path("geofield.toml")
+    if path is None and not file.is_file():
+        return {}
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"The settings file {file} cannot be read: {error.strerror}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"The settings file {file} is not valid TOML: {error}.") from None
+
+
+def _explain(error: ValidationError) -> str:
+    lines = []
+    for problem in error.errors():
+        name = ".".join(str(part) for part in problem["loc"])
+        lines.append(f"{name}: {problem['msg'].lower()} (given: {problem.get('input')!r})")
+    return "Settings are not valid: " + "; ".join(lines) + "."
