@@ -1,0 +1,169 @@
+"""Circular Hough transforms with one accumulator: PhaseCode and TwoStage.
+
+PhaseCode (T. J. Atherton, D. J. Kerbyson, "Size invariant circle detection", Image and
+Vision Computing 17, 1999) writes the radius of every vote into its phase, so that one
+complex picture holds centres and radii. TwoStage finds the centres from plain votes and then
+measures each radius on a histogram of the distances of the edge pixels around it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.obstacles.accumulator import (
+    EdgePixels,
+    Polarity,
+    radii_between,
+    smooth,
+    spokes,
+    voting_pixels,
+)
+from geofield.obstacles.circles import Circles, checked_range
+from geofield.obstacles.peaks import plateau_labels
+
+CircleMethod = Literal["phase_code", "two_stage"]
+CIRCLE_METHODS: tuple[CircleMethod, ...] = get_args(CircleMethod)
+DEFAULT_SENSITIVITY = 0.85
+
+
+def find_circles(
+    image: NDArray[np.generic],
+    radius_px: tuple[float, float],
+    *,
+    polarity: Polarity = "bright",
+    sensitivity: float = DEFAULT_SENSITIVITY,
+    edge_threshold: float | None = None,
+    method: CircleMethod = "phase_code",
+    region: NDArray[np.bool_] | None = None,
+    warn: bool = True,
+) -> Circles:
+    """Find circles in a grey or logical picture.
+
+    Parameters
+    ----------
+    image : array, shape (rows, cols)
+        Integers are scaled to 0..1.
+    radius_px : (low, high)
+        Radii in pixels. The transform is at its best with ``low > 5`` and ``high < 3 low``;
+        a range outside warns, since the study's own 4 to 18 is one.
+    polarity : {"bright", "dark"}
+        Of the circles against what is around them.
+    sensitivity : float
+        0..1; larger finds weaker circles.
+    edge_threshold : float, optional
+        Share of the largest gradient above which pixels vote; default Otsu's.
+    method : {"phase_code", "two_stage"}
+    region : bool array, optional
+        Only these pixels vote.
+    warn : bool
+        Whether a radius range outside the recommended one warns.
+
+    Returns
+    -------
+    Circles
+        Strongest first, none when no peak stands out. Centres in pixel-index coordinates.
+
+    Raises
+    ------
+    ObstacleError
+        For an impossible range, sensitivity, threshold, polarity or method.
+    """
+    low, high = checked_range(radius_px)
+    if not 0 <= sensitivity <= 1:
+        raise ObstacleError(f"The sensitivity {sensitivity:g} is outside 0 to 1.")
+    if method not in CIRCLE_METHODS:
+        raise ObstacleError(
+            f"Unknown circle method {method!r}.", hint=f"Choose {' or '.join(CIRCLE_METHODS)}."
+        )
+    if warn and (low <= 5 or high >= 3 * low):
+        warnings.warn(
+            f"Radii of {low:g} to {high:g} px are outside the range the circular Hough "
+            "transform is reliable in (above 5 px, and less than threefold).",
+            ObstacleWarning,
+            stacklevel=2,
+        )
+    edges = voting_pixels(image, edge_threshold=edge_threshold, region=region)
+    if len(edges) == 0:
+        return Circles()
+    return circles_from_edges(edges, (low, high), polarity, sensitivity, method)
+
+
+def circles_from_edges(
+    edges: EdgePixels,
+    radius_px: tuple[float, float],
+    polarity: Polarity,
+    sensitivity: float,
+    method: CircleMethod = "phase_code",
+) -> Circles:
+    """Find circles from the pixels that vote; see :func:`find_circles`."""
+    radii = radii_between(*radius_px)
+    where, which = spokes(edges, radii, polarity)
+    if where.size == 0:
+        return Circles()
+    size = edges.shape[0] * edges.shape[1]
+    weight = 1.0 / radii
+    if method == "phase_code":
+        span = float(np.log(radii[-1]) - np.log(radii[0])) or 1.0
+        phase = 2 * np.pi * (np.log(radii) - np.log(radii[0])) / span
+        vote = weight * np.exp(1j * phase)
+        real = np.bincount(where, weights=vote.real[which], minlength=size)
+        imaginary = np.bincount(where, weights=vote.imag[which], minlength=size)
+        votes = (real + 1j * imaginary).reshape(edges.shape)
+        height = np.abs(votes)
+    else:
+        votes = None
+        height = np.bincount(where, weights=weight[which], minlength=size).reshape(edges.shape)
+    height = smooth(height, 9, 2.0, "constant")
+    x, y, strength = _centres(height, (1.0 - sensitivity) * 2 * np.pi)
+    if x.size == 0:
+        return Circles()
+    if votes is None:
+        radius = _radii_by_histogram(edges, x, y, radii)
+    else:
+        rows = np.clip(np.floor(y + 0.5).astype(np.intp), 0, edges.shape[0] - 1)
+        cols = np.clip(np.floor(x + 0.5).astype(np.intp), 0, edges.shape[1] - 1)
+        theta = np.mod(np.angle(votes[rows, cols]), 2 * np.pi)
+        radius = np.exp(theta / (2 * np.pi) * np.log(radii[-1] / radii[0]) + np.log(radii[0]))
+    order = np.argsort(-strength, kind="stable")
+    return Circles(x, y, radius, strength).take(order)
+
+
+def _centres(
+    height: NDArray[np.float64], h: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the centroid of each plateau (it is flat, so no weights), and the height there."""
+    labels, count = plateau_labels(height, h)
+    if count == 0:
+        none = np.empty(0)
+        return none, none, none
+    rows, cols = np.nonzero(labels)
+    label = labels[rows, cols] - 1
+    total = np.bincount(label, minlength=count)
+    x = np.bincount(label, weights=cols, minlength=count) / total
+    y = np.bincount(label, weights=rows, minlength=count) / total
+    strength = height[np.floor(y + 0.5).astype(np.intp), np.floor(x + 0.5).astype(np.intp)]
+    return x, y, strength
+
+
+def _radii_by_histogram(
+    edges: EdgePixels,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    radii: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the radius at which the ring around each centre holds most edge pixels.
+
+    A large ring holds more pixels by chance, so counts are divided by the circumference.
+    """
+    out = np.empty(x.size)
+    bins = np.append(radii - 0.25, radii[-1] + 0.25)
+    for i in range(x.size):
+        distance = np.hypot(edges.x_px - x[i], edges.y_px - y[i])
+        counts, _ = np.histogram(distance, bins=bins)
+        out[i] = radii[int(np.argmax(counts / (2 * np.pi * radii)))]
+    return cast("NDArray[np.float64]", out)
