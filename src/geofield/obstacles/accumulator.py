@@ -126,7 +126,7 @@ def voting_pixels(
 def radii_between(low_px: float, high_px: float) -> NDArray[np.float64]:
     """Return the radii that are voted for, half a pixel apart."""
     count = int(np.floor((high_px - low_px) / RADIUS_STEP_PX + 1e-9)) + 1
-    return low_px + RADIUS_STEP_PX * np.arange(count)
+    return low_px + RADIUS_STEP_PX * np.arange(count, dtype=np.float64)
 
 
 def spokes(

@@ -40,7 +40,8 @@ def as_unit(image: NDArray[np.generic]) -> NDArray[np.float64]:
     if image.dtype == np.bool_:
         return image.astype(np.float64)
     if np.issubdtype(image.dtype, np.integer):
-        return image.astype(np.float64) / np.iinfo(image.dtype).max
+        grey: NDArray[np.float64] = image.astype(np.float64)
+        return grey / float(np.iinfo(image.dtype.name).max)
     return image.astype(np.float64)
 
 
@@ -88,7 +89,9 @@ def _separable(
     grey: NDArray[np.float64], along_rows: FloatImage, along_cols: FloatImage
 ) -> NDArray[np.float64]:
     rows = ndimage.correlate1d(grey, along_rows, axis=0, mode="nearest")
-    return cast("NDArray[np.float64]", ndimage.correlate1d(rows, along_cols, axis=1, mode="nearest"))
+    return cast(
+        "NDArray[np.float64]", ndimage.correlate1d(rows, along_cols, axis=1, mode="nearest")
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +192,7 @@ def _thinned(squared: NDArray[np.float64]) -> BoolImage:
     here = p[1:-1, 1:-1]
     horizontal = (here > p[1:-1, :-2]) & (here > p[1:-1, 2:])
     vertical = (here > p[:-2, 1:-1]) & (here > p[2:, 1:-1])
-    return cast("BoolImage", horizontal | vertical)
+    return horizontal | vertical
 
 
 def _canny_ridge(

@@ -1,0 +1,255 @@
+"""Stage 3 from a scene to a table of obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from geofield.errors import ObstacleError
+from geofield.model.field import Field
+from geofield.model.obstacles import from_circles_px
+from geofield.model.scene import Scene
+from geofield.obstacles.accumulator import otsu_threshold
+from geofield.obstacles.checks import (
+    GREY_LIMIT,
+    dark_enough,
+    first_of_duplicates,
+    inside,
+    relative_grey_limit,
+)
+from geofield.obstacles.circles import checked_range
+from geofield.obstacles.edges import EdgeMethod
+from geofield.obstacles.phase_code import CircleMethod, find_circles
+from geofield.obstacles.strategies import (
+    EdgeCircles,
+    StrategyResult,
+    StudyStrategy,
+    ThresholdRange,
+    run_strategy,
+)
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+Strategy = Literal[
+    "auto",
+    "single",
+    "t_range",
+    "max_of_all",
+    "dlc",
+    "consensus",
+    "study_text",
+    "study_listing",
+    "study_dlc",
+]
+STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
+GreyCheck = Literal["absolute", "relative"]
+Progress = Callable[[int, int, str], None]
+
+STUDY_RADIUS_PX = (4.0, 18.0)
+STUDY_SMOOTHED_RADIUS_PX = (4.0, 16.0)
+STUDY_EDGE_THRESHOLD = 0.27
+
+
+def detect_obstacles(
+    scene: Scene,
+    field: Field | None = None,
+    *,
+    strategy: Strategy = "auto",
+    radius_m: tuple[float, float] = (2.0, 9.0),
+    buffer_m: float = 1.0,
+    edge_method: EdgeMethod | None = None,
+    threshold: float | None = None,
+    threshold_range: ThresholdRange | None = None,
+    circle_method: CircleMethod = "phase_code",
+    sensitivity: float = 0.85,
+    grey_check: GreyCheck | float | None = None,
+    min_share: float = 0.1,
+    progress: Progress | None = None,
+) -> gpd.GeoDataFrame:
+    """Find the obstacles in a field.
+
+    Parameters
+    ----------
+    scene : Scene
+    field : Field, optional
+        Only obstacles with their centre inside its outer ring are returned; holes do not
+        count, since a tree that the outline was cut around still stands in the way. The
+        whole scene when not given.
+    strategy : str
+        One of :data:`STRATEGIES`.
+    radius_m : (low, high)
+        Radii to look for, metres on the ground.
+    buffer_m : float
+        Safety margin added around each footprint, metres.
+    edge_method : str, optional
+        Edge method of the study's strategies; see :func:`run_strategy`.
+    threshold : float, optional
+        Edge threshold of ``single``.
+    threshold_range : (start, stop, step), optional
+        Thresholds of ``t_range``, ``dlc`` and ``consensus``.
+    circle_method : {"phase_code", "two_stage"}
+    sensitivity : float
+        Of the circle search, 0..1.
+    grey_check : {"absolute", "relative"} or float, optional
+        Drop discs brighter than 127.37, than the field's mean, or than a grey level.
+    min_share : float
+        ``consensus``: the share of the settings that must see a circle.
+    progress : callable, optional
+        Called with (done, total, what).
+
+    Returns
+    -------
+    GeoDataFrame
+        The layer ``obstacles`` in the metric CRS, ordered by row and column of the centre;
+        ``attrs["detection"]`` says how they were found.
+
+    Raises
+    ------
+    ObstacleError
+        For an impossible radius range, margin, strategy or method.
+    """
+    low_m, high_m = checked_range(radius_m)
+    if not (np.isfinite(buffer_m) and buffer_m >= 0):
+        raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
+    if strategy not in STRATEGIES:
+        raise ObstacleError(
+            f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
+        )
+    region = search_region(scene, field)
+    notes: list[str] = []
+    detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m]}
+    resolution = scene.grid.ground_resolution_m
+    radius_px = (low_m / resolution, high_m / resolution)
+    grey = filled(scene.grey, scene.valid)
+
+    if strategy in ("auto", "study_listing"):
+        if strategy == "study_listing":
+            radius_px = STUDY_RADIUS_PX
+        circles = find_circles(
+            grey / 255,
+            radius_px,
+            polarity="dark",
+            sensitivity=sensitivity if strategy == "study_listing" else 0.93,
+            method=circle_method,
+            warn=False,
+        )
+        circles = circles.take(inside(circles, region))
+        circles = circles.take(first_of_duplicates(circles))
+        detection["method"] = circle_method
+    else:
+        result = _study(
+            grey, region, strategy, radius_px, edge_method, threshold, threshold_range,
+            circle_method, sensitivity, min_share, progress,
+        )  # fmt: skip
+        circles = result.circles
+        detection |= {
+            "method": result.method,
+            "threshold": result.threshold,
+            "counts": {name: [list(row) for row in rows] for name, rows in result.counts.items()},
+        }
+    if grey_check is not None:
+        limit = _grey_limit(grey_check, grey, region)
+        circles = circles.take(dark_enough(grey, circles, limit, scene.valid))
+        detection["grey_limit"] = limit
+    order = np.lexsort((circles.x_px, circles.y_px))
+    circles = circles.take(order)
+    crs = scene.grid.metric_crs if field is None else field.crs
+    table = from_circles_px(
+        circles.x_px + 0.5,
+        circles.y_px + 0.5,
+        circles.radius_px,
+        scene.grid,
+        buffer_m=buffer_m,
+        crs=crs,
+    )
+    detection["notes"] = notes
+    table.attrs["detection"] = detection
+    return table
+
+
+def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
+    """Return the pixels (rows, cols) on which an obstacle's centre may lie."""
+    if field is None:
+        return scene.valid
+    return field.mask(scene.grid, holes=False) & scene.valid
+
+
+def filled(grey: NDArray[np.floating], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return a picture whose missing pixels repeat the nearest one, so that they add no edge."""
+    picture: NDArray[np.float64] = grey.astype(np.float64)
+    if valid.all() or not valid.any():
+        return picture
+    nearest = ndimage.distance_transform_edt(~valid, return_distances=False, return_indices=True)
+    return cast("NDArray[np.float64]", picture[tuple(nearest)])
+
+
+def _grey_limit(
+    check: GreyCheck | float, grey: NDArray[np.float64], region: NDArray[np.bool_]
+) -> float:
+    if check == "absolute":
+        return GREY_LIMIT
+    if check == "relative":
+        return relative_grey_limit(grey, region)
+    if isinstance(check, int | float):
+        return float(check)
+    raise ObstacleError(
+        f"Unknown grey check {check!r}.", hint="Choose absolute, relative or a grey level."
+    )
+
+
+def _study(  # noqa: PLR0917
+    grey: NDArray[np.float64],
+    region: NDArray[np.bool_],
+    strategy: Strategy,
+    radius_px: tuple[float, float],
+    edge_method: EdgeMethod | None,
+    threshold: float | None,
+    threshold_range: ThresholdRange | None,
+    circle_method: CircleMethod,
+    sensitivity: float,
+    min_share: float,
+    progress: Progress | None,
+) -> StrategyResult:
+    """Run one of the study's strategies or presets."""
+    if strategy == "study_text":
+        smooth = ndimage.median_filter(grey, 3)
+        values = smooth[region]
+        level = 255 * otsu_threshold(values / 255)
+        circles = find_circles(
+            smooth <= level,
+            STUDY_RADIUS_PX,
+            polarity="bright",
+            sensitivity=sensitivity,
+            edge_threshold=STUDY_EDGE_THRESHOLD,
+            method=circle_method,
+            warn=False,
+        )
+        circles = circles.take(inside(circles, region))
+        return StrategyResult(circles.take(first_of_duplicates(circles)), None, None)
+    preset = strategy == "study_dlc"
+    how = EdgeCircles(
+        STUDY_RADIUS_PX if preset else radius_px,
+        sensitivity=sensitivity,
+        method=circle_method,
+        smoothed_radius_px=STUDY_SMOOTHED_RADIUS_PX if preset else None,
+    )
+    ranges: dict[EdgeMethod, ThresholdRange] | None = None
+    if threshold_range is not None:
+        ranges = {"sobel": threshold_range, "prewitt": threshold_range}
+        ranges |= {"roberts": threshold_range, "canny": threshold_range}
+    return run_strategy(
+        grey / 255,
+        region,
+        "dlc" if preset else cast("StudyStrategy", strategy),
+        how,
+        methods=None if edge_method is None else (edge_method,),
+        threshold=threshold,
+        ranges=ranges,
+        min_share=min_share,
+        progress=progress,
+    )
