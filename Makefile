@@ -1,11 +1,61 @@
-# Two commands: `make demo` and `make test`. Both set up what they need.
+# Two commands set up all they need: `make demo` and `make test`.
+# Needed on the machine: git, make and Python 3.11 or newer.
+
 PYTHON ?= python3
-UV_VERSION := 0.9.9
 VENV := .venv
 BIN := $(VENV)/bin
+UV := $(BIN)/uv
+UV_VERSION := 0.13.8
+DEMO_OUT ?= out/demo
+SAMPLE := sample_data/field.tif --lat 35.075373 --lon 33.531142
 
-lock:  ## refresh the locked dependencies from pyproject.toml
+# One thread per process: the work is split by process, and figures stay comparable.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: help demo test check pytest format lock bench docs clean
+
+help:  ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
+
+demo: $(VENV)/run.stamp  ## run the main job on the sample field
+	$(BIN)/geofield run $(SAMPLE) --spacing 4 --out $(DEMO_OUT) --overwrite
+	@echo "Map picture: $(CURDIR)/$(DEMO_OUT)/map.png"
+
+test: check pytest  ## everything that must hold: lint, types, layers, tests
+
+check: $(VENV)/dev.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+pytest: $(VENV)/dev.stamp
+	$(BIN)/python -m pytest -n 2 --dist loadgroup --durations 15
+
+format: $(VENV)/dev.stamp  ## format the code and mend what ruff can mend
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+lock:  ## refresh the locked dependencies from pyproject.toml (needs uv)
 	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \
 	  -o requirements/run.txt --custom-compile-command "make lock"
-	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml --group dev \
-	  -o requirements/dev.txt --custom-compile-command "make lock"
+	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \
+	  --group dev -o requirements/dev.txt --custom-compile-command "make lock"
+
+clean:  ## remove the environment and everything made
+	rm -rf $(VENV) out site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+$(UV):
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check uv==$(UV_VERSION)
+
+$(VENV)/run.stamp: requirements/run.txt pyproject.toml | $(UV)
+	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/run.txt
+	$(UV) pip install -q --python $(BIN)/python --no-deps -e .
+	@touch $@
+
+$(VENV)/dev.stamp: requirements/dev.txt pyproject.toml | $(UV)
+	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/dev.txt
+	$(UV) pip install -q --python $(BIN)/python --no-deps -e .
+	@touch $@ $(VENV)/run.stamp

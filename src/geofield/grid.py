@@ -100,12 +100,12 @@ class Grid:
 
     def crop(self, column: int, row: int, width_px: int, height_px: int) -> Grid:
         """The part that starts at a column and row (equation 4); it may reach outside."""
-        return Grid(width_px, height_px, self.transform * Affine.translation(column, row), self.crs)
+        return Grid(width_px, height_px, self.transform @ Affine.translation(column, row), self.crs)
 
     def resized(self, width_px: int, height_px: int) -> Grid:
         """The same ground cut into another number of pixels."""
         scale = Affine.scale(self.width_px / width_px, self.height_px / height_px)
-        return Grid(width_px, height_px, self.transform * scale, self.crs)
+        return Grid(width_px, height_px, self.transform @ scale, self.crs)
 
     # -- pixel <-> ground ------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -15,7 +15,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     import geopandas as gpd
 
@@ -53,6 +53,43 @@ class Tracks:
     def crs(self) -> CRS:
         """The metric CRS."""
         return CRS(self.segments.crs)
+
+    def tables(self) -> dict[str, gpd.GeoDataFrame]:
+        """The tables by layer name, without the points, which are made when asked for."""
+        return {
+            schema.TRACKS.name: self.lines,
+            schema.SEGMENTS.name: self.segments,
+            schema.GAPS.name: self.gaps,
+        }
+
+    def evidence(self) -> dict[str, Any]:
+        """What the tables do not say, as plain JSON values."""
+        return {
+            "heading_deg": self.heading_deg,
+            "spacing_m": self.spacing_m,
+            "step_m": self.step_m,
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_tables(
+        cls,
+        tables: Mapping[str, gpd.GeoDataFrame],
+        evidence: Mapping[str, Any],
+        *,
+        grid: Grid | None = None,
+    ) -> Tracks:
+        """The tracks that were written as :meth:`tables` and :meth:`evidence`."""
+        return cls(
+            lines=tables[schema.TRACKS.name],
+            segments=tables[schema.SEGMENTS.name],
+            gaps=tables[schema.GAPS.name],
+            heading_deg=float(evidence["heading_deg"]),
+            spacing_m=float(evidence["spacing_m"]),
+            step_m=float(evidence["step_m"]),
+            grid=grid,
+            notes=tuple(evidence.get("notes", ())),
+        )
 
     @cached_property
     def points(self) -> gpd.GeoDataFrame:

@@ -1,0 +1,43 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("geofield", deadline=None, max_examples=60, derandomize=True)
+settings.load_profile("geofield")
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def shared_folder() -> Path | None:
+    """The folder with real data, where there is one."""
+    place = Path(os.environ.get("GEOFIELD_SHARED", ROOT.parent / "shared"))
+    return place if (place / "data").is_dir() else None
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder with real imagery, parcels and the study's tables."""
+    place = shared_folder()
+    if place is None:
+        pytest.skip("no real data beside the checkout (../shared or GEOFIELD_SHARED)")
+    return place
+
+
+@pytest.fixture(scope="session")
+def sample() -> Path:
+    """The folder with the project's own sample fields."""
+    return ROOT / "sample_data"
+
+
+@pytest.fixture(autouse=True)
+def _own_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No setting of the person who runs the tests may change them."""
+    for name in list(os.environ):
+        if name.startswith("GEOFIELD_") and name != "GEOFIELD_SHARED":
+            monkeypatch.delenv(name)
