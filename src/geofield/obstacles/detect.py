@@ -202,7 +202,7 @@ def _grey_limit(
     )
 
 
-def _study(  # noqa: PLR0917
+def _study(
     grey: NDArray[np.float64],
     region: NDArray[np.bool_],
     strategy: Strategy,
