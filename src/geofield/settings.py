@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from geofield.errors import SettingsError
 
@@ -73,8 +73,8 @@ class ExportSettings(Section):
     )
 
 
-class Settings(BaseSettings):
-    """All settings of a run.
+class Settings(Section):
+    """All settings of a run. A plain value: :func:`load_settings` reads file and environment.
 
     Examples
     --------
@@ -82,13 +82,17 @@ class Settings(BaseSettings):
     3.0
     """
 
-    model_config = SettingsConfigDict(
-        env_prefix="GEOFIELD_",
-        env_nested_delimiter="__",
-        extra="forbid",
-        frozen=True,
-        nested_model_default_partial_update=True,
-    )
+    imagery: ImagerySettings = ImagerySettings()
+    field: FieldSettings = FieldSettings()
+    obstacles: ObstacleSettings = ObstacleSettings()
+    tracks: TrackSettings = TrackSettings()
+    export: ExportSettings = ExportSettings()
+
+
+class _Environment(BaseSettings):
+    """Names the environment variables; only its parsing is used."""
+
+    model_config = SettingsConfigDict(env_prefix="GEOFIELD_", env_nested_delimiter="__")
 
     imagery: ImagerySettings = ImagerySettings()
     field: FieldSettings = FieldSettings()
@@ -119,22 +123,17 @@ def load_settings(
     SettingsError
         Naming the setting, its value and what would be right.
     """
-    values = _read_toml(path)
+    merged: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
     try:
-        base = Settings()
-        merged = base.model_dump(exclude_unset=False)
-        environment = base.model_dump(exclude_unset=True)
-        for section, settings in values.items():
-            if section not in SECTIONS:
-                raise SettingsError(
-                    f"Unknown section [{section}] in the settings file.",
-                    hint=f"Sections: {', '.join(SECTIONS)}.",
-                )
-            merged[section] |= settings
-        for source in (environment, overrides or {}):
+        for source in (_read_toml(path), EnvSettingsSource(_Environment)(), overrides or {}):
             for section, settings in source.items():
-                merged[section] |= {k: v for k, v in settings.items() if v is not None}
-        return Settings(**merged)
+                if section not in SECTIONS:
+                    raise SettingsError(
+                        f"Unknown section [{section}] in the settings.",
+                        hint=f"Sections: {', '.join(SECTIONS)}.",
+                    )
+                merged[section] |= {k: v for k, v in dict(settings).items() if v is not None}
+        return Settings(**merged)  # type: ignore[arg-type]
     except ValidationError as error:
         raise SettingsError(_explain(error)) from None
 
