@@ -133,7 +133,7 @@ def load_settings(
                         hint=f"Sections: {', '.join(SECTIONS)}.",
                     )
                 merged[section] |= {k: v for k, v in dict(settings).items() if v is not None}
-        return Settings(**merged)  # type: ignore[arg-type]
+        return Settings(**merged)
     except ValidationError as error:
         raise SettingsError(_explain(error)) from None
 
