@@ -26,8 +26,9 @@ FloatArray = NDArray[np.float64]
 
 #: Straight pieces per quarter circle in the polygon that stands for a circle.
 QUARTER_SEGMENTS = 16
-#: A polygon whose area differs more than this from its row's circle was redrawn by a person.
-_CIRCLE_TOLERANCE = 0.02
+#: A polygon with a vertex farther than this from its row's circle was redrawn by a person:
+#: metres (formats round to about a centimetre) and share of the radius (other UTM zones).
+_CIRCLE_TOLERANCE = (0.02, 0.002)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,18 +180,7 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
             hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
         )
     total = radius + margin
-    area = shapely.area(geometry)
-    vertices = 4 * QUARTER_SEGMENTS
-    circle_area = 0.5 * vertices * np.sin(2 * np.pi / vertices) * total**2
-    hull_is_round = np.abs(4 * np.pi * area - shapely.length(geometry) ** 2) <= 0.02 * (
-        4 * np.pi * area
-    )
-    with np.errstate(invalid="ignore"):
-        is_circle = (
-            (shapely.get_type_id(geometry) == shapely.GeometryType.POLYGON.value)
-            & (np.abs(area - circle_area) <= _CIRCLE_TOLERANCE * circle_area)
-            & hull_is_round
-        )
+    is_circle = _still_round(geometry, total)
     centre = shapely.centroid(geometry[is_circle])
     return ObstacleShapes(
         np.column_stack([shapely.get_x(centre), shapely.get_y(centre), total[is_circle]]),
@@ -198,6 +188,31 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
         geometry[~is_circle],
         numbers[~is_circle],
     )
+
+
+def _still_round(geometry: NDArray[np.object_], radius: FloatArray) -> NDArray[np.bool_]:
+    """Whether each geometry is, vertex by vertex, the polygon of a circle of the radius."""
+    polygon = shapely.get_type_id(geometry) == shapely.GeometryType.POLYGON.value
+    candidate = np.flatnonzero(
+        polygon
+        & np.isfinite(radius)
+        & (shapely.get_num_interior_rings(geometry) == 0)
+        & (shapely.get_num_coordinates(geometry) >= 2 * QUARTER_SEGMENTS)
+    )
+    result = np.zeros(len(geometry), dtype=bool)
+    if not len(candidate):
+        return result
+    shapes, total = geometry[candidate], radius[candidate]
+    xy, row = shapely.get_coordinates(shapes, return_index=True)
+    centre = shapely.get_coordinates(shapely.centroid(shapes))
+    off = np.abs(np.hypot(*(xy - centre[row]).T) - total[row])
+    first = np.searchsorted(row, np.arange(len(shapes)))
+    worst = np.maximum.reduceat(off, first)
+    # An arc whose chord cuts a piece off has all its vertices on the circle, but not the area.
+    share = shapely.area(shapes) / np.maximum(np.pi * total**2, 1e-12)
+    metres, relative = _CIRCLE_TOLERANCE
+    result[candidate] = (worst <= metres + relative * total) & (share > 0.98)
+    return result
 
 
 def _floats(frame: gpd.GeoDataFrame, column: str, count: int) -> FloatArray:

@@ -8,16 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pyproj import CRS
+from shapely import Polygon
 
 from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
+from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     import geopandas as gpd
+
+
+def points_per_segment(length_m: NDArray[np.float64], step_m: float) -> NDArray[np.int64]:
+    """How many points segments get: one every `step_m` from the start, and the end."""
+    # A rest shorter than a millionth of a step is rounding, not a further point.
+    return np.asarray(np.ceil(length_m / step_m - 1e-6).clip(min=1), dtype=np.int64) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +47,12 @@ class Tracks:
         Gives the points their pixel position.
     notes : tuple of str
         What the planner had to tell.
+    outline : shapely.Polygon or None
+        The field planned in, metric CRS; None where the tracks were only read back.
+    blocked_count : int
+        Tracks of the layout that obstacles leave nothing of; their numbers stay free.
+    losses : tuple of ObstacleLoss
+        What each obstacle costs.
     """
 
     lines: gpd.GeoDataFrame
@@ -48,6 +63,9 @@ class Tracks:
     step_m: float = 1.0
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
+    outline: Polygon | None = None
+    blocked_count: int = 0
+    losses: tuple[ObstacleLoss, ...] = ()
 
     @property
     def crs(self) -> CRS:
@@ -92,6 +110,11 @@ class Tracks:
         )
 
     @cached_property
+    def statistics(self) -> TrackStatistics:
+        """Counts, lengths and areas, computed when first asked for."""
+        return track_statistics(self)
+
+    @cached_property
     def points(self) -> gpd.GeoDataFrame:
         """Layer `track_points`, computed when first asked for."""
         import pandas as pd
@@ -105,8 +128,7 @@ class Tracks:
         """The track points in tables of about `rows` rows, for streaming."""
         coordinates = shapely.get_coordinates(self.segments.geometry.to_numpy()).reshape(-1, 2, 2)
         length = np.hypot(*(coordinates[:, 1] - coordinates[:, 0]).T)
-        # A rest shorter than a micrometre is rounding, not a further point.
-        counts = np.ceil(length / self.step_m - 1e-6).astype(np.int64).clip(min=1) + 1
+        counts = points_per_segment(length, self.step_m)
         track_no = self.segments["track_no"].to_numpy(dtype=np.int64)
         segment_no = self.segments["segment_no"].to_numpy(dtype=np.int64)
         batches = np.cumsum(counts) // rows

@@ -1,0 +1,120 @@
+"""What a set of tracks amounts to: counts and lengths, area worked, missed and worked twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+if TYPE_CHECKING:
+    from geofield.model.tracks import Tracks
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleLoss:
+    """What one obstacle costs.
+
+    Attributes
+    ----------
+    obstacle_no : int
+    length_m : float
+        Track lost to it; stretches inside several obstacles are shared evenly among them.
+    percent : float
+        Of all track the field would have without obstacles.
+    """
+
+    obstacle_no: int
+    length_m: float
+    percent: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrackStatistics:
+    """Figures of one field's tracks.
+
+    Attributes
+    ----------
+    track_count, segment_count, gap_count, point_count : int
+        Tracks with at least one segment; segments; gaps between segments; track points.
+    blocked_count : int
+        Tracks that obstacles leave nothing of.
+    length_m : float
+        Of all segments: the path without turns.
+    gap_length_m : float
+    mean_segment_m, longest_segment_m, shortest_segment_m : float
+        NaN without segments.
+    area_ha : float
+        The field without its holes; NaN where the outline is not known.
+    worked_ha : float
+        Of the field within half a spacing of a segment, as a strip of the segment's length.
+    coverage_percent : float
+        Worked area, of the field's.
+    overlap_percent : float
+        Area worked more than once, counted once per repetition, of the field's.
+    losses : tuple of ObstacleLoss
+    """
+
+    track_count: int
+    segment_count: int
+    gap_count: int
+    point_count: int
+    blocked_count: int
+    length_m: float
+    gap_length_m: float
+    mean_segment_m: float
+    longest_segment_m: float
+    shortest_segment_m: float
+    area_ha: float
+    worked_ha: float
+    coverage_percent: float
+    overlap_percent: float
+    losses: tuple[ObstacleLoss, ...]
+
+
+def track_statistics(tracks: Tracks) -> TrackStatistics:
+    """Compute the figures of planned tracks."""
+    length = tracks.segments["length_m"].to_numpy(dtype=np.float64)
+    gaps = tracks.gaps["length_m"].to_numpy(dtype=np.float64)
+    nan = float("nan")
+    area = worked = coverage = overlap = nan
+    if tracks.outline is not None:
+        area = float(tracks.outline.area)
+        strips = _strips(tracks)
+        union = shapely.intersection(shapely.union_all(strips), tracks.outline).area
+        single = float(shapely.area(shapely.intersection(strips, tracks.outline)).sum())
+        worked = float(union)
+        coverage = 100.0 * worked / area
+        overlap = 100.0 * max(0.0, single - worked) / area
+    return TrackStatistics(
+        track_count=len(tracks.lines),
+        segment_count=len(length),
+        gap_count=len(gaps),
+        point_count=int(tracks.lines["point_count"].sum()),
+        blocked_count=tracks.blocked_count,
+        length_m=float(length.sum()),
+        gap_length_m=float(gaps.sum()),
+        mean_segment_m=float(length.mean()) if len(length) else nan,
+        longest_segment_m=float(length.max()) if len(length) else nan,
+        shortest_segment_m=float(length.min()) if len(length) else nan,
+        area_ha=area / 10_000.0,
+        worked_ha=worked / 10_000.0,
+        coverage_percent=coverage,
+        overlap_percent=overlap,
+        losses=tracks.losses,
+    )
+
+
+def _strips(tracks: Tracks) -> np.ndarray:
+    """The strip that each segment works, as a rectangle."""
+    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)
+    if not len(ends):
+        return np.empty(0, dtype=object)
+    along = ends[:, 1] - ends[:, 0]
+    along /= np.hypot(along[:, 0], along[:, 1])[:, None]
+    side = np.column_stack((-along[:, 1], along[:, 0])) * (tracks.spacing_m / 2.0)
+    corners = np.stack(
+        (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
+    )
+    return np.asarray(shapely.polygons(corners))

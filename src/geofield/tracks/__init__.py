@@ -1,0 +1,7 @@
+"""Stage 4: straight parallel tracks through a field, around every obstacle."""
+
+from geofield.tracks.direction import find_baseline
+from geofield.tracks.longest_edge import StraightRun, longest_edge
+from geofield.tracks.planner import plan_tracks
+
+__all__ = ["StraightRun", "find_baseline", "longest_edge", "plan_tracks"]

@@ -1,0 +1,161 @@
+"""What the tracks must avoid: obstacles in any form as true circles and polygons."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import geopandas as gpd
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+from shapely.geometry.base import BaseGeometry
+
+from geofield.errors import CRSMismatchError, TrackError, TrackWarning
+from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, shapes_of
+
+_POINTS = (shapely.GeometryType.POINT.value, shapely.GeometryType.MULTIPOINT.value)
+_LINES = (
+    shapely.GeometryType.LINESTRING.value,
+    shapely.GeometryType.LINEARRING.value,
+    shapely.GeometryType.MULTILINESTRING.value,
+)
+
+
+def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> ObstacleShapes:
+    """Understand obstacles in any of the forms a user may have them.
+
+    Parameters
+    ----------
+    obstacles : GeoDataFrame, GeoSeries, shapely geometry, sequence of them, or None
+        Tables in another CRS are reprojected; plain geometries are in `crs`. Rows whose `status` is
+        ``rejected`` are left out. Points need a column `radius_m`, or a clearance.
+    crs : CRS
+        The field's.
+    clearance_m : float
+        Grows everything by this much.
+
+    Returns
+    -------
+    ObstacleShapes
+        With numbers from the column `obstacle_no`, or 1, 2, ... in the order given.
+
+    Raises
+    ------
+    CRSMismatchError
+        When a table without a CRS cannot be in the field's.
+    TrackError
+        When a point or line has no width, or a geometry is not finite.
+    ObstacleError
+        When a radius or margin is negative or infinite.
+    """
+    if not np.isfinite(clearance_m) or clearance_m < 0.0:
+        raise TrackError(f"clearance_m is {clearance_m}; it must be 0 or more metres.")
+    frame = _as_table(obstacles, crs)
+    if "status" in frame.columns:
+        frame = frame[frame["status"] != "rejected"]
+    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    missing = shapely.is_missing(geometry) | shapely.is_empty(geometry)
+    if missing.any():
+        _warn(f"{int(missing.sum())} obstacles have no geometry and were left out.")
+    if "obstacle_no" not in frame.columns:
+        frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
+    frame, geometry = frame[~missing], shapely.force_2d(geometry[~missing])
+    if not np.isfinite(shapely.get_coordinates(geometry)).all():
+        raise TrackError("An obstacle has coordinates that are not finite numbers.")
+    broken = ~shapely.is_valid(geometry)
+    if broken.any():
+        _warn(f"{int(broken.sum())} obstacles were not valid and have been repaired.")
+        geometry[broken] = shapely.make_valid(geometry[broken], method="structure")
+    frame = frame.set_geometry(gpd.GeoSeries(geometry, index=frame.index, crs=crs))
+    kind = shapely.get_type_id(geometry)
+    point, line = np.isin(kind, _POINTS), np.isin(kind, _LINES)
+    shapes = _grown(shapes_of(frame[~(point | line)]), clearance_m)
+    if not (point.any() or line.any()):
+        return shapes
+    return _with_thin(shapes, frame, point, line, clearance_m)
+
+
+def _as_table(obstacles: Any, crs: CRS) -> gpd.GeoDataFrame:
+    if obstacles is None:
+        return gpd.GeoDataFrame(geometry=gpd.GeoSeries([], crs=crs))
+    if isinstance(obstacles, gpd.GeoSeries):
+        obstacles = gpd.GeoDataFrame(geometry=obstacles)
+    if isinstance(obstacles, gpd.GeoDataFrame):
+        if obstacles.crs is None:
+            _refuse_other_units(obstacles, crs)
+            return obstacles.set_crs(crs)
+        return obstacles if obstacles.crs == crs else obstacles.to_crs(crs)
+    if isinstance(obstacles, BaseGeometry):
+        shapes = list(shapely.get_parts(obstacles))
+    else:
+        shapes = list(obstacles)
+    for shape in shapes:
+        if shape is not None and not isinstance(shape, BaseGeometry):
+            raise TrackError(
+                f"An obstacle must be a shapely geometry, not {type(shape).__name__}.",
+                hint="Give a GeoDataFrame, a list of shapely geometries, or None.",
+            )
+    return gpd.GeoDataFrame(geometry=gpd.GeoSeries(shapes, crs=crs))
+
+
+def _refuse_other_units(obstacles: gpd.GeoDataFrame, crs: CRS) -> None:
+    if len(obstacles) == 0:
+        return
+    x0, y0, x1, y1 = obstacles.total_bounds
+    if max(abs(x0), abs(x1)) <= 180 and max(abs(y0), abs(y1)) <= 90 and x1 - x0 < 1.0 > y1 - y0:
+        raise CRSMismatchError(
+            "The obstacles name no CRS and their coordinates look like degrees.",
+            hint="Name it: obstacles.set_crs('EPSG:4326').",
+        )
+
+
+def _with_thin(
+    shapes: ObstacleShapes,
+    frame: gpd.GeoDataFrame,
+    point: NDArray[np.bool_],
+    line: NDArray[np.bool_],
+    clearance_m: float,
+) -> ObstacleShapes:
+    """Add points as circles and lines as strips, or say that they have no width."""
+    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    number = frame["obstacle_no"].to_numpy(dtype=np.int64)
+    own = np.nan_to_num(_column(frame, "radius_m")) + np.nan_to_num(_column(frame, "buffer_m"))
+    width = own + clearance_m
+    bare = np.flatnonzero((point | line) & ~(width > 0.0))
+    if len(bare):
+        raise TrackError(
+            f"Obstacle {number[bare[0]]} is a {geometry[bare[0]].geom_type} without a radius: "
+            "it has no width to avoid.",
+            hint="Give a column radius_m, or a clearance (clearance_m, --clearance).",
+        )
+    places, source = shapely.get_coordinates(geometry[point], return_index=True)
+    strips = shapely.buffer(geometry[line], width[line], quad_segs=QUARTER_SEGMENTS)
+    return ObstacleShapes(
+        np.concatenate((shapes.circles, np.column_stack((places, width[point][source])))),
+        np.concatenate((shapes.circle_no, number[point][source])),
+        np.concatenate((shapes.polygons, strips)),
+        np.concatenate((shapes.polygon_no, number[line])),
+    )
+
+
+def _column(frame: gpd.GeoDataFrame, name: str) -> NDArray[np.float64]:
+    if name not in frame.columns:
+        return np.full(len(frame), np.nan)
+    return np.asarray(frame[name].to_numpy(dtype="float64", na_value=np.nan))
+
+
+def _grown(shapes: ObstacleShapes, clearance_m: float) -> ObstacleShapes:
+    if clearance_m == 0.0:
+        return shapes
+    circles = shapes.circles.copy()
+    circles[:, 2] += clearance_m
+    polygons = shapes.polygons
+    if len(polygons):
+        polygons = shapely.buffer(polygons, clearance_m, quad_segs=QUARTER_SEGMENTS)
+    return ObstacleShapes(circles, shapes.circle_no, polygons, shapes.polygon_no)
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, TrackWarning, stacklevel=4)

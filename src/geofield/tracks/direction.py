@@ -1,0 +1,158 @@
+"""Which way to drive: the baseline that a field's tracks are parallel to.
+
+Headings are degrees clockwise from true north; the metric CRS has its own north, which differs
+by the meridian convergence. Baselines are in the CRS; headings are converted here, at the rim.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from shapely import LineString, Polygon
+
+from geofield.crs import grid_north_deg
+from geofield.errors import TrackError
+from geofield.tracks.fewest import fewest_direction
+from geofield.tracks.hough import hough_edge
+from geofield.tracks.longest_edge import StraightRun, longest_edge
+
+METHODS = ("longest_edge", "hough", "fewest", "fewest_turns")
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """What the tracks are parallel to, and where they are counted from.
+
+    Attributes
+    ----------
+    along : (float, float)
+        Direction of the tracks in the CRS, unit vector, its true heading in [0, 180).
+    heading_deg : float
+        The same as a true heading.
+    left : bool
+        Whether numbers grow to the left of the direction.
+    edge : StraightRun or None
+        The edge of the outline that tracks are counted from, for `longest_edge` and `hough`.
+    through : (float, float) or None
+        A place in the CRS that a track passes through, for an A-B line.
+    """
+
+    along: tuple[float, float]
+    heading_deg: float
+    left: bool = False
+    edge: StraightRun | None = None
+    through: tuple[float, float] | None = None
+
+
+def find_baseline(
+    polygon: Polygon, direction: Any, crs: CRS, *, spacing_m: float, tolerance_m: float = 1.0
+) -> Baseline:
+    """Turn the user's choice of a direction into a baseline.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        The field, in a metric CRS.
+    direction : str, float, LineString or pair of points
+        ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading in degrees, or an
+        A-B line in the CRS.
+    crs : CRS
+    spacing_m : float
+        Needed by ``fewest``.
+    tolerance_m : float
+        Half the width of the band within which an edge counts as straight.
+
+    Raises
+    ------
+    TrackError
+        When the direction is not understood.
+    """
+    centre = polygon.centroid
+    north = grid_north_deg(crs, centre.x, centre.y)
+    if isinstance(direction, str):
+        if direction == "longest_edge":
+            return _from_edge(longest_edge(polygon, tolerance_m=tolerance_m), north)
+        if direction == "hough":
+            return _from_edge(hough_edge(polygon), north)
+        if direction in ("fewest", "fewest_turns"):
+            along = fewest_direction(polygon, spacing_m, turns=direction == "fewest_turns")
+            return _from_vector(along, north)
+        heading = _number(direction)
+        if heading is None:
+            raise TrackError(
+                f"Unknown direction {direction!r}.",
+                hint=f"Choose one of {', '.join(METHODS)}, a heading in degrees, or an A-B line.",
+            )
+        direction = heading
+    if isinstance(direction, int | float | np.integer | np.floating):
+        return _from_heading(float(direction), north)
+    return _from_ab(direction, north)
+
+
+def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:
+    """The true heading of a direction in the CRS, 0 <= heading < 180."""
+    heading = (math.degrees(math.atan2(along[0], along[1])) + grid_north) % 180.0
+    return 0.0 if heading >= 180.0 else heading
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _from_heading(heading_deg: float, north: float) -> Baseline:
+    if not math.isfinite(heading_deg):
+        raise TrackError(f"A heading of {heading_deg} degrees is not a direction.")
+    angle = math.radians(heading_deg - north)
+    return _from_vector((math.sin(angle), math.cos(angle)), north)
+
+
+def _from_vector(
+    along: tuple[float, float], north: float, through: tuple[float, float] | None = None
+) -> Baseline:
+    """Orient so that the true heading is in [0, 180); numbers grow to the right of `along`."""
+    length = math.hypot(*along)
+    unit = (along[0] / length, along[1] / length)
+    heading = (math.degrees(math.atan2(*unit)) + north) % 360.0
+    flipped = heading >= 180.0 and heading < 360.0
+    if flipped:
+        unit = (-unit[0], -unit[1])
+    return Baseline(unit, true_heading_deg(unit, north), left=flipped, through=through)
+
+
+def _from_edge(edge: StraightRun, north: float) -> Baseline:
+    """Count from the edge inwards: the field lies to the left of a run of the outer ring."""
+    along = (edge.x1 - edge.x0, edge.y1 - edge.y0)
+    base = _from_vector(along, north)
+    return Baseline(base.along, base.heading_deg, left=not base.left, edge=edge)
+
+
+def _from_ab(line: Any, north: float) -> Baseline:
+    try:
+        points = np.asarray(
+            shapely.get_coordinates(line)
+            if isinstance(line, LineString)
+            else [(p.x, p.y) if hasattr(p, "x") else p for p in line],
+            dtype=np.float64,
+        )
+    except (TypeError, ValueError) as error:
+        raise TrackError(
+            f"Unknown direction {line!r}.",
+            hint=f"Choose one of {', '.join(METHODS)}, a heading in degrees, or an A-B line.",
+        ) from error
+    if points.shape != (2, 2) or not np.isfinite(points).all():
+        raise TrackError(
+            "An A-B line has two points of two finite coordinates in the field's CRS.",
+            hint="For a curved line give its first and last point.",
+        )
+    along = (float(points[1, 0] - points[0, 0]), float(points[1, 1] - points[0, 1]))
+    if math.hypot(*along) < 0.01:
+        raise TrackError("A and B of the A-B line are the same point.")
+    return _from_vector(along, north, through=(float(points[0, 0]), float(points[0, 1])))

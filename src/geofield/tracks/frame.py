@@ -1,0 +1,78 @@
+"""The working frame of a field's tracks: u along the tracks, v across them, near the origin.
+
+Coordinates of a metric CRS are large (a northing needs 23 bits before the metre), and rotating
+them as they are costs about 1e-9 m. All computing is therefore done in a frame whose origin lies
+in the field; only finished ends are carried back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackFrame:
+    """Origin and axes of a field's tracks.
+
+    Attributes
+    ----------
+    origin_x_m, origin_y_m : float
+        Origin in the metric CRS.
+    along_x, along_y : float
+        Unit vector of the tracks (the axis u), in the CRS.
+    across_x, across_y : float
+        Unit vector from one track to the next (the axis v): perpendicular to u, on either side.
+    """
+
+    origin_x_m: float
+    origin_y_m: float
+    along_x: float
+    along_y: float
+    across_x: float
+    across_y: float
+
+    @classmethod
+    def of(
+        cls, origin: tuple[float, float], along: tuple[float, float], *, left: bool = False
+    ) -> TrackFrame:
+        """Make a frame from an origin and a direction.
+
+        Parameters
+        ----------
+        origin : (float, float)
+            In the metric CRS; rounded to whole metres, so that subtracting it is exact.
+        along : (float, float)
+            Direction of the tracks, any length but zero.
+        left : bool
+            Whether v points to the left of the direction instead of to the right.
+        """
+        length = float(np.hypot(*along))
+        ux, uy = along[0] / length, along[1] / length
+        side = -1.0 if left else 1.0
+        return cls(
+            float(np.rint(origin[0])), float(np.rint(origin[1])), ux, uy, side * uy, -side * ux
+        )
+
+    def to_frame(self, x: Any, y: Any) -> tuple[FloatArray, FloatArray]:
+        """Carry CRS coordinates into the frame: (u, v) in metres."""
+        dx = np.asarray(x, dtype=np.float64) - self.origin_x_m
+        dy = np.asarray(y, dtype=np.float64) - self.origin_y_m
+        return (
+            dx * self.along_x + dy * self.along_y,
+            dx * self.across_x + dy * self.across_y,
+        )
+
+    def to_crs(self, u: Any, v: Any) -> tuple[FloatArray, FloatArray]:
+        """Carry frame coordinates back to the CRS: (x, y) in metres."""
+        u = np.asarray(u, dtype=np.float64)
+        v = np.asarray(v, dtype=np.float64)
+        return (
+            self.origin_x_m + (u * self.along_x + v * self.across_x),
+            self.origin_y_m + (u * self.along_y + v * self.across_y),
+        )

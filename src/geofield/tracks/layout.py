@@ -1,0 +1,72 @@
+"""Where the tracks lie across the field, and which numbers they carry.
+
+Positions and numbers follow from the outline and the settings alone, never from obstacles: a
+track keeps its number whatever is found or moved in the field.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from geofield.errors import TrackError
+from geofield.tracks.frame import FloatArray
+
+LastStrip = Literal["overrun", "leave", "shift", "spread"]
+LAST_STRIPS: tuple[str, ...] = get_args(LastStrip)
+
+_EPS_M = 1e-7
+
+
+def track_positions(
+    near_m: float,
+    far_m: float,
+    spacing_m: float,
+    *,
+    first_m: float,
+    last_strip: LastStrip = "overrun",
+) -> FloatArray:
+    """Places of the tracks across the field, increasing; the n-th is track n + 1.
+
+    Parameters
+    ----------
+    near_m, far_m : float
+        Extent of the field across the tracks.
+    spacing_m : float
+        Between neighbouring tracks, which is also the width of the strip each one works.
+    first_m : float
+        Place of one track; all others are whole spacings away from it.
+    last_strip : {"overrun", "leave", "shift", "spread"}
+        What becomes of the rest at the far side. ``overrun``: tracks as far as the field goes (the
+        study's rule), so that the last strip may reach beyond the border by less than half a
+        spacing, or a rest narrower than that stays unworked; ``leave``: only strips that
+        lie wholly inside; ``shift``: one more track, moved back until its strip ends at the far
+        side; ``spread``: the spacing shrinks evenly until strips fill the field exactly.
+
+    Returns
+    -------
+    array, shape (tracks,)
+        Empty when no track fits.
+    """
+    if last_strip not in LAST_STRIPS:
+        raise TrackError(
+            f"Unknown last_strip {last_strip!r}.", hint=f"Choose one of {', '.join(LAST_STRIPS)}."
+        )
+    half = spacing_m / 2.0
+    index = np.ceil((near_m + _EPS_M - first_m) / spacing_m)
+    start = first_m + index * spacing_m
+    if last_strip == "spread":
+        edge = max(start - half, near_m)
+        count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
+        width = (far_m - edge) / count
+        return np.asarray(edge + (np.arange(count) + 0.5) * width)
+    limit = far_m - _EPS_M if last_strip == "overrun" else far_m - half + _EPS_M
+    count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
+    # Multiples of the spacing from the one place, so that numbers far away do not drift.
+    positions = first_m + (index + np.arange(count)) * spacing_m
+    if last_strip == "shift":
+        worked = positions[-1] + half if count else near_m
+        if far_m - worked > _EPS_M and far_m - half > near_m:
+            positions = np.append(positions, far_m - half)
+    return np.asarray(positions)

@@ -1,0 +1,131 @@
+"""The longest straight run of an outline, whatever vertices lie along it.
+
+A digitised edge has vertices that stray from the straight line, and many more than two. A run is
+straight when a line through its first vertex passes every vertex within a tolerance: the cone of
+directions that still do so is narrowed vertex by vertex (Williams 1978, "An efficient algorithm for
+the piecewise linear approximation of planar curves"), from all first vertices at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from geofield.tracks.frame import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class StraightRun:
+    """A straight run of the outer ring, as the line that fits it best.
+
+    Attributes
+    ----------
+    x0, y0, x1, y1 : float
+        Its ends in the CRS; the field lies to the left of the way from the first to the second.
+    """
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    @property
+    def length_m(self) -> float:
+        """Length in metres."""
+        return float(np.hypot(self.x1 - self.x0, self.y1 - self.y0))
+
+
+def longest_edge(polygon: Polygon, *, tolerance_m: float = 1.0) -> StraightRun:
+    """Find the longest straight run of a polygon's outer ring.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        In a metric CRS.
+    tolerance_m : float
+        How far a vertex may lie from the line. The default is that of outlines digitised from
+        imagery of half a metre per pixel.
+
+    Returns
+    -------
+    StraightRun
+    """
+    ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
+    if shapely.get_num_coordinates(ring) > 400:
+        # Hundreds of stairs of a pixel each say nothing that their corners do not.
+        ring = shapely.simplify(ring, tolerance_m / 4.0)
+    xy = shapely.get_coordinates(ring)[:-1]
+    first, count = _longest_run(xy, tolerance_m)
+    run = xy[np.arange(first, first + count + 1) % len(xy)]
+    return fit_run(run)
+
+
+def fit_run(run: FloatArray) -> StraightRun:
+    """Fit a line to a polyline, every metre of it counting alike (total least squares)."""
+    start, end = run[0], run[-1]
+    if len(run) > 2:
+        a, b = run[:-1] - start, run[1:] - start
+        weight = np.hypot(*(b - a).T)
+        total = weight.sum()
+        mean = (weight[:, None] * (a + b)).sum(axis=0) / (2.0 * total)
+        a, b = a - mean, b - mean
+        # Second moment of a straight piece about the mean: (aa + ab + ba + bb) / 6 per length.
+        moment = np.einsum("n,ni,nj->ij", weight, a, a) + np.einsum("n,ni,nj->ij", weight, b, b)
+        cross = np.einsum("n,ni,nj->ij", weight, a, b)
+        moment = moment / 3.0 + (cross + cross.T) / 6.0
+        axis = np.linalg.eigh(moment)[1][:, 1]
+        if axis @ (end - start) < 0.0:
+            axis = -axis
+        centre = start + mean
+        start = centre + axis * (axis @ (start - centre))
+        end = centre + axis * (axis @ (end - centre))
+    return StraightRun(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
+
+
+def _longest_run(xy: FloatArray, tolerance_m: float) -> tuple[int, int]:
+    """First vertex and number of edges of the longest run of a ring without its closing vertex."""
+    n = len(xy)
+    start = np.arange(n)
+    axis = np.zeros(n)
+    low, high = np.full(n, -np.inf), np.full(n, np.inf)
+    reach = np.zeros(n)
+    best_length, best_first, best_count = -1.0, 0, 1
+    active = start
+    for step in range(1, n):
+        if not len(active):
+            break
+        offset = xy[(active + step) % n] - xy[active]
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        angle = np.arctan2(offset[:, 1], offset[:, 0])
+        if step == 1:
+            axis[active] = angle
+        # Angles are reckoned from the first edge, so that the cut at 180 degrees lies behind.
+        turn = (angle - axis[active] + np.pi) % (2.0 * np.pi) - np.pi
+        near = distance <= tolerance_m
+        first_far = ~near & np.isinf(low[active])
+        axis[active[first_far]] = angle[first_far]
+        turn[first_far] = 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            spread = np.where(near, np.inf, np.arcsin(np.minimum(tolerance_m / distance, 1.0)))
+        inside = near | ((turn >= low[active]) & (turn <= high[active]))
+        # The outline may not turn back along itself: that is another edge.
+        ahead = distance >= reach[active] - tolerance_m
+        good = inside & ahead & ~near
+        if good.any():
+            lengths = np.where(good, distance, -1.0)
+            top = int(np.argmax(lengths))
+            if lengths[top] > best_length:
+                best_length, best_first, best_count = float(lengths[top]), int(active[top]), step
+        reach[active] = np.maximum(reach[active], distance)
+        far = active[~near]
+        low[far] = np.maximum(low[far], (turn - spread)[~near])
+        high[far] = np.minimum(high[far], (turn + spread)[~near])
+        active = active[ahead & (low[active] <= high[active])]
+    if best_length < 0.0:
+        # A field smaller than the tolerance: its longest single edge.
+        lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
+        return int(np.argmax(lengths)), 1
+    return best_first, best_count

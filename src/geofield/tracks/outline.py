@@ -1,0 +1,106 @@
+"""The field's outline as the planner takes it: one valid, flat polygon in a metric CRS."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from geofield.crs import authority_name, is_metric, parse_crs
+from geofield.errors import CRSError, TrackError
+
+_SLIVER = 0.01
+"""Parts that together have less than this share of the area are lost in a repair."""
+
+
+def metric(crs: Any) -> CRS:
+    """Parse a CRS and refuse one that is not in true ground metres.
+
+    Raises
+    ------
+    CRSError
+    """
+    parsed = parse_crs(crs)
+    if not is_metric(parsed):
+        raise CRSError(
+            f"Tracks are planned in metres; {authority_name(parsed)} is not a metric CRS.",
+            hint="Reproject to the UTM zone: GeoSeries.to_crs(series.estimate_utm_crs()).",
+        )
+    return parsed
+
+
+def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
+    """Check a field's outline, and repair what can be repaired without a guess.
+
+    Heights are dropped; an invalid outline is repaired where one part keeps at least 99 % of the
+    area; a multi-polygon of one part is that part.
+
+    Returns
+    -------
+    shapely.Polygon
+        Valid, 2D, outer ring counter-clockwise.
+    tuple of str
+        What was changed, for people.
+
+    Raises
+    ------
+    TrackError
+        When the outline is empty, no polygon, has several parts or cannot be repaired.
+    CRSError
+        When the coordinates are degrees.
+    """
+    notes: list[str] = []
+    if not isinstance(polygon, BaseGeometry):
+        raise TrackError(
+            f"The field must be a shapely polygon, not {type(polygon).__name__}.",
+            hint="For a Field, give field.polygon and crs=field.crs.",
+        )
+    if polygon.is_empty:
+        raise TrackError("The field's outline is empty.")
+    if polygon.has_z:
+        polygon = shapely.force_2d(polygon)
+        notes.append("Heights of the field's outline were dropped.")
+    if not np.isfinite(shapely.get_coordinates(polygon)).all():
+        raise TrackError("The field's outline has coordinates that are not finite numbers.")
+    if not isinstance(polygon, Polygon | MultiPolygon):
+        raise TrackError(f"The field's outline must be a polygon, not a {polygon.geom_type}.")
+    _refuse_degrees(polygon)
+    if not polygon.is_valid:
+        reason = shapely.is_valid_reason(polygon)
+        polygon = _largest_part(shapely.make_valid(polygon, method="structure"), reason)
+        notes.append(f"The field's outline was repaired ({reason}).")
+    parts = [part for part in shapely.get_parts(polygon) if part.area > 0.0]
+    if not parts:
+        raise TrackError("The field's outline has no area.")
+    if len(parts) > 1:
+        raise TrackError(
+            f"The field's outline has {len(parts)} parts.",
+            hint="Plan each part as its own field: GeoDataFrame.explode().",
+        )
+    return shapely.orient_polygons(parts[0]), tuple(notes)
+
+
+def _largest_part(repaired: BaseGeometry, reason: str) -> Polygon:
+    parts = [part for part in shapely.get_parts(repaired) if isinstance(part, Polygon)]
+    areas = [part.area for part in parts]
+    if not parts or max(areas) < (1.0 - _SLIVER) * sum(areas):
+        raise TrackError(
+            f"The field's outline is not valid and cannot be repaired without a guess: {reason}.",
+            hint="Repair it by hand, or with Fix geometries in QGIS.",
+        )
+    return parts[int(np.argmax(areas))]
+
+
+def _refuse_degrees(polygon: BaseGeometry) -> None:
+    x0, y0, x1, y1 = polygon.bounds
+    degrees = max(abs(x0), abs(x1)) <= 180.0 and max(abs(y0), abs(y1)) <= 90.0
+    if degrees and max(x1 - x0, y1 - y0) < 1.0:
+        raise CRSError(
+            f"The field is {x1 - x0:.4f} by {y1 - y0:.4f} m large and near (0, 0): its "
+            "coordinates look like degrees, not metres.",
+            hint="Reproject to the UTM zone: GeoSeries.to_crs(series.estimate_utm_crs()).",
+        )

@@ -1,0 +1,252 @@
+"""Stage 4 as one call: from a field and its obstacles to tracks."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from shapely import Polygon
+
+from geofield.errors import TrackError, TrackWarning
+from geofield.grid import Grid
+from geofield.model.obstacles import ObstacleShapes
+from geofield.model.track_statistics import ObstacleLoss
+from geofield.model.tracks import Tracks
+from geofield.tracks.blocks import obstacle_shapes
+from geofield.tracks.clip import Crossings, Pieces, clip_tracks
+from geofield.tracks.direction import Baseline, find_baseline
+from geofield.tracks.frame import FloatArray, TrackFrame
+from geofield.tracks.layout import LastStrip, track_positions
+from geofield.tracks.losses import obstacle_losses
+from geofield.tracks.outline import clean_outline, metric
+from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
+from geofield.tracks.tables import (
+    gap_table,
+    line_table,
+    number_segments,
+    segment_ends,
+    segment_table,
+)
+
+
+def plan_tracks(
+    polygon: Polygon,
+    obstacles: Any = None,
+    *,
+    crs: Any,
+    spacing_m: float,
+    direction: Any = "longest_edge",
+    offset_m: float | None = None,
+    through: Any = None,
+    last_strip: LastStrip = "overrun",
+    min_segment_m: float = 0.0,
+    clearance_m: float = 0.0,
+    step_m: float = 1.0,
+    straight_tolerance_m: float = 1.0,
+    grid: Grid | None = None,
+) -> Tracks:
+    """Plan parallel tracks through a field, around what stands in it.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        The field, with or without holes, in `crs`.
+    obstacles : GeoDataFrame, GeoSeries, shapely geometries or None
+        What no vehicle may enter, avoided exactly as drawn: circles of geofield's own tables as
+        true circles, a person's polygons as polygons. Rows with status ``rejected`` do not count.
+        A table in another CRS is reprojected.
+    crs : CRS, str or int
+        Of the field; projected, in metres (usually the UTM zone).
+    spacing_m : float
+        Between neighbouring tracks.
+    direction : str, float, LineString or pair of points
+        ``longest_edge`` (of the outer ring), ``hough`` (the study's way to it), ``fewest`` (tracks)
+        or ``fewest_turns`` (pieces), a heading in degrees clockwise from true north, or an A-B
+        line in `crs`.
+    offset_m : float, optional
+        Of the first track from the edge it is counted from; half a spacing when not given.
+    through : (x, y) or shapely.Point, optional
+        A place in `crs` that one track passes through, instead of an offset. An A-B line passes
+        through its A by itself.
+    last_strip : {"overrun", "leave", "shift", "spread"}
+        What becomes of the rest at the far side; see `track_positions`.
+    min_segment_m : float
+        Shorter segments are not driven; they count as part of the gap.
+    clearance_m : float
+        Grows every obstacle.
+    step_m : float
+        Between track points.
+    straight_tolerance_m : float
+        How far the vertices of a straight edge may stray, for ``longest_edge``.
+    grid : Grid, optional
+        Of the picture: gives the track points their pixels.
+
+    Returns
+    -------
+    Tracks
+
+    Raises
+    ------
+    CRSError
+        When the CRS or the coordinates are not metres.
+    TrackError
+        When the field or a setting is unfit.
+    """
+    metric_crs = metric(crs)
+    _check_lengths(spacing_m=spacing_m, step_m=step_m)
+    outline, notes = clean_outline(polygon)
+    for note in notes:
+        warnings.warn(note, TrackWarning, stacklevel=2)
+    baseline = find_baseline(
+        outline, direction, metric_crs, spacing_m=spacing_m, tolerance_m=straight_tolerance_m
+    )
+    centre = outline.centroid
+    frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left)
+    edges = polygon_edges(outline, frame, FIELD)
+    positions, spacing_m, more = _positions(
+        edges,
+        frame,
+        baseline,
+        spacing_m=spacing_m,
+        offset_m=offset_m,
+        through=through,
+        last_strip=last_strip,
+    )
+    shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
+    pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
+    return _tracks(
+        pieces,
+        crossings,
+        positions,
+        frame,
+        shapes,
+        crs=metric_crs,
+        heading_deg=baseline.heading_deg,
+        spacing_m=spacing_m,
+        step_m=step_m,
+        grid=grid,
+        outline=outline,
+        notes=(*notes, *more),
+    )
+
+
+def clip_shapes(
+    positions: FloatArray,
+    edges: Edges,
+    shapes: ObstacleShapes,
+    frame: TrackFrame,
+    min_segment_m: float = 0.0,
+) -> tuple[Pieces, Crossings]:
+    """Clip tracks against a field's edges and obstacles of the CRS.
+
+    Obstacle indices are those of the circles, followed by those of the polygons.
+    """
+    circles = len(shapes.circles)
+    discs = discs_in_frame(
+        shapes.circles[:, 0], shapes.circles[:, 1], shapes.circles[:, 2], np.arange(circles), frame
+    )
+    if len(shapes.polygons):
+        owner = np.arange(circles, circles + len(shapes.polygons))
+        edges = join_edges(edges, polygon_edges(shapes.polygons, frame, owner))
+    return clip_tracks(positions, edges, discs, min_length_m=min_segment_m)
+
+
+def _check_lengths(**lengths: float) -> None:
+    for name, value in lengths.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
+
+
+def _positions(
+    edges: Edges,
+    frame: TrackFrame,
+    baseline: Baseline,
+    *,
+    spacing_m: float,
+    offset_m: float | None,
+    through: Any,
+    last_strip: LastStrip,
+) -> tuple[FloatArray, float, tuple[str, ...]]:
+    """Places of the tracks, and the spacing that they have."""
+    near, far = float(edges.va.min()), float(edges.va.max())
+    place = baseline.through if through is None else _place(through)
+    if place is not None and offset_m is not None:
+        raise TrackError(
+            "An offset and a place to pass through were both given.", hint="Give one of the two."
+        )
+    if place is not None:
+        first = float(frame.to_frame(*place)[1])
+    else:
+        edge = near
+        if baseline.edge is not None:
+            edge = float(
+                np.mean(
+                    frame.to_frame(
+                        [baseline.edge.x0, baseline.edge.x1], [baseline.edge.y0, baseline.edge.y1]
+                    )[1]
+                )
+            )
+        offset = spacing_m / 2.0 if offset_m is None else float(offset_m)
+        if not np.isfinite(offset):
+            raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
+        first = edge + offset
+    positions = track_positions(near, far, spacing_m, first_m=first, last_strip=last_strip)
+    if not len(positions):
+        note = (
+            f"The spacing of {spacing_m:g} m leaves no track in a field {far - near:.2f} m wide "
+            "across the tracks; one was laid through its middle."
+        )
+        warnings.warn(note, TrackWarning, stacklevel=3)
+        return np.array([(near + far) / 2.0]), spacing_m, (note,)
+    if last_strip == "spread" and len(positions) > 1:
+        spacing_m = float(positions[1] - positions[0])
+    return positions, spacing_m, ()
+
+
+def _place(through: Any) -> tuple[float, float]:
+    x, y = (through.x, through.y) if hasattr(through, "x") else tuple(through)
+    if not (np.isfinite(x) and np.isfinite(y)):
+        raise TrackError("The place to pass through is not finite.")
+    return float(x), float(y)
+
+
+def _tracks(
+    pieces: Pieces,
+    crossings: Crossings,
+    positions: FloatArray,
+    frame: TrackFrame,
+    shapes: ObstacleShapes,
+    *,
+    crs: Any,
+    heading_deg: float,
+    step_m: float,
+    outline: Polygon,
+    **rest: Any,
+) -> Tracks:
+    obstacle_no = np.concatenate((shapes.circle_no, shapes.polygon_no))
+    track_no, segment_no = number_segments(pieces)
+    length_m = pieces.end - pieces.start
+    ends = segment_ends(pieces, positions, frame)
+    segments, lines = segment_table(ends, track_no, segment_no, length_m, crs)
+    lost = obstacle_losses(crossings, len(obstacle_no))
+    whole = float(length_m.sum() + lost.sum())
+    numbers, row = np.unique(obstacle_no, return_inverse=True)
+    per_number = np.bincount(row, weights=lost, minlength=len(numbers))
+    blocked = len(positions) - len(np.unique(pieces.track))
+    return Tracks(
+        lines=line_table(
+            lines, track_no, length_m, heading_deg=heading_deg, step_m=step_m, crs=crs
+        ),
+        segments=segments,
+        gaps=gap_table(pieces, crossings, positions, frame, obstacle_no=obstacle_no, crs=crs),
+        heading_deg=heading_deg,
+        step_m=step_m,
+        outline=outline,
+        blocked_count=blocked,
+        losses=tuple(
+            ObstacleLoss(int(no), float(m), 100.0 * float(m) / whole if whole else 0.0)
+            for no, m in zip(numbers.tolist(), per_number.tolist(), strict=True)
+        ),
+        **rest,
+    )

@@ -1,0 +1,150 @@
+"""From pieces in the track frame to the layers `tracks`, `segments` and `gaps`."""
+
+from __future__ import annotations
+
+import geopandas as gpd
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from geofield import schema
+from geofield.model.tracks import points_per_segment
+from geofield.tracks.clip import Crossings, Pieces
+from geofield.tracks.frame import FloatArray, TrackFrame
+from geofield.tracks.losses import gap_causes, gaps_between
+from geofield.tracks.shapes import FIELD, IntArray
+
+
+def segment_ends(pieces: Pieces, positions: FloatArray, frame: TrackFrame) -> FloatArray:
+    """Ends of the pieces in the CRS: array of shape (pieces, 2 ends, 2 coordinates)."""
+    return _ends(pieces.start, pieces.end, positions[pieces.track], frame)
+
+
+def _ends(start: FloatArray, end: FloatArray, v: FloatArray, frame: TrackFrame) -> FloatArray:
+    out = np.empty((len(start), 2, 2))
+    out[:, 0, 0], out[:, 0, 1] = frame.to_crs(start, v)
+    out[:, 1, 0], out[:, 1, 1] = frame.to_crs(end, v)
+    return out
+
+
+def segment_table(
+    ends: FloatArray, track_no: IntArray, segment_no: IntArray, length_m: FloatArray, crs: CRS
+) -> tuple[gpd.GeoDataFrame, NDArray[np.object_]]:
+    """Layer `segments`, and its geometries."""
+    lines = _lines(ends)
+    table = schema.table(
+        schema.SEGMENTS,
+        {"track_no": track_no, "segment_no": segment_no, "length_m": length_m},
+        lines,
+        crs,
+    )
+    return table, lines
+
+
+def line_table(
+    lines: NDArray[np.object_],
+    track_no: IntArray,
+    length_m: FloatArray,
+    *,
+    heading_deg: float,
+    step_m: float,
+    crs: CRS,
+) -> gpd.GeoDataFrame:
+    """Layer `tracks`: one row for each track with at least one segment."""
+    numbers, first, count = np.unique(track_no, return_index=True, return_counts=True)
+    row = np.repeat(np.arange(len(numbers)), count)
+    points = points_per_segment(length_m, step_m)
+    return schema.table(
+        schema.TRACKS,
+        {
+            "track_no": numbers,
+            "heading_deg": np.full(len(numbers), heading_deg),
+            "segment_count": count,
+            "gap_count": count - 1,
+            "point_count": np.add.reduceat(points, first) if len(first) else points,
+            "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
+        },
+        shapely.multilinestrings(lines, indices=row) if len(lines) else lines,
+        crs,
+    )
+
+
+def gap_table(
+    pieces: Pieces,
+    crossings: Crossings,
+    positions: FloatArray,
+    frame: TrackFrame,
+    *,
+    obstacle_no: IntArray,
+    crs: CRS,
+) -> gpd.GeoDataFrame:
+    """Layer `gaps`, each with its causes in words and its lowest obstacle number."""
+    before = gaps_between(pieces)
+    start, end = pieces.end[before], pieces.start[before + 1]
+    track = pieces.track[before]
+    gap_of_piece = np.zeros(len(pieces), dtype=np.int64)
+    gap_of_piece[before] = np.arange(len(before))
+    piece, owner = gap_causes(pieces, crossings)
+    causes, lowest = _in_words(gap_of_piece[piece], owner, obstacle_no, len(before))
+    return schema.table(
+        schema.GAPS,
+        {
+            "track_no": track + 1,
+            "gap_no": _count_within(track),
+            "length_m": end - start,
+            "cause": causes,
+            "obstacle_no": lowest,
+        },
+        _lines(_ends(start, end, positions[track], frame)),
+        crs,
+    )
+
+
+def _in_words(
+    gap: IntArray, owner: IntArray, obstacle_no: IntArray, count: int
+) -> tuple[list[str], list[int | None]]:
+    border: list[bool] = [False] * count
+    numbers: list[list[int]] = [[] for _ in range(count)]
+    number = np.append(obstacle_no, 0)[owner].tolist()
+    for at, who, no in zip(gap.tolist(), owner.tolist(), number, strict=True):
+        if who == FIELD:
+            border[at] = True
+        else:
+            numbers[at].append(no)
+    words: list[str] = []
+    lowest: list[int | None] = []
+    for at_border, mine in zip(border, numbers, strict=True):
+        if not mine:
+            words.append("border")
+            lowest.append(None)
+            continue
+        if len(mine) == 1:
+            text = f"obstacle {mine[0]}"
+        else:
+            # Parts of one obstacle share its number.
+            each = sorted(set(mine))
+            text = f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}"
+        words.append(f"border, {text}" if at_border else text)
+        lowest.append(min(mine))
+    return words, lowest
+
+
+def _count_within(track: IntArray) -> IntArray:
+    """1, 2, ... within each run of equal values."""
+    if not len(track):
+        return track
+    new = np.append(True, track[1:] != track[:-1])
+    index = np.arange(len(track))
+    return np.asarray(index - np.maximum.accumulate(np.where(new, index, 0)) + 1)
+
+
+def number_segments(pieces: Pieces) -> tuple[IntArray, IntArray]:
+    """Track and segment numbers of the pieces, both from 1."""
+    return pieces.track + 1, _count_within(pieces.track)
+
+
+def _lines(ends: FloatArray) -> NDArray[np.object_]:
+    if not len(ends):
+        return np.empty(0, dtype=object)
+    return np.asarray(shapely.linestrings(ends))
