@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from geofield.model.obstacles import ObstacleShapes
+from geofield.tracks.clip import SNAP_M
 from geofield.tracks.frame import TrackFrame
 from geofield.tracks.layout import track_positions
 from geofield.tracks.planner import clip_shapes
@@ -115,8 +116,15 @@ def overlay(
     """The same by GEOS: each line with the free area, joined where noding split it."""
 
     # The free area in the frame itself: rotating the tracks instead would move them off vertices.
+    if not len(positions):
+        return []
+
     def turn(xy: np.ndarray) -> np.ndarray:
-        return np.column_stack(frame.to_frame(xy[:, 0], xy[:, 1]))
+        u, v = frame.to_frame(xy[:, 0], xy[:, 1])
+        # Whether a track runs along an edge or 1e-16 m beside it is rounding: for both, a vertex
+        # within a nanometre of a track is on it.
+        nearest = positions[np.abs(positions[:, None] - v).argmin(axis=0)]
+        return np.column_stack((u, np.where(np.abs(nearest - v) <= SNAP_M, nearest, v)))
 
     free = shapely.transform(polygon, turn)
     if obstacles:

@@ -12,11 +12,27 @@ import numpy as np
 
 from geofield.errors import TrackError
 from geofield.tracks.frame import FloatArray
+from geofield.tracks.shapes import Edges
 
 LastStrip = Literal["overrun", "leave", "shift", "spread"]
 LAST_STRIPS: tuple[str, ...] = get_args(LastStrip)
 
 _EPS_M = 1e-7
+
+
+def on_the_border(positions: FloatArray, edges: Edges) -> FloatArray:
+    """Leave out a first or last track that only touches a corner of the field.
+
+    A track on the border itself is one where an edge of the field lies along it.
+    """
+    near, far = float(edges.va.min()), float(edges.va.max())
+    keep = np.ones(len(positions), dtype=bool)
+    for at in {0, len(positions) - 1} if len(positions) else set():
+        place = positions[at]
+        if min(abs(place - near), abs(place - far)) <= _EPS_M:
+            along = (np.abs(edges.va - place) <= _EPS_M) & (np.abs(edges.vb - place) <= _EPS_M)
+            keep[at] = bool(along.any())
+    return positions[keep]
 
 
 def track_positions(
@@ -39,7 +55,7 @@ def track_positions(
         Place of one track; all others are whole spacings away from it.
     last_strip : {"overrun", "leave", "shift", "spread"}
         What becomes of the rest at the far side. ``overrun``: tracks as far as the field goes (the
-        study's rule), so that the last strip may reach beyond the border by less than half a
+        study's rule), so that the last strip may reach beyond the border by up to half a
         spacing, or a rest narrower than that stays unworked; ``leave``: only strips that
         lie wholly inside; ``shift``: one more track, moved back until its strip ends at the far
         side; ``spread``: the spacing shrinks evenly until strips fill the field exactly.
@@ -54,14 +70,14 @@ def track_positions(
             f"Unknown last_strip {last_strip!r}.", hint=f"Choose one of {', '.join(LAST_STRIPS)}."
         )
     half = spacing_m / 2.0
-    index = np.ceil((near_m + _EPS_M - first_m) / spacing_m)
+    index = np.ceil((near_m - _EPS_M - first_m) / spacing_m)
     start = first_m + index * spacing_m
     if last_strip == "spread":
         edge = max(start - half, near_m)
         count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
         width = (far_m - edge) / count
         return np.asarray(edge + (np.arange(count) + 0.5) * width)
-    limit = far_m - _EPS_M if last_strip == "overrun" else far_m - half + _EPS_M
+    limit = (far_m if last_strip == "overrun" else far_m - half) + _EPS_M
     count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
     # Multiples of the spacing from the one place, so that numbers far away do not drift.
     positions = first_m + (index + np.arange(count)) * spacing_m

@@ -17,7 +17,7 @@ from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
 from geofield.tracks.frame import FloatArray, TrackFrame
-from geofield.tracks.layout import LastStrip, track_positions
+from geofield.tracks.layout import LastStrip, on_the_border, track_positions
 from geofield.tracks.losses import obstacle_losses
 from geofield.tracks.outline import clean_outline, metric
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
@@ -192,6 +192,7 @@ def _positions(
             raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
         first = edge + offset
     positions = track_positions(near, far, spacing_m, first_m=first, last_strip=last_strip)
+    positions = on_the_border(positions, edges)
     if not len(positions):
         note = (
             f"The spacing of {spacing_m:g} m leaves no track in a field {far - near:.2f} m wide "
