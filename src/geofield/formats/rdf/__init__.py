@@ -1,0 +1,1 @@
+"""Linked data: RDF in four syntaxes and two profiles, ontology, shapes, queries."""

@@ -1,0 +1,122 @@
+"""Namespaces, well-known terms and CRS identifiers of the linked data products."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pyproj import CRS
+
+#: The ontology's namespace.
+GF: Final = "https://w3id.org/geofield#"
+#: Under which features are named when the user sets no base of their own. `example.org`
+#: belongs to nobody: whoever publishes data sets a base they control.
+DEFAULT_BASE: Final = "https://example.org/geofield/"
+
+RDF: Final = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS: Final = "http://www.w3.org/2000/01/rdf-schema#"
+OWL: Final = "http://www.w3.org/2002/07/owl#"
+XSD: Final = "http://www.w3.org/2001/XMLSchema#"
+SKOS: Final = "http://www.w3.org/2004/02/skos/core#"
+DCTERMS: Final = "http://purl.org/dc/terms/"
+DCAT: Final = "http://www.w3.org/ns/dcat#"
+PROV: Final = "http://www.w3.org/ns/prov#"
+GEO: Final = "http://www.opengis.net/ont/geosparql#"
+GEOF: Final = "http://www.opengis.net/def/function/geosparql/"
+SF: Final = "http://www.opengis.net/ont/sf#"
+SOSA: Final = "http://www.w3.org/ns/sosa/"
+S4AGRI: Final = "https://saref.etsi.org/saref4agri/"
+WGS: Final = "http://www.w3.org/2003/01/geo/wgs84_pos#"
+CC: Final = "http://creativecommons.org/ns#"
+QUDT: Final = "http://qudt.org/schema/qudt/"
+UNIT: Final = "http://qudt.org/vocab/unit/"
+PO: Final = "http://purl.obolibrary.org/obo/PO_"
+SH: Final = "http://www.w3.org/ns/shacl#"
+
+# The source study's vocabulary (METHOD.md, section 5).
+STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
+STUDY_TRAJECTORY: Final = "http://www.DLC.org/Trajectory#"
+STUDY_POINT: Final = "http://www.DLC.org/trajectory#"
+STUDY_TREE: Final = "http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#"
+SVG_CIRCLE: Final = "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd/circle#"
+GML: Final = "http://www.opengis.net/gml/"
+DC: Final = "http://purl.org/dc/elements/1.1/"
+DCMI_IMAGE: Final = "http://purl.org/dc/dcmitype/Image"
+
+#: Prefixes of every product, by name; the order is that of the files.
+PREFIXES: Final[dict[str, str]] = {
+    "rdf": RDF,
+    "rdfs": RDFS,
+    "xsd": XSD,
+    "dcterms": DCTERMS,
+    "dcat": DCAT,
+    "prov": PROV,
+    "geo": GEO,
+    "sf": SF,
+    "sosa": SOSA,
+    "s4agri": S4AGRI,
+    "wgs84": WGS,
+    "cc": CC,
+    "gf": GF,
+}
+STUDY_PREFIXES: Final[dict[str, str]] = {
+    "dc": DC,
+    "po": STUDY_TREE,
+    "svg": SVG_CIRCLE,
+    "gml": GML,
+    "obstacle": STUDY_OBSTACLE,
+    "trajectory": STUDY_POINT,
+}
+#: Further prefixes that the ontology, the shapes and the queries need.
+SCHEMA_PREFIXES: Final[dict[str, str]] = {
+    **PREFIXES,
+    "owl": OWL,
+    "skos": SKOS,
+    "qudt": QUDT,
+    "unit": UNIT,
+    "po": PO,
+    "sh": SH,
+    "geof": GEOF,
+}
+
+TYPE: Final = RDF + "type"
+LABEL: Final = RDFS + "label"
+STRING: Final = XSD + "string"
+DOUBLE: Final = XSD + "double"
+INTEGER: Final = XSD + "integer"
+INT: Final = XSD + "int"
+DATE: Final = XSD + "date"
+BOOLEAN: Final = XSD + "boolean"
+WKT: Final = GEO + "wktLiteral"
+
+CRS84: Final = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
+_EPSG: Final = "http://www.opengis.net/def/crs/EPSG/0/"
+
+
+def expand(curie: str) -> str:
+    """The full IRI of a prefixed name such as ``gf:Track``."""
+    prefix, _, name = curie.partition(":")
+    return SCHEMA_PREFIXES[prefix] + name
+
+
+def crs_iri(crs: CRS) -> str | None:
+    """The OGC identifier of a CRS, None where it has no EPSG code."""
+    authority = crs.to_authority(auth_name="EPSG", min_confidence=100)
+    return _EPSG + str(authority[1]) if authority else None
+
+
+def crs_of_iri(iri: str) -> CRS | None:
+    """The CRS of an OGC identifier; None where it is not one."""
+    if iri == CRS84:
+        return CRS.from_user_input("OGC:CRS84")
+    code = iri.removeprefix(_EPSG)
+    return CRS.from_epsg(int(code)) if code != iri and code.isdecimal() else None
+
+
+def northing_first(crs: CRS) -> bool:
+    """Whether the authority's axis order is northing (latitude) before easting.
+
+    WKT literals follow the authority's order, geofield's arrays never do.
+    """
+    directions = [str(axis.direction).lower() for axis in crs.axis_info[:2]]
+    # Polar CRS name both axes "south" (or "north"); theirs is easting first.
+    return directions[0] in ("north", "south") and len(set(directions)) == 2

@@ -1,0 +1,92 @@
+"""Four syntaxes, two profiles, one graph."""
+
+from __future__ import annotations
+
+import pyoxigraph as ox
+import pytest
+import rdflib
+from rdf_plans import small_plan
+from rdflib.compare import isomorphic
+
+from geofield.errors import FormatError
+from geofield.formats.rdf import write
+
+WRITERS = {
+    "xml": write.write_rdfxml,
+    "turtle": write.write_turtle,
+    "json-ld": write.write_jsonld,
+    "nt": write.write_ntriples,
+}
+BASE = "https://data.farm.example/"
+
+
+def triples(paths):
+    """All triples of files, by a parser that is not rdflib."""
+    return {quad.triple for path in paths for quad in ox.parse(path=path)}
+
+
+@pytest.mark.parametrize("profile", write.PROFILES)
+def test_the_four_syntaxes_hold_the_same_triples_and_no_blank_node(plan, tmp_path, profile):
+    options = {"profile": profile, "base": BASE}
+    graphs = {
+        name: triples(writer(plan, tmp_path, options=options)) for name, writer in WRITERS.items()
+    }
+    assert len(graphs["nt"]) > 1000
+    for name, graph in graphs.items():
+        assert graph == graphs["nt"], name
+        terms = {term for triple in graph for term in (triple.subject, triple.object)}
+        assert not any(isinstance(term, ox.BlankNode) for term in terms)
+
+
+# rdflib's own JSON-LD parser uses a class that rdflib has deprecated.
+@pytest.mark.filterwarnings("ignore:ConjunctiveGraph is deprecated:DeprecationWarning")
+@pytest.mark.parametrize("syntax", ["xml", "turtle", "json-ld"])
+def test_rdflib_reads_the_same_graph(plan, tmp_path, syntax):
+    def graph(name):
+        result = rdflib.Graph()
+        for path in WRITERS[name](plan, tmp_path, options={"base": BASE}):
+            result.parse(path, format=name)
+        return result
+
+    assert isomorphic(graph(syntax), graph("nt"))
+
+
+@pytest.mark.parametrize("writer", WRITERS.values())
+def test_two_runs_write_the_same_bytes(tmp_path, writer):
+    both = []
+    for run in ("a", "b"):
+        (tmp_path / run).mkdir()
+        both.append([p.read_bytes() for p in writer(small_plan(), tmp_path / run, options={})])
+    assert both[0] == both[1]
+
+
+def test_the_base_names_every_feature(plan, tmp_path):
+    graph = triples(write.write_ntriples(plan, tmp_path, options={"base": BASE.rstrip("/")}))
+    own = {str(t.subject.value) for t in graph}
+    assert all(iri.startswith(BASE) for iri in own)
+    assert f"{BASE}field/cy-1/track/7/geometry" in own
+    assert f"{BASE}field/cy-1/obstacle/3" in own
+
+
+@pytest.mark.parametrize(
+    "base",
+    ["farm", "https://a b.example/", "https://a.example/#", "file:///etc/", "https://a/?q=1"],
+)
+def test_a_base_that_cannot_name_features_is_refused(plan, tmp_path, base):
+    with pytest.raises(FormatError, match="cannot name features"):
+        write.write_turtle(plan, tmp_path, options={"base": base})
+
+
+def test_an_unknown_profile_is_refused(plan, tmp_path):
+    with pytest.raises(FormatError, match="Profiles: geosparql, study"):
+        write.write_turtle(plan, tmp_path, options={"profile": "other"})
+
+
+@pytest.mark.parametrize("name", ["a b/c#d?é", "..", 'x"<y>&{z}', "日本\n"])
+def test_any_field_id_becomes_a_valid_iri(tmp_path, name):
+    plan = small_plan()
+    plan.tables["field"].loc[0, "field_id"] = name
+    graphs = [triples(w(plan, tmp_path, options={})) for w in WRITERS.values()]
+    assert all(graph == graphs[0] for graph in graphs)
+    texts = {t.object.value for t in graphs[0] if t.predicate.value.endswith("terms/identifier")}
+    assert texts == {name}
