@@ -255,10 +255,11 @@ def table(of: Layer, data: dict[str, Any], geometry: Any, crs: CRS) -> gpd.GeoDa
     return gpd.GeoDataFrame(frame, geometry=gpd.GeoSeries(geometry, crs=crs), crs=crs)
 
 
-def conform(of: Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.GeoDataFrame:
     """Any table in the shape of a layer: its columns, order and types, sorted by its key.
 
-    Rows without a key come last. Further columns are left out.
+    Rows without a key come last. Further columns are left out, or kept behind the layer's
+    own where `extras` is true.
     """
     import numpy as np
     import pandas as pd
@@ -269,14 +270,23 @@ def conform(of: Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
             continue
         series = frame[column.name]
         if column.type == "int":
-            data[column.name] = pd.to_numeric(series).round().astype("Int64").to_list()
-            data[column.name] = [None if pd.isna(v) else int(v) for v in data[column.name]]
+            whole = pd.to_numeric(series)
+            if whole.dtype.kind == "i" and not whole.isna().any():
+                data[column.name] = whole.to_numpy(dtype="int64")
+            else:
+                rounded = whole.round().astype("Int64").to_list()
+                data[column.name] = [None if pd.isna(v) else int(v) for v in rounded]
         elif column.type == "float":
             data[column.name] = pd.to_numeric(series).to_numpy(dtype="float64", na_value=np.nan)
         elif column.type == "date":
             data[column.name] = [None if pd.isna(v) else str(v)[:10] for v in series]
         else:
             data[column.name] = [None if pd.isna(v) else str(v) for v in series]
-    result = table(of, data, list(frame.geometry), frame.crs)
+    result = table(of, data, frame.geometry.to_numpy(), frame.crs)
+    if extras:
+        known = {*of.column_names, frame.geometry.name, result.geometry.name}
+        for name in frame.columns:
+            if name not in known:
+                result[name] = frame[name].to_numpy()
     result = result.sort_values(list(of.key), kind="stable", na_position="last")
     return result.reset_index(drop=True)

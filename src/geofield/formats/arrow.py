@@ -1,0 +1,253 @@
+"""From tables to files through Arrow: exact column types, missing values, streaming.
+
+GDAL's writers take Arrow batches as they come, so that a layer of millions of points
+never lies in memory as a whole, and an empty layer has the same columns as a full one.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, authority_name, transformer
+from geofield.errors import FormatError
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    import pyarrow as pa
+
+    from geofield.schema import Column, Layer
+
+_SINGLE = {"Point": 0, "LineString": 1, "Polygon": 3, "MultiLineString": 5, "MultiPolygon": 6}
+_PART = {"MultiLineString": 1, "MultiPolygon": 3}
+_WHOLE = {"Point": 4, "LineString": 5, "Polygon": 6}
+# GDAL's configuration belongs to the whole process.
+_GDAL_CONFIG = threading.Lock()
+
+
+@contextmanager
+def gdal_config(**options: str) -> Iterator[None]:
+    """GDAL configuration options for a block, one block at a time."""
+    import pyogrio
+
+    with _GDAL_CONFIG:
+        before = {key: pyogrio.get_gdal_config_option(key) for key in options}
+        pyogrio.set_gdal_config_options(options)
+        try:
+            yield
+        finally:
+            pyogrio.set_gdal_config_options(before)
+
+
+def to_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
+    """Geometries in WGS 84 longitude and latitude, degrees."""
+    if crs == LONLAT:
+        return geometry
+    project = transformer(crs, LONLAT)
+    return np.asarray(
+        shapely.transform(geometry, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))),
+        dtype=object,
+    )
+
+
+def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:
+    """The geometries of a table as a layer wants them.
+
+    Two-dimensional, of the layer's one type (single geometries are promoted), exterior rings
+    counter-clockwise.
+
+    Raises
+    ------
+    FormatError
+        For a missing or empty geometry, or one of another type.
+    """
+    geometry = np.asarray(table.geometry.to_numpy(), dtype=object)
+    if not len(geometry):
+        return geometry
+    wanted = _SINGLE[of.geometry]
+    kind = shapely.get_type_id(geometry)
+    if of.geometry in _PART:
+        single = kind == _PART[of.geometry]
+        if single.any():
+            geometry = geometry.copy()
+            promote = shapely.multilinestrings if wanted == 5 else shapely.multipolygons
+            geometry[single] = promote(geometry[single], indices=np.arange(single.sum()))
+    else:
+        alone = (kind == _WHOLE[of.geometry]) & (shapely.get_num_geometries(geometry) == 1)
+        if alone.any():
+            geometry = geometry.copy()
+            geometry[alone] = shapely.get_geometry(geometry[alone], 0)
+    wrong = (shapely.get_type_id(geometry) != wanted) | shapely.is_empty(geometry)
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        found = "no geometry" if kind[row] < 0 else geometry[row].geom_type
+        if kind[row] >= 0 and shapely.is_empty(geometry[row]):
+            found = f"an empty {found}"
+        raise FormatError(
+            f"Layer {of.name!r} holds {of.geometry} geometries; row {row + 1} has {found}.",
+            hint="Split multi-part geometries and remove empty ones, then repeat.",
+        )
+    if shapely.has_z(geometry).any():
+        geometry = shapely.force_2d(geometry)
+    if wanted in (3, 6):
+        geometry = shapely.orient_polygons(geometry)
+    return np.asarray(geometry, dtype=object)
+
+
+def arrow_type(column: Column) -> Any:
+    """The Arrow type of a column."""
+    import pyarrow as pa
+
+    return {"int": pa.int64(), "float": pa.float64(), "str": pa.string(), "date": pa.date32()}[
+        column.type
+    ]
+
+
+def arrow_values(column: Column, series: Any) -> pa.Array:
+    """A column's values as Arrow; missing ones (NaN included) as null.
+
+    Raises
+    ------
+    FormatError
+        When a value does not fit the column's type.
+    """
+    import pandas as pd
+    import pyarrow as pa
+
+    try:
+        if column.type == "date":
+            return pa.array([None if pd.isna(v) else str(v)[:10] for v in series]).cast(pa.date32())
+        if column.type == "str":
+            return pa.array([None if pd.isna(v) else str(v) for v in series], pa.string())
+        if column.type == "float":
+            values = series.to_numpy(dtype="float64", na_value=np.nan)
+            return pa.array(values, pa.float64(), from_pandas=True)
+        return pa.array(series.astype("Int64"), pa.int64(), from_pandas=True)
+    except (pa.ArrowInvalid, pa.ArrowTypeError, ValueError, TypeError) as error:
+        raise FormatError(
+            f"Column {column.name!r} holds a value that is no {column.type}: {error}.",
+            hint="Correct the value.",
+        ) from error
+
+
+def extra_columns(of: Layer, table: gpd.GeoDataFrame) -> list[str]:
+    """Columns that a person added to a layer."""
+    known = {*of.column_names, table.geometry.name, "fid"}
+    return [str(name) for name in table.columns if name not in known]
+
+
+def arrow_table(
+    of: Layer,
+    table: gpd.GeoDataFrame,
+    *,
+    names: Mapping[str, str] | None = None,
+    lonlat: bool = False,
+    geometry_name: str = "geom",
+    extras: bool = True,
+) -> pa.Table:
+    """A layer's table as Arrow, geometry as WKB in the last column.
+
+    Parameters
+    ----------
+    of : Layer
+    table : GeoDataFrame
+    names : mapping, optional
+        Column names in the file; columns that are missing here are left out.
+    lonlat : bool
+        Whether to reproject to WGS 84.
+    geometry_name : str
+    extras : bool
+        Whether columns that the schema does not know are written too.
+    """
+    import pyarrow as pa
+
+    geometry = exact_geometry(of, table)
+    if lonlat and len(geometry):
+        geometry = to_lonlat(geometry, CRS(table.crs))
+    columns: dict[str, pa.Array] = {}
+    for column in of.columns:
+        if names is None or column.name in names:
+            key = column.name if names is None else names[column.name]
+            columns[key] = arrow_values(column, table[column.name])
+    if extras and names is None:
+        for name in extra_columns(of, table):
+            columns[name] = _extra_values(table[name])
+    columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
+    return pa.table(columns)
+
+
+def _extra_values(series: Any) -> pa.Array:
+    import pandas as pd
+    import pyarrow as pa
+
+    try:
+        values = pa.array(series, from_pandas=True)
+    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):
+        values = pa.array([None if pd.isna(v) else str(v) for v in series], pa.string())
+    if pa.types.is_null(values.type):
+        return values.cast(pa.string())
+    if pa.types.is_large_string(values.type):
+        return values.cast(pa.string())
+    return values
+
+
+def write_layer(
+    table: pa.Table | pa.RecordBatchReader,
+    path: Path,
+    *,
+    layer: str,
+    driver: str,
+    geometry_type: str,
+    crs: CRS,
+    geometry_name: str = "geom",
+    **options: Any,
+) -> None:
+    """Write Arrow data as one layer of a file, through GDAL.
+
+    Raises
+    ------
+    FormatError
+        When GDAL refuses.
+    """
+    import pyogrio
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = authority_name(crs)
+    try:
+        pyogrio.write_arrow(
+            table,
+            path,
+            layer=layer,
+            driver=driver,
+            geometry_name=geometry_name,
+            geometry_type=geometry_type,
+            crs=name if ":" in name else crs.to_wkt(),
+            **options,
+        )
+    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
+        raise FormatError(
+            f"{path.name} could not be written: {error}.", hint="Is there room on the disk?"
+        ) from error
+
+
+def batches(of: Layer, chunks: Iterable[gpd.GeoDataFrame], **how: Any) -> pa.RecordBatchReader:
+    """Tables of one layer as a stream of Arrow batches (parameters of :func:`arrow_table`)."""
+    import pyarrow as pa
+
+    first = arrow_table(of, schema.empty(of, LONLAT), **how).schema
+
+    def stream() -> Iterator[pa.RecordBatch]:
+        for chunk in chunks:
+            yield from arrow_table(of, chunk, extras=False, **how).to_batches()
+
+    return pa.RecordBatchReader.from_batches(first, stream())

@@ -1,0 +1,130 @@
+"""Writing products: stage, say what is dropped, move into place."""
+
+from __future__ import annotations
+
+import difflib
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import shapely
+
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats.atomic import staged_folder
+from geofield.formats.registry import Format, format_named
+from geofield.model import Dataset
+
+
+def write_dataset(
+    dataset: Dataset,
+    folder: Path | str,
+    formats: Iterable[str],
+    *,
+    stem: str = "field",
+    overwrite: bool = False,
+    options: Mapping[str, Any] | None = None,
+    inputs: Iterable[Path | str] = (),
+) -> list[Path]:
+    """Write a dataset in one or more formats.
+
+    Either all products come into place or none; previous ones stay as they were until then.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    folder : Path
+        Where the products go; made when it is missing.
+    formats : iterable of str
+        Names of the registry.
+    stem : str
+        Name of the products that are one file.
+    overwrite : bool
+        Whether products that are there already may be replaced.
+    options : mapping, optional
+        Options of the writers (see `Format.options`); each writer gets those it knows.
+    inputs : iterable of Path
+        Files that were read for this dataset: they are never replaced.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Warns
+    -----
+    FormatWarning
+        Once per format that drops something the dataset has.
+
+    Raises
+    ------
+    FormatError
+        For an unknown format or option, and when a product cannot be written.
+    """
+    chosen = list(dict.fromkeys(format_named(name) for name in formats))
+    given = dict(options or {})
+    _check_options(chosen, given)
+    _check_stem(stem)
+    target = Path(folder)
+    written: list[Path] = []
+    with staged_folder(target, overwrite=overwrite, inputs=inputs) as staging:
+        for each in chosen:
+            write = each.load_writer()
+            own = {key: value for key, value in given.items() if key in each.options}
+            for path in write(dataset, staging, stem=stem, options=own):
+                written.append(target / path.relative_to(staging))
+    for each in chosen:
+        words = dropped(dataset, each)
+        if words:
+            warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
+    return written
+
+
+def dropped(dataset: Dataset, into: Format) -> list[str]:
+    """What a format leaves out of a dataset, in plain words."""
+    layers = [
+        each.title.lower()
+        for each in dataset.layers()
+        if each.name not in into.layers and dataset.has(each.name)
+    ]
+    # Segments are the tracks' pieces: a format with the one has the other's geometry.
+    carried = set(into.layers)
+    if "segments" in carried:
+        layers = [title for title in layers if title != "tracks"]
+    return layers + [drop.words for drop in into.drops if _present(dataset, drop.when)]
+
+
+def _present(dataset: Dataset, when: str) -> bool:
+    if when == "provenance":
+        return bool(dataset.provenance.settings or dataset.provenance.evidence)
+    if when == "holes":
+        return bool((shapely.get_num_interior_rings(dataset.table("field").geometry) > 0).any())
+    if when == "polygons":
+        obstacles = dataset.table("obstacles")
+        return bool((obstacles["radius_m"].isna()).any())
+    layer, _, column = when.partition(".")
+    if not dataset.has(layer):
+        return False
+    if not column:
+        return True
+    return layer in dataset.tables and bool(dataset.tables[layer][column].notna().any())
+
+
+def _check_options(chosen: list[Format], given: Mapping[str, Any]) -> None:
+    known = {key for each in chosen for key in each.options}
+    for key in given:
+        if key not in known:
+            near = difflib.get_close_matches(key, sorted(known), n=1)
+            raise FormatError(
+                f"No chosen format knows the option {key!r}.",
+                hint=f"Did you mean {near[0]!r}?" if near else f"Options: {sorted(known)}.",
+            )
+
+
+def _check_stem(stem: str) -> None:
+    if not stem or stem in (".", "..") or set(stem) & set('/\\:*?"<>|\0'):
+        raise FormatError(f"{stem!r} is not a file name.", hint="Use letters, digits, '-' and '_'.")
+
+
+def _join(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,203 @@
+"""Foreign geometries as layers of the schema: names, numbers and radii from usual columns."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import shapely
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, grid_north_deg, transformer
+from geofield.errors import FormatError, FormatWarning
+from geofield.model.obstacles import circle_polygons
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: Radius of an obstacle point that has none, metres: the smallest tree of METHOD.md, section 3.
+POINT_RADIUS_M = 2.0
+
+_NAME = ("name", "field", "fieldname", "field_name", "designator", "label", "title", "schlag")
+_ID = ("field_id", "id", "fid", "guid", "uuid", "parcel_id", "ref")
+_RADIUS = ("radius_m", "radius")
+_BUFFER = ("buffer_m", "buffer")
+_NUMBER = ("obstacle_no", "obst_no", "number", "no")
+_TRACK = ("track_no", "track", "swath")
+_SEGMENT = ("segment_no", "segment")
+
+
+def column_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> Any:
+    """The first column with one of the names, whatever its case; None without one."""
+    by_name = {str(column).lower(): column for column in frame.columns}
+    for name in names:
+        if name in by_name and frame[by_name[name]].notna().any():
+            return frame[by_name[name]]
+    return None
+
+
+def numbers_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> np.ndarray:
+    """A column's numbers as floats; NaN where there are none."""
+    series = column_like(frame, names)
+    if series is None:
+        return np.full(len(frame), np.nan)
+    numeric = pd.to_numeric(series, errors="coerce")
+    return np.asarray(numeric.to_numpy(dtype="float64", na_value=np.nan))
+
+
+def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
+    """The one outline as layer `field`.
+
+    Raises
+    ------
+    FormatError
+        When there are several: a dataset is one field.
+    """
+    names = column_like(frame, _NAME)
+    if len(frame) > 1:
+        shown = "" if names is None else f" ({', '.join(map(str, names[:5]))}, ...)"
+        raise FormatError(
+            f"{path.name} holds {len(frame)} outlines{shown}; a dataset is one field.",
+            hint="Save the one you want as a file of its own.",
+        )
+    polygon = shapely.orient_polygons(shapely.force_2d(frame.geometry.iloc[0]))
+    ids = column_like(frame, _ID)
+    data: dict[str, Any] = {
+        column.name: [frame[column.name].iloc[0]]
+        for column in schema.FIELD.columns
+        if column.name in frame.columns and pd.notna(frame[column.name].iloc[0])
+    }
+    data |= {
+        "name": [path.stem if names is None else str(names.iloc[0])],
+        "field_id": [None if ids is None else str(ids.iloc[0])],
+        "area_ha": [polygon.area / 10_000.0],
+        "perimeter_m": [polygon.exterior.length],
+    }
+    data.setdefault("method", ["boundary"])
+    return schema.table(schema.FIELD, data, [polygon], crs)
+
+
+def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
+    """Points and polygons as layer `obstacles`.
+
+    A point becomes the circle of its radius and safety margin. Rows without a status were
+    put there by a person: they are `added`.
+    """
+    geometry = np.asarray(shapely.force_2d(frame.geometry.to_numpy()), dtype=object)
+    count = len(geometry)
+    radius, margin = numbers_like(frame, _RADIUS), numbers_like(frame, _BUFFER)
+    is_point = shapely.get_type_id(geometry) == shapely.GeometryType.POINT.value
+    unsized = is_point & ~(radius > 0)
+    if unsized.any():
+        warnings.warn(
+            f"{path.name}: {int(unsized.sum())} obstacle points have no radius; they are circles "
+            f"of {POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
+            FormatWarning,
+            stacklevel=2,
+        )
+        radius[unsized] = POINT_RADIUS_M
+    margin = np.where(np.isnan(margin), 0.0, margin)
+    centre = shapely.centroid(geometry)
+    x, y = shapely.get_x(centre), shapely.get_y(centre)
+    if is_point.any():
+        geometry[is_point] = circle_polygons(
+            x[is_point], y[is_point], radius[is_point] + margin[is_point]
+        )
+    lon, lat = transformer(crs, LONLAT).transform(x, y)
+    data: dict[str, Any] = {
+        name: frame[name].to_list()
+        for name in ("confidence", "x_px", "y_px", "radius_px")
+        if name in frame.columns
+    }
+    data |= {
+        "obstacle_no": _whole_numbers(numbers_like(frame, _NUMBER)),
+        "kind": _one_of(frame, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
+        "status": _one_of(frame, "status", schema.STATUSES, np.full(count, "added")),
+        "radius_m": radius,
+        "buffer_m": margin,
+        "lat": lat,
+        "lon": lon,
+    }
+    return schema.conform(
+        schema.OBSTACLES,
+        schema.table(schema.OBSTACLES, data, shapely.orient_polygons(geometry), crs),
+    )
+
+
+def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+    """Lines as layers `tracks` and `segments`.
+
+    Lines with the same track number are segments of one track; without numbers each line is
+    a track.
+    """
+    geometry = shapely.force_2d(frame.geometry.to_numpy())
+    geometry = np.array([shapely.LineString(line.coords) for line in geometry], dtype=object)
+    track = numbers_like(frame, _TRACK)
+    if np.isnan(track).any():
+        track = _numbers_in_names(frame)
+    segment = numbers_like(frame, _SEGMENT)
+    if np.isnan(segment).any():
+        segment = pd.Series(track).groupby(track).cumcount().to_numpy() + 1
+    lengths = shapely.length(geometry)
+    segments = schema.conform(
+        schema.SEGMENTS,
+        schema.table(
+            schema.SEGMENTS,
+            {
+                "track_no": track.astype(int),
+                "segment_no": np.asarray(segment).astype(int),
+                "length_m": lengths,
+            },
+            geometry,
+            crs,
+        ),
+    )
+    rows: dict[str, list[Any]] = {name: [] for name in schema.TRACKS.column_names}
+    shapes = []
+    for number, part in segments.groupby("track_no", sort=True):
+        lines = part.geometry.to_numpy()
+        (x0, y0), (x1, y1) = lines[0].coords[0], lines[-1].coords[-1]
+        grid_heading = np.degrees(np.arctan2(x1 - x0, y1 - y0))
+        rows["track_no"].append(int(number))
+        rows["heading_deg"].append(float((grid_heading + grid_north_deg(crs, x0, y0)) % 360.0))
+        rows["segment_count"].append(len(part))
+        rows["gap_count"].append(len(part) - 1)
+        rows["point_count"].append(None)
+        rows["length_m"].append(float(part["length_m"].sum()))
+        shapes.append(shapely.multilinestrings(list(lines)))
+    return schema.table(schema.TRACKS, rows, shapes, crs), segments
+
+
+def _numbers_in_names(frame: gpd.GeoDataFrame) -> np.ndarray:
+    """Track numbers from names such as ``Track 7``, where all rows have one; else 1, 2, ..."""
+    names = column_like(frame, _NAME)
+    if names is not None:
+        found = [re.search(r"\d+", str(name)) for name in names]
+        if all(found):
+            return np.array([float(match.group()) for match in found if match])
+    return np.arange(1, len(frame) + 1, dtype=float)
+
+
+def _whole_numbers(values: np.ndarray) -> list[int]:
+    """Obstacle numbers: those of the file where they are whole and unique, else 1, 2, ..."""
+    whole = np.isfinite(values) & (values == np.round(values))
+    if whole.all() and len(np.unique(values)) == len(values):
+        return [int(value) for value in values]
+    return list(range(1, len(values) + 1))
+
+
+def _one_of(
+    frame: gpd.GeoDataFrame, name: str, allowed: tuple[str, ...], default: np.ndarray
+) -> list[str]:
+    series = column_like(frame, (name,))
+    if series is None:
+        return [str(value) for value in default]
+    return [
+        str(value).lower() if str(value).lower() in allowed else str(other)
+        for value, other in zip(series, default, strict=True)
+    ]

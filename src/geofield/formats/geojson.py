@@ -1,0 +1,44 @@
+"""GeoJSON by RFC 7946: one file per layer, WGS 84, seven decimals, right-hand rule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT
+from geofield.formats.arrow import arrow_table, batches, write_layer
+from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.formats.origin import lineage
+from geofield.model import Dataset
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write ``geojson/<layer>.geojson`` for every layer."""
+    written = []
+    for layer in dataset.layers():
+        path = folder / "geojson" / f"{layer.name}.geojson"
+        if layer.name == schema.TRACK_POINTS.name:
+            table = batches(layer, dataset.point_chunks(), lonlat=True)
+        else:
+            table = arrow_table(layer, dataset.table(layer.name), lonlat=True)
+        write_layer(
+            table,
+            path,
+            layer=layer.name,
+            driver="GeoJSON",
+            geometry_type=layer.geometry,
+            crs=LONLAT,
+            layer_options={"RFC7946": "YES", "DESCRIPTION": lineage(dataset)},
+        )
+        written.append(path)
+    return written
+
+
+def read(path: Path, *, crs: CRS | None = None) -> Dataset:
+    """The dataset in a GeoJSON file, or in all GeoJSON files of a folder."""
+    files = sorted(path.glob("*.*json")) if path.is_dir() else [path]
+    return read_foreign([RawLayer(file.stem, read_vector(file)) for file in files], path, crs=crs)

@@ -1,0 +1,155 @@
+"""GeoPackage, the home format: every layer, styles, project and origin in one file.
+
+GDAL writes the layers from Arrow batches; the tables that GDAL has no words for (origin,
+column titles and value lists, styles, the QGIS project) are added with SQLite. Everything
+stamped with a time gets the date of the imagery, so that a second run is byte-identical.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from geofield import schema
+from geofield.formats import origin
+from geofield.formats.arrow import arrow_table, batches, gdal_config, write_layer
+from geofield.model import Dataset
+
+#: GDAL 3.4 and QGIS 3.22 warn about 1.4.
+GPKG_VERSION = "1.3"
+
+_METADATA = """
+CREATE TABLE gpkg_metadata (
+  id INTEGER CONSTRAINT m_pk PRIMARY KEY ASC NOT NULL,
+  md_scope TEXT NOT NULL DEFAULT 'dataset',
+  md_standard_uri TEXT NOT NULL,
+  mime_type TEXT NOT NULL DEFAULT 'text/xml',
+  metadata TEXT NOT NULL DEFAULT ''
+);
+CREATE TABLE gpkg_metadata_reference (
+  reference_scope TEXT NOT NULL,
+  table_name TEXT,
+  column_name TEXT,
+  row_id_value INTEGER,
+  timestamp DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
+  md_file_id INTEGER NOT NULL,
+  md_parent_id INTEGER,
+  CONSTRAINT crmr_mfi_fk FOREIGN KEY (md_file_id) REFERENCES gpkg_metadata(id),
+  CONSTRAINT crmr_mpi_fk FOREIGN KEY (md_parent_id) REFERENCES gpkg_metadata(id)
+);
+"""
+_DATA_COLUMNS = """
+CREATE TABLE gpkg_data_columns (
+  table_name TEXT NOT NULL,
+  column_name TEXT NOT NULL,
+  name TEXT,
+  title TEXT,
+  description TEXT,
+  mime_type TEXT,
+  constraint_name TEXT,
+  CONSTRAINT pk_gdc PRIMARY KEY (table_name, column_name),
+  CONSTRAINT gdc_tn UNIQUE (table_name, name)
+);
+CREATE TABLE gpkg_data_column_constraints (
+  constraint_name TEXT NOT NULL,
+  constraint_type TEXT NOT NULL,
+  value TEXT,
+  min NUMERIC,
+  min_is_inclusive BOOLEAN,
+  max NUMERIC,
+  max_is_inclusive BOOLEAN,
+  description TEXT,
+  CONSTRAINT gdcc_ntv UNIQUE (constraint_name, constraint_type, value)
+);
+"""
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write ``{stem}.gpkg``.
+
+    The option ``points`` (default true) says whether the track points are written; they are
+    streamed.
+    """
+    path = folder / f"{stem}.gpkg"
+    with_points = bool(options.get("points", True))
+    with gdal_config(OGR_CURRENT_DATE=origin.timestamp(dataset)):
+        for layer in dataset.layers():
+            if layer.name == schema.TRACK_POINTS.name:
+                chunks = dataset.point_chunks() if with_points else iter(())
+                table = batches(layer, chunks)
+            else:
+                table = arrow_table(layer, dataset.table(layer.name))
+            write_layer(
+                table,
+                path,
+                layer=layer.name,
+                driver="GPKG",
+                geometry_type=layer.geometry,
+                crs=dataset.crs,
+                dataset_options={"VERSION": GPKG_VERSION},
+                layer_options={
+                    "IDENTIFIER": layer.name,
+                    "DESCRIPTION": layer.description,
+                    "GEOMETRY_NAME": "geom",
+                },
+            )
+    with closing(sqlite3.connect(path)) as connection, connection:
+        _add_origin(connection, dataset)
+        _add_columns(connection, dataset)
+    return [path]
+
+
+def _add_origin(connection: sqlite3.Connection, dataset: Dataset) -> None:
+    connection.executescript(_METADATA)
+    connection.execute(
+        "INSERT INTO gpkg_metadata VALUES (1, 'dataset', ?, 'application/json', ?)",
+        (origin.URI, origin.to_json(dataset)),
+    )
+    connection.execute(
+        "INSERT INTO gpkg_metadata_reference VALUES ('geopackage', NULL, NULL, NULL, ?, 1, NULL)",
+        (origin.timestamp(dataset),),
+    )
+    for table in ("gpkg_metadata", "gpkg_metadata_reference"):
+        _register(
+            connection,
+            table,
+            "gpkg_metadata",
+            "http://www.geopackage.org/spec120/#extension_metadata",
+        )
+
+
+def _add_columns(connection: sqlite3.Connection, dataset: Dataset) -> None:
+    """Titles, units and value lists of the columns (the Schema extension)."""
+    connection.executescript(_DATA_COLUMNS)
+    lists: dict[str, tuple[str, ...]] = {}
+    for layer in dataset.layers():
+        for column in layer.columns:
+            unit = f"Unit (UCUM): {column.unit}" if column.unit else None
+            constraint = f"{column.name}_values" if column.values else None
+            if constraint:
+                lists[constraint] = column.values
+            connection.execute(
+                "INSERT INTO gpkg_data_columns VALUES (?, ?, ?, ?, ?, NULL, ?)",
+                (layer.name, column.name, column.name, column.title, unit, constraint),
+            )
+    for name, values in lists.items():
+        for value in values:
+            connection.execute(
+                "INSERT INTO gpkg_data_column_constraints "
+                "VALUES (?, 'enum', ?, NULL, NULL, NULL, NULL, NULL)",
+                (name, value),
+            )
+    for table in ("gpkg_data_columns", "gpkg_data_column_constraints"):
+        _register(
+            connection, table, "gpkg_schema", "http://www.geopackage.org/spec120/#extension_schema"
+        )
+
+
+def _register(connection: sqlite3.Connection, table: str, name: str, definition: str) -> None:
+    connection.execute(
+        "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
+        (table, name, definition),
+    )

@@ -1,0 +1,118 @@
+"""Reading GeoPackages: our own exactly, with whatever a person changed; others by content."""
+
+from __future__ import annotations
+
+import sqlite3
+import warnings
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pyproj import CRS
+
+from geofield import schema
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats import origin
+from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.model import Dataset
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: Tables that some readers list as layers without geometry.
+_NOT_LAYERS = ("layer_styles", "qgis_projects")
+
+
+def read(path: Path) -> Dataset:
+    """The dataset in a GeoPackage.
+
+    One that geofield wrote comes back as it was, together with the rows, columns, shapes
+    and values that a person added or changed. Any other is understood by its layers' names
+    and geometries (see `geofield.formats.foreign`).
+
+    Raises
+    ------
+    FormatError
+        When the file is damaged, or an edited layer is in another CRS.
+    """
+    record = _origin(path)
+    layers = [name for name in layer_names(path) if name not in _NOT_LAYERS]
+    if record is None:
+        return read_foreign([RawLayer(name, read_vector(path, name)) for name in layers], path)
+    tables: dict[str, gpd.GeoDataFrame] = {}
+    crs = record.crs
+    known = {layer.name: layer for layer in schema.LAYERS}
+    for name in layers:
+        if name not in known:
+            warnings.warn(
+                f"{path.name}: layer {name!r} is not geofield's and is left out.",
+                FormatWarning,
+                stacklevel=2,
+            )
+            continue
+        tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
+    scene = None if record.scene is None else path.parent / record.scene
+    return Dataset(
+        tables,
+        crs,
+        record.name,
+        record.provenance,
+        record.grid,
+        scene if scene is not None and scene.exists() else None,
+    )
+
+
+def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
+    if frame.crs is None or not CRS(frame.crs).equals(crs, ignore_axis_order=True):
+        raise FormatError(
+            f"{path.name}: layer {of.name!r} is no longer in {crs.name}.",
+            hint="Export the layer in the CRS of the other layers, then repeat.",
+        )
+    frame = frame.set_crs(crs, allow_override=True)
+    absent = frame.geometry.isna() | frame.geometry.is_empty
+    if absent.any():
+        warnings.warn(
+            f"{path.name}: {int(absent.sum())} row(s) of layer {of.name!r} have no geometry and "
+            "are left out.",
+            FormatWarning,
+            stacklevel=3,
+        )
+        frame = frame[~absent]
+    return schema.conform(of, frame, extras=True)
+
+
+def layer_names(path: Path) -> list[str]:
+    """The layers of a file, in order.
+
+    Raises
+    ------
+    FormatError
+        When GDAL cannot open it.
+    """
+    import pyogrio
+    from pyogrio.errors import DataSourceError
+
+    try:
+        return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+    except DataSourceError as error:
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
+
+
+def _origin(path: Path) -> origin.Origin | None:
+    try:
+        with closing(
+            sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+        ) as connection:
+            row = connection.execute(
+                "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ? ORDER BY id DESC",
+                (origin.URI,),
+            ).fetchone()
+    except sqlite3.OperationalError as error:
+        if "no such table" in str(error):
+            return None
+        raise FormatError(f"{path} cannot be read: {error}.") from error
+    except sqlite3.DatabaseError as error:
+        raise FormatError(
+            f"{path} is not a GeoPackage: {error}.", hint="Is the file whole?"
+        ) from error
+    return None if row is None else origin.from_json(row[0])

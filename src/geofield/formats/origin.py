@@ -1,0 +1,130 @@
+"""What is known of a dataset's origin, as JSON: for formats with a place for it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from affine import Affine
+from pyproj import CRS
+
+from geofield.errors import FormatError
+from geofield.grid import Grid
+from geofield.model import Dataset, ImagerySource, Provenance
+
+#: Version of this JSON.
+VERSION = 1
+#: Names this JSON where a format wants a URI.
+URI = "https://geofield.dev/ns/origin/1"
+
+
+def to_json(dataset: Dataset) -> str:
+    """Name, CRS, grid and provenance of a dataset; the same text for the same dataset."""
+    grid = dataset.grid
+    content = {
+        "version": VERSION,
+        "name": dataset.name,
+        "crs": dataset.crs.to_wkt(),
+        "grid": None
+        if grid is None
+        else {
+            "width_px": grid.width_px,
+            "height_px": grid.height_px,
+            "transform": list(grid.transform[:6]),
+            "crs": grid.crs.to_wkt(),
+        },
+        "scene": None if dataset.scene_path is None else dataset.scene_path.name,
+        "software": dataset.provenance.software,
+        "source": dataclasses.asdict(dataset.provenance.source),
+        "settings": _plain(dataset.provenance.settings),
+        "evidence": _plain(dataset.provenance.evidence),
+    }
+    try:
+        return json.dumps(content, ensure_ascii=False, indent=1)
+    except (TypeError, ValueError) as error:
+        raise FormatError(f"The provenance is not plain JSON: {error}.") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Origin:
+    """The content of the JSON."""
+
+    name: str
+    crs: CRS
+    grid: Grid | None
+    scene: str | None
+    provenance: Provenance
+
+
+def from_json(text: str) -> Origin:
+    """The content of the JSON.
+
+    Raises
+    ------
+    FormatError
+        When it is damaged or of a later version.
+    """
+    try:
+        content = json.loads(text)
+        if content["version"] > VERSION:
+            raise FormatError(
+                "The file was written by a later version of geofield.", hint="Update geofield."
+            )
+        grid = content["grid"]
+        source = dict(content["source"])
+        source["details"] = tuple((str(k), str(v)) for k, v in source.get("details", ()))
+        return Origin(
+            content["name"],
+            CRS.from_wkt(content["crs"]),
+            None
+            if grid is None
+            else Grid(
+                grid["width_px"],
+                grid["height_px"],
+                Affine(*grid["transform"]),
+                CRS.from_wkt(grid["crs"]),
+            ),
+            content.get("scene"),
+            Provenance(
+                content["software"],
+                ImagerySource(**source),
+                content["settings"],
+                content["evidence"],
+            ),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(f"The record of the file's origin is damaged: {error!r}.") from error
+
+
+def lineage(dataset: Dataset) -> str:
+    """One line for people: the picture, its date, licence and attribution, the software."""
+    source = dataset.provenance.source
+    words = [
+        f"Imagery: {source.name}" if source.name else "",
+        f"of {source.date}" if source.date else "",
+        f"licence: {source.licence}" if source.licence else "",
+        source.attribution,
+        dataset.provenance.software,
+    ]
+    return "; ".join(word for word in words if word)
+
+
+def timestamp(dataset: Dataset) -> str:
+    """The time stamped on files: the date of the imagery, so that a second run is identical.
+
+    Midnight UTC, ISO 8601; the start of 1970 where nobody knows the date.
+    """
+    date = (dataset.provenance.source.date or "")[:10]
+    parts = date.split("-")
+    whole = len(parts) == 3 and all(part.isdigit() for part in parts) and len(date) == 10
+    return f"{date if whole else '1970-01-01'}T00:00:00.000Z"
