@@ -162,7 +162,7 @@ class Scene:
         """
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
-            raise PointOutsideError(*_outside_message(self.grid, lat, lon))
+            raise PointOutsideError(outside_message(self.grid, lat, lon))
         if not self.valid[int(y), int(x)]:
             raise PointOutsideError(
                 f"The point lat {lat}, lon {lon} (pixel {x:.0f}, {y:.0f}) lies where the picture "
@@ -172,7 +172,8 @@ class Scene:
         return float(x), float(y)
 
 
-def _outside_message(grid: Grid, lat: float, lon: float) -> tuple[str, ...]:
+def outside_message(grid: Grid, lat: float, lon: float) -> str:
+    """Say that a point lies outside, what is covered, and whether lat and lon look swapped."""
     corners = grid.corners_lonlat()
     lons, lats = [c[0] for c in corners], [c[1] for c in corners]
     message = (
@@ -184,4 +185,4 @@ def _outside_message(grid: Grid, lat: float, lon: float) -> tuple[str, ...]:
     )
     if swapped:
         message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
-    return (message,)
+    return message

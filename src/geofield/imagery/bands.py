@@ -1,0 +1,249 @@
+"""What the bands of a picture show: red, green, blue, near infrared, grey, mask.
+
+Given roles win, then band descriptions, then the file's colour interpretation, then the
+number of bands. A band marked as alpha is believed only when its values look like a mask:
+four-band aerial imagery often carries its near infrared band under that mark.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import ImageryError
+
+#: A mask is opaque or transparent nearly everywhere; feathered edges are thin.
+_MASK_SHARE = 0.9
+
+_WORDS = {
+    "red": "red",
+    "r": "red",
+    "green": "green",
+    "g": "green",
+    "blue": "blue",
+    "b": "blue",
+    "nir": "nir",
+    "nir1": "nir",
+    "n": "nir",
+    "near_infrared": "nir",
+    "nearinfrared": "nir",
+    "infrared": "nir",
+    "near_ir": "nir",
+    "alpha": "alpha",
+    "mask": "alpha",
+    "gray": "grey",
+    "grey": "grey",
+    "pan": "grey",
+    "panchromatic": "grey",
+}
+_SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
+_INTERPRETATION = {
+    "red": "red",
+    "green": "green",
+    "blue": "blue",
+    "nir": "nir",
+    "alpha": "alpha",
+    "gray": "grey",
+    "pan": "grey",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class BandRoles:
+    """What each band of a file shows.
+
+    Attributes
+    ----------
+    roles : tuple of str
+        One of `geofield.model.scene.ROLES`, or ``alpha``, per band of the file.
+    notes : tuple of str
+        What had to be decided or assumed.
+    """
+
+    roles: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def alpha(self) -> int | None:
+        """The 0-based band that masks the others, or None."""
+        return self.roles.index("alpha") if "alpha" in self.roles else None
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """The 0-based bands that a scene keeps, in the file's order."""
+        kept = tuple(i for i, role in enumerate(self.roles) if role not in ("alpha", "other"))
+        return kept or tuple(i for i, role in enumerate(self.roles) if role != "alpha")
+
+
+def find_roles(
+    descriptions: Sequence[str | None],
+    interpretation: Sequence[str],
+    looks_like_mask: Sequence[bool],
+    given: Sequence[str] | None = None,
+) -> BandRoles:
+    """Decide what each band shows.
+
+    Parameters
+    ----------
+    descriptions : sequence of str or None
+        The file's own words for each band.
+    interpretation : sequence of str
+        GDAL's colour interpretation: red, green, blue, alpha, gray, nir, undefined ...
+    looks_like_mask : sequence of bool
+        Whether each band's values are nearly all 0 or opaque (:func:`looks_like_mask`).
+    given : sequence of str, optional
+        Roles from the user, in the order of the bands; further bands are ``other``.
+
+    Raises
+    ------
+    ImageryError
+        When the given roles are unknown, repeated or more than the bands.
+    """
+    count = len(interpretation)
+    if given:
+        return BandRoles(_checked(given, count))
+    notes: list[str] = []
+    described = [_from_description(text) for text in descriptions]
+    if any(described) and _is_consistent(described):
+        roles = [role or "other" for role in described]
+        if not {"red", "green", "blue", "grey", "nir"} & set(roles):
+            described = [""] * count
+        else:
+            return BandRoles(tuple(roles))
+    roles = [_INTERPRETATION.get(name, "") for name in interpretation]
+    for i, role in enumerate(roles):
+        if role == "alpha" and not looks_like_mask[i]:
+            roles[i] = ""
+            notes.append(
+                f"Band {i + 1} is marked as alpha, but its values are a picture: not used as mask."
+            )
+        if not roles[i] and described[i] not in roles:
+            roles[i] = described[i]
+    known = [role for role in roles if role]
+    colours = [role for role in known if role in ("red", "green", "blue")]
+    if len(set(colours)) == len(colours) == 3:
+        roles, more = _complete_colour(roles, looks_like_mask)
+        notes += more
+    else:
+        roles, more = _from_count(roles, looks_like_mask)
+        notes += more
+    return BandRoles(tuple(roles), tuple(notes))
+
+
+def looks_like_mask(values: NDArray[Any]) -> bool:
+    """Whether a band's values are those of a mask: nearly all 0 or one opaque value.
+
+    A band that is 0 everywhere hides the whole picture; it counts as a mask only when the
+    file says so, hence is reported as one.
+    """
+    if values.size == 0 or values.dtype.kind not in "uib":
+        return False
+    top = values.max()
+    if top != 0 and values.dtype.kind == "u" and top not in (1, 255, np.iinfo(values.dtype).max):
+        return False
+    binary = np.count_nonzero((values == 0) | (values == top))
+    return bool(binary >= _MASK_SHARE * values.size)
+
+
+def _checked(given: Sequence[str], count: int) -> tuple[str, ...]:
+    roles = [
+        _WORDS.get(_key(role), "other" if role in ("other", "", "-") else "") for role in given
+    ]
+    if "" in roles:
+        raise ImageryError(
+            f"Unknown band role {given[roles.index('')]!r}.",
+            hint="Use red, green, blue, nir, grey, alpha, other, in the order of the bands.",
+        )
+    repeated = [role for role in roles if role != "other" and roles.count(role) > 1]
+    if repeated:
+        raise ImageryError(f"Two bands are said to be {repeated[0]}.", hint="Name each one once.")
+    if len(roles) > count:
+        raise ImageryError(
+            f"{len(roles)} band roles were given, but the picture has {count} band(s).",
+            hint=f"Name at most {count}.",
+        )
+    if all(role in ("other", "alpha") for role in roles) and len(roles) >= count:
+        raise ImageryError(
+            "No band of the picture is left to look at.",
+            hint="Name at least one of red, green, blue, nir, grey.",
+        )
+    return (*roles, *["other"] * (count - len(roles)))
+
+
+def _key(text: str) -> str:
+    return re.sub(r"[\s\-]+", "_", text.strip().lower())
+
+
+def _from_description(text: str | None) -> str:
+    if not text:
+        return ""
+    key = _key(text)
+    if key in _WORDS:
+        return _WORDS[key]
+    if key in _SENTINEL_2:
+        return _SENTINEL_2[key]
+    # "Band 1: Red", "B4 (red)"; but not "red edge".
+    words = set(re.split(r"[^a-z0-9]+", key.replace("_", " ")))
+    if "edge" in words or "rededge" in words:
+        return "other"
+    found = {_WORDS[word] for word in words if word in _WORDS and len(word) > 2}
+    if {"near", "infrared"} <= words or {"near", "ir"} <= words:
+        found = {"nir"}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _is_consistent(roles: Sequence[str]) -> bool:
+    named = [role for role in roles if role and role != "other"]
+    return len(named) == len(set(named)) and (
+        {"red", "green", "blue"} <= set(named) or "grey" in named or len(roles) < 3
+    )
+
+
+def _complete_colour(
+    roles: list[str], mask_like: Sequence[bool]
+) -> tuple[list[str], tuple[str, ...]]:
+    """Bands beside red, green and blue: the first that is a picture is near infrared."""
+    notes: tuple[str, ...] = ()
+    for i, role in enumerate(roles):
+        if role:
+            continue
+        if mask_like[i]:
+            roles[i] = "other"
+        elif "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
+            roles[i] = "nir"
+            notes = (f"Band {i + 1} is taken as near infrared.",)
+        else:
+            roles[i] = "other"
+    return roles, notes
+
+
+def _from_count(roles: list[str], mask_like: Sequence[bool]) -> tuple[list[str], tuple[str, ...]]:
+    """No colours are named: red, green, blue, near infrared is the common order."""
+    pictures = [i for i, role in enumerate(roles) if role != "alpha"]
+    # The last of two or four bands without a name is a mask when it looks like one.
+    last = pictures[-1] if pictures else 0
+    if "alpha" not in roles and len(pictures) in (2, 4) and mask_like[last]:
+        roles[last] = "alpha"
+        pictures = pictures[:-1]
+    if len(pictures) < 3:
+        for n, i in enumerate(pictures):
+            roles[i] = "grey" if n == 0 else "other"
+        if len(pictures) == 2:
+            return roles, ("The first of two bands is taken as brightness.",)
+        return roles, ()
+    for n, i in enumerate(pictures):
+        roles[i] = ("red", "green", "blue", "nir")[n] if n < min(4, len(pictures)) else "other"
+    if len(pictures) > 4:
+        roles[pictures[3]] = "other"
+        return roles, (
+            f"The first three of {len(pictures)} unnamed bands are taken as red, green, blue; "
+            "name them with `bands` where this is wrong.",
+        )
+    if len(pictures) == 4:
+        return roles, ("Four unnamed bands are taken as red, green, blue, near infrared.",)
+    return roles, ()

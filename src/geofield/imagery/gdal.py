@@ -1,0 +1,142 @@
+"""rasterio and pyproj side by side: CRS between them, GDAL's options, errors with a reason."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rasterio
+from pyproj import CRS
+from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
+
+from geofield import __version__
+from geofield.crs import parse_crs
+from geofield.errors import CRSError, ImageryError
+
+#: Sent with every request: servers answer 403 without one.
+USER_AGENT = f"geofield/{__version__} (farm field mapping; python-urllib3)"
+
+_OPTIONS: dict[str, Any] = {
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",  # no guessing of side files over HTTP
+    "GDAL_HTTP_USERAGENT": USER_AGENT,
+    "GDAL_HTTP_MAX_RETRY": "5",
+    "GDAL_HTTP_RETRY_DELAY": "0.5",
+    "GDAL_HTTP_CONNECTTIMEOUT": "20",
+    "GDAL_HTTP_TIMEOUT": "120",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": "",
+    "GDAL_HTTP_MERGE_CONSECUTIVE_RANGES": "YES",
+    "GDAL_INGESTED_BYTES_AT_OPEN": "32768",
+}
+
+_REMOTE = re.compile(r"^(https?://|/vsicurl/|/vsis3/|s3://|gs://)", re.IGNORECASE)
+
+
+def is_remote(path: str) -> bool:
+    """Whether GDAL would read a path over the network."""
+    return bool(_REMOTE.match(path))
+
+
+def display_name(path: str | Path) -> str:
+    """A path for people and products: no folders, no query (keys live there), no password."""
+    text = str(path)
+    if is_remote(text):
+        text = re.sub(r"[?#].*$", "", text).rstrip("/")
+    return re.split(r"[\\/]", text)[-1] or "picture"
+
+
+@contextmanager
+def gdal_env(path: str = "", **options: Any) -> Iterator[None]:
+    """GDAL options for reading and writing here; side files are listed for local paths only."""
+    remote = is_remote(path)
+    chosen = {
+        name: value
+        for name, value in _OPTIONS.items()
+        if remote or name != "GDAL_DISABLE_READDIR_ON_OPEN"
+    }
+    with rasterio.Env(**(chosen | options)), warnings.catch_warnings():
+        # Said by our own errors, with a next step.
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        yield
+
+
+def to_pyproj(crs: Any) -> CRS:
+    """A rasterio CRS as a pyproj CRS: horizontal part only, by its EPSG code where it has one."""
+    parsed = parse_crs(crs.to_wkt(version="WKT2_2019"))
+    if parsed.is_compound:
+        parsed = parsed.sub_crs_list[0]
+    authority = parsed.to_authority(min_confidence=100)
+    if authority:
+        known = CRS.from_authority(*authority)
+        if known == parsed:
+            return known
+    return parsed
+
+
+def to_rasterio(crs: CRS) -> Any:
+    """A pyproj CRS as a rasterio CRS."""
+    authority = crs.to_authority(min_confidence=100)
+    try:
+        if authority and CRS.from_authority(*authority) == crs:
+            return rasterio.crs.CRS.from_authority(*authority)
+        return rasterio.crs.CRS.from_wkt(crs.to_wkt())
+    except rasterio.errors.CRSError as error:
+        raise CRSError(f"GDAL does not know the coordinate reference system {crs.name}.") from error
+
+
+def open_picture(path: str) -> Any:
+    """Open a picture with rasterio, or say why it cannot be opened.
+
+    Raises
+    ------
+    ImageryError
+        No such file, not a picture, truncated, or the server does not answer.
+    """
+    name = display_name(path)
+    if not is_remote(path) and not path.startswith("/vsi") and "://" not in path:
+        file = Path(path)
+        if not file.exists():
+            raise ImageryError(
+                f"There is no picture {path}.", hint="Check the path; it must name a raster file."
+            )
+        if file.is_file() and file.stat().st_size == 0:
+            raise ImageryError(f"The picture {path} is empty (0 bytes).", hint="Copy it again.")
+    try:
+        return rasterio.open(path)
+    except RasterioIOError as error:
+        raise ImageryError(
+            f"The picture {name} cannot be opened: {reason(error, path)}.",
+            hint=(
+                "Check the address and the network."
+                if is_remote(path)
+                else "It must be a raster file that GDAL reads (GeoTIFF, COG, VRT, JPEG 2000 ...); "
+                "`gdalinfo` tells more."
+            ),
+        ) from None
+
+
+@contextmanager
+def reading(path: str) -> Iterator[None]:
+    """Turn GDAL's read errors into one that says what to do."""
+    try:
+        yield
+    except (RasterioError, OSError) as error:
+        raise ImageryError(
+            f"The picture {display_name(path)} cannot be read to its end: {reason(error, path)}.",
+            hint="The file is truncated or damaged: copy or download it again.",
+        ) from None
+
+
+def reason(error: BaseException, path: str) -> str:
+    """GDAL's own words without paths, queries and keys."""
+    cause: BaseException = error
+    while cause.__cause__ is not None:
+        cause = cause.__cause__
+    text = str(cause) or str(error)
+    text = text.replace(path, display_name(path))
+    text = re.sub(r"(https?://[^\s?'\"]+)\?[^\s'\"]*", r"\1", text)
+    text = re.sub(r"//[^/@\s]+@", "//", text)
+    return text.strip().rstrip(".").split("\n")[0][:300]

@@ -1,0 +1,160 @@
+"""Where a picture lies, and whether it must be reprojected to be looked at.
+
+A grid in any CRS, rotated or not, is used as it is. A picture is put on square metres only
+where its pixels are not square on the ground, or where only control points place it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from pyproj import CRS, Geod
+from rasterio.control import GroundControlPoint
+from rasterio.transform import from_gcps
+
+from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.errors import CRSError, PointOutsideError
+from geofield.grid import Grid
+from geofield.imagery.gdal import display_name
+from geofield.model.scene import outside_message
+
+#: Sides of a ground pixel may differ by this factor before the picture is reprojected.
+MAX_ASPECT = 1.1
+#: The angle between a pixel's sides may differ from a right angle by this many degrees.
+MAX_SKEW_DEG = 3.0
+#: A reprojected picture reaches this far from the point: one UTM zone does not hold a country.
+REACH_M = 10_000.0
+
+_GEOD = Geod(ellps="WGS84")
+#: Longitude and latitude, degrees.
+LonLat = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class WarpOrigin:
+    """How the file itself is placed, for a picture that is read through a reprojection."""
+
+    crs: CRS
+    transform: Affine | None = None
+    gcps: tuple[GroundControlPoint, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """The grid a picture is read on; `warped_from` is None when that is its own grid."""
+
+    grid: Grid
+    warped_from: WarpOrigin | None = None
+    notes: tuple[str, ...] = ()
+
+
+def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
+    """The grid on which an open raster dataset is read.
+
+    Parameters
+    ----------
+    dataset : rasterio dataset
+    crs : CRS
+        Of the dataset, or as the user says.
+    point : (lon, lat), optional
+        Where the ground pixel is measured and a reprojection is centred; else the centre.
+
+    Raises
+    ------
+    CRSError
+        No position, or a CRS that is not one of maps.
+    PointOutsideError
+        A picture to be reprojected does not hold the point.
+    """
+    gcps, _ = dataset.gcps
+    transform = Affine(*tuple(dataset.transform)[:6])
+    if crs.is_geocentric or crs.is_vertical:
+        raise CRSError(f"{crs.name} is not the CRS of a map.", hint="Reproject the picture first.")
+    if transform.is_identity:
+        if len(gcps) < 3:
+            raise CRSError(
+                f"The picture {display_name(dataset.name)} has no position on the ground.",
+                hint="Georeference it (QGIS: Layer > Georeferencer), or put its world file beside.",
+            )
+        rough = Grid(dataset.width, dataset.height, from_gcps(gcps), crs)
+        note = f"Placed by its {len(gcps)} ground control points."
+        return Place(_square_grid(rough, point), WarpOrigin(crs, gcps=tuple(gcps)), (note,))
+    native = Grid(dataset.width, dataset.height, transform, crs)
+    aspect, skew_deg = pixel_shape(native, point)
+    if aspect <= MAX_ASPECT and skew_deg <= MAX_SKEW_DEG:
+        return Place(native)
+    why = (
+        f"its pixels are {aspect:.2f} times longer one way"
+        if aspect > MAX_ASPECT
+        else f"its pixels are skewed by {skew_deg:.0f} degrees"
+    )
+    grid = _square_grid(native, point)
+    note = f"Reprojected from {crs.name} to {grid.crs.name}: {why} on the ground."
+    return Place(grid, WarpOrigin(crs, transform), (note,))
+
+
+def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
+    """How far a ground pixel is from a square, at a point or the centre.
+
+    Returns
+    -------
+    aspect : float
+        Longer side by shorter side.
+    skew_deg : float
+        Deviation of the angle between the sides from a right angle.
+    """
+    x, y = grid.width_px / 2, grid.height_px / 2
+    if point is not None:
+        px, py = grid.from_lonlat(*point)
+        if grid.contains_px(px, py):
+            x, y = px, py
+    lons, lats = grid.to_lonlat(
+        np.array([x - 0.5, x + 0.5, x, x]), np.array([y, y, y - 0.5, y + 0.5])
+    )
+    azimuth_x, _, length_x = _GEOD.inv(lons[0], lats[0], lons[1], lats[1])
+    azimuth_y, _, length_y = _GEOD.inv(lons[2], lats[2], lons[3], lats[3])
+    angle = abs((azimuth_y - azimuth_x) % 180.0 - 90.0)
+    if not min(length_x, length_y) > 0:
+        raise CRSError(
+            f"The picture's centre is not a place on earth in {grid.crs.name}.",
+            hint="Check the picture's transform and CRS with `gdalinfo`.",
+        )
+    return max(length_x, length_y) / min(length_x, length_y), angle
+
+
+def _square_grid(native: Grid, point: LonLat | None) -> Grid:
+    """Square metres over a picture: in the metric CRS of the point, else of its centre."""
+    here = native.centre_lonlat if point is None else point
+    local = native
+    if point is not None:
+        lon, lat = point
+        x, y = native.from_lonlat(lon, lat)
+        if not native.contains_px(x, y):
+            raise PointOutsideError(outside_message(native, lat, lon))
+        local = native.crop(int(x), int(y), 1, 1)
+    target = metric_crs(*here)
+    aspect, _ = pixel_shape(local)
+    # The finer of the two sides, so that no detail is lost.
+    resolution = float(f"{local.ground_resolution_m / np.sqrt(aspect):.4g}")
+    edge = np.linspace(0.0, 1.0, 33)
+    zero, one = np.zeros_like(edge), np.ones_like(edge)
+    border_x = np.concatenate([edge, one, edge, zero]) * native.width_px
+    border_y = np.concatenate([zero, edge, one, edge]) * native.height_px
+    xs, ys = native.to_crs(border_x, border_y, target)
+    cx, cy = transformer(LONLAT, target).transform(*here)
+    finite = np.isfinite(xs) & np.isfinite(ys)
+    xs = np.clip(np.append(xs[finite], cx), cx - REACH_M, cx + REACH_M)
+    ys = np.clip(np.append(ys[finite], cy), cy - REACH_M, cy + REACH_M)
+    west, north = (
+        np.floor(xs.min() / resolution) * resolution,
+        np.ceil(ys.max() / resolution) * resolution,
+    )
+    return Grid(
+        int(np.ceil((xs.max() - west) / resolution)) or 1,
+        int(np.ceil((north - ys.min()) / resolution)) or 1,
+        Affine(resolution, 0, float(west), 0, -resolution, float(north)),
+        target,
+    )

@@ -1,0 +1,414 @@
+"""SceneReader: a picture on disk or on a server, read window by window.
+
+The reader is a value (what the file says about itself); every read opens the file, so it can
+be pickled and sent to a pool. Pixels are kept as they are in any CRS, rotated or not. Only
+where they are not square on the ground, as in degrees at high latitude, is the picture
+reprojected to the metric CRS, because the trees in it would not be round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from pyproj import CRS
+from rasterio.enums import ColorInterp, MaskFlags, Resampling
+from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
+
+from geofield.crs import parse_crs
+from geofield.errors import CRSError, ImageryError, PointOutsideError
+from geofield.grid import Grid
+from geofield.imagery.bands import BandRoles, find_roles, looks_like_mask
+from geofield.imagery.gdal import (
+    display_name,
+    gdal_env,
+    open_picture,
+    reading,
+    to_pyproj,
+    to_rasterio,
+)
+from geofield.imagery.placing import WarpOrigin, find_place
+from geofield.imagery.scaling import scale_limits, to_uint8
+from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
+from geofield.model.scene import ImagerySource, Scene, outside_message
+
+#: Read at a coarser resolution rather than hold more pixels than this on a side.
+MAX_SIDE_PX = 4096
+_SAMPLE_PX = 128
+
+
+@dataclass(frozen=True, eq=False)
+class SceneReader:
+    """A picture that scenes are read from.
+
+    Make one with :meth:`open`. The attributes are facts of the file.
+
+    Attributes
+    ----------
+    path : str
+        Path or address, as GDAL takes it.
+    grid : Grid
+        Of the whole picture, as it is read (reprojected where that is needed).
+    roles : BandRoles
+        What each band of the file shows.
+    source : ImagerySource
+    scaling : (float, float) or None
+        Values that become 0 and 255 in every window; None means the window's percentiles.
+    notes : tuple of str
+        What was decided about the whole picture.
+    """
+
+    path: str
+    grid: Grid
+    roles: BandRoles
+    dtype: str
+    source: ImagerySource
+    scaling: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+    nodata: float | None = None
+    palette: tuple[tuple[int, int, int, int], ...] = ()
+    has_mask: bool = False
+    # Set where the file is read through a warp: its own CRS, control points or transform.
+    warped_from: WarpOrigin | None = None
+
+    @classmethod
+    def open(
+        cls,
+        path: str,
+        *,
+        lat: float | None = None,
+        lon: float | None = None,
+        bands: Sequence[str] | None = None,
+        crs: Any = None,
+        scaling: tuple[float, float] | None = None,
+        source: ImagerySource | None = None,
+    ) -> SceneReader:
+        """Look at a picture without reading its pixels.
+
+        Parameters
+        ----------
+        path : str
+            Path, or an http(s) address of a GeoTIFF; anything GDAL opens.
+        lat, lon : float, optional
+            The point of interest, degrees; where a reprojected picture is centred.
+        bands : sequence of str, optional
+            What the bands show, in order.
+        crs : optional
+            The picture's CRS, for files that do not name it.
+        scaling : (float, float), optional
+            File values that become 0 and 255.
+        source : ImagerySource, optional
+            Provenance that is known better than the file knows it.
+
+        Raises
+        ------
+        ImageryError
+            Not a picture, without bands or of complex numbers.
+        CRSError
+            Without CRS or without position.
+        """
+        path = str(path)
+        with gdal_env(path), open_picture(path) as dataset:
+            if dataset.count == 0:
+                raise ImageryError(
+                    f"The file {display_name(path)} holds no picture itself"
+                    + (f", but {len(dataset.subdatasets)} others." if dataset.subdatasets else "."),
+                    hint=(
+                        f"Open one of them, for instance {dataset.subdatasets[0]!r}."
+                        if dataset.subdatasets
+                        else "Give a raster file."
+                    ),
+                )
+            dtypes = set(dataset.dtypes)
+            if any("complex" in each for each in dtypes):
+                raise ImageryError(
+                    f"The picture {display_name(path)} holds complex numbers (radar?).",
+                    hint="Give an optical picture.",
+                )
+            with reading(path):
+                palette = _palette(dataset)
+                roles = _roles(dataset, bands) if not palette else BandRoles(("red",))
+            own_crs = parse_crs(crs) if crs is not None else _crs_of(dataset, path)
+            flags = dataset.mask_flag_enums[0]
+            reader = cls(
+                path=path,
+                grid=Grid(1, 1, Affine.identity(), own_crs),
+                roles=roles,
+                dtype=str(np.result_type(*dtypes)),
+                source=source or source_from_tags(dataset.tags(), path),
+                scaling=scaling,
+                notes=(*notes_from_tags(dataset.tags()), *roles.notes),
+                nodata=dataset.nodata,
+                palette=palette,
+                has_mask=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
+            )
+            if reader.dtype == "uint8" and scaling is None:
+                reader = replace(reader, scaling=scaling_from_tags(dataset.tags()))
+            point = None if lat is None or lon is None else (lon, lat)
+            place = find_place(dataset, own_crs, point=point)
+            return replace(
+                reader,
+                grid=place.grid,
+                warped_from=place.warped_from,
+                notes=(*reader.notes, *place.notes),
+            )
+
+    # -- which part ------------------------------------------------------------------------
+
+    def window_around(
+        self,
+        *,
+        lat: float,
+        lon: float,
+        size_m: float | None = None,
+        size_px: int | None = None,
+    ) -> tuple[int, int, int, int]:
+        """The part of the picture around a point, cut at its edges.
+
+        Parameters
+        ----------
+        lat, lon : float
+            Degrees, WGS 84.
+        size_m, size_px : optional
+            Side of the square; without both, all of the picture or, where it is enormous,
+            `MAX_SIDE_PX` pixels.
+
+        Returns
+        -------
+        column, row, width_px, height_px : int
+
+        Raises
+        ------
+        PointOutsideError
+        """
+        x, y = self.grid.from_lonlat(lon, lat)
+        if not self.grid.contains_px(x, y):
+            raise PointOutsideError(outside_message(self.grid, lat, lon))
+        if size_px is None:
+            if size_m is None:
+                size_px = MAX_SIDE_PX
+                if max(self.grid.shape) <= size_px:
+                    return 0, 0, self.grid.width_px, self.grid.height_px
+            else:
+                if not size_m > 0:
+                    raise ImageryError(
+                        f"A window of {size_m} m shows nothing.", hint="Give a size above 0."
+                    )
+                centred = self.grid.crop(int(x), int(y), 1, 1)
+                size_px = max(1, round(size_m / centred.ground_resolution_m))
+        elif size_px < 1:
+            raise ImageryError(
+                f"A window of {size_px} px shows nothing.", hint="Give at least 1 pixel."
+            )
+        column, row = round(x - size_px / 2), round(y - size_px / 2)
+        c0, r0 = max(column, 0), max(row, 0)
+        c1 = min(column + size_px, self.grid.width_px)
+        r1 = min(row + size_px, self.grid.height_px)
+        return c0, r0, max(c1 - c0, 1), max(r1 - r0, 1)
+
+    # -- pixels ----------------------------------------------------------------------------
+
+    def read(
+        self,
+        window: tuple[int, int, int, int] | None = None,
+        *,
+        shape_px: tuple[int, int] | None = None,
+        scaling: tuple[float, float] | None = None,
+    ) -> Scene:
+        """Read a part of the picture.
+
+        Parameters
+        ----------
+        window : (column, row, width_px, height_px), optional
+            Must lie inside the picture; all of it by default.
+        shape_px : (rows, columns), optional
+            Read that many pixels instead, each the average of those it covers.
+        scaling : (float, float), optional
+            File values that become 0 and 255; a scene's `scaling` makes a second window fit.
+
+        Raises
+        ------
+        ImageryError
+            The window reaches outside, or the file is damaged.
+        """
+        column, row, width, height = window or (0, 0, self.grid.width_px, self.grid.height_px)
+        if (
+            min(column, row) < 0
+            or min(width, height) < 1
+            or column + width > self.grid.width_px
+            or row + height > self.grid.height_px
+        ):
+            raise ImageryError(
+                f"The window {width} x {height} px at column {column}, row {row} reaches outside "
+                f"the picture of {self.grid.width_px} x {self.grid.height_px} px."
+            )
+        grid = self.grid.crop(column, row, width, height)
+        notes = self.notes
+        if shape_px is not None and shape_px != (height, width):
+            grid = grid.resized(shape_px[1], shape_px[0])
+            notes += (
+                f"Read at {grid.ground_resolution_m:.3g} m per pixel instead of "
+                f"{self.grid.ground_resolution_m:.3g} m.",
+            )
+        values, valid = self._pixels(Window(column, row, width, height), grid.shape)
+        if self.palette:
+            roles: tuple[str, ...] = ("red", "green", "blue")
+            bands, limits = values.astype(np.uint8), None
+        else:
+            roles = tuple(self.roles.roles[i] for i in self.roles.shown)
+            bands, limits, more = self._scaled(values, roles, valid, scaling or self.scaling)
+            notes += more
+        bands = np.where(valid, bands, np.uint8(0))
+        return Scene(grid, bands, roles, valid, self.source, limits, notes)
+
+    def _scaled(
+        self,
+        values: NDArray[Any],
+        roles: tuple[str, ...],
+        valid: NDArray[np.bool_],
+        scaling: tuple[float, float] | None,
+    ) -> tuple[NDArray[np.uint8], tuple[float, float] | None, tuple[str, ...]]:
+        if values.dtype == np.uint8:
+            # A scaling here is what an earlier reading did to the pixels: kept, not repeated.
+            return values, scaling, ()
+        colour = [i for i, role in enumerate(roles) if role != "nir"]
+        limits = scaling or scale_limits(values[colour or [0]], valid)
+        scaled = to_uint8(values, limits)
+        low, high = limits or (0.0, 255.0)
+        notes = [f"Values {low:.6g} to {high:.6g} ({self.dtype}) became 0 to 255."]
+        if "nir" in roles and colour:
+            # Plants are several times brighter there: the colours' scaling would saturate.
+            near = [roles.index("nir")]
+            own = scale_limits(values[near], valid)
+            scaled[near] = to_uint8(values[near], own)
+            if own is not None:
+                notes.append(f"Near infrared {own[0]:.6g} to {own[1]:.6g} became 0 to 255.")
+        return scaled, limits, tuple(notes)
+
+    def _pixels(
+        self, window: Window, shape: tuple[int, int]
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """The shown bands (bands, rows, columns) in the file's type, and what is valid."""
+        indexes = [i + 1 for i in self.roles.shown]
+        with (
+            gdal_env(self.path),
+            open_picture(self.path) as dataset,
+            reading(self.path),
+            self._through_warp(dataset) as raster,
+        ):
+            full = shape == (window.height, window.width)
+            resampling = Resampling.nearest if full or self.palette else Resampling.average
+            values = raster.read(
+                indexes, window=window, out_shape=(len(indexes), *shape), resampling=resampling
+            )
+            valid = np.ones(shape, bool)
+            nearest = {"window": window, "out_shape": shape, "resampling": Resampling.nearest}
+            if self.warped_from is not None:
+                valid &= raster.read(raster.count, **nearest) > 0
+            elif self.roles.alpha is not None:
+                alpha = raster.read(self.roles.alpha + 1, **nearest)
+                valid &= _opaque(alpha)
+            elif self.has_mask:
+                valid &= raster.read_masks(1, **nearest) > 0
+        if self.warped_from is None and self.nodata is not None and not np.isnan(self.nodata):
+            valid &= ~np.all(values == self.nodata, axis=0)
+        if values.dtype.kind == "f":
+            valid &= np.all(np.isfinite(values), axis=0)
+        if self.palette:
+            table = np.asarray(self.palette, np.uint8)[values[0]]
+            valid &= table[..., 3] >= 128
+            values = np.moveaxis(table[..., :3], -1, 0)
+        return values, valid
+
+    @contextmanager
+    def _through_warp(self, dataset: Any) -> Iterator[Any]:
+        """The dataset itself, or its reprojection with a mask as the last band."""
+        if self.warped_from is None:
+            yield dataset
+            return
+        origin = self.warped_from
+        options: dict[str, Any] = {"src_crs": to_rasterio(origin.crs)}
+        if origin.gcps:
+            options |= {"gcps": list(origin.gcps)}
+        elif origin.transform is not None:
+            options |= {"src_transform": origin.transform}
+        alpha = self.roles.alpha
+        options |= (
+            {"src_alpha": alpha + 1, "add_alpha": False}
+            if alpha is not None
+            else {"add_alpha": True}
+        )
+        with WarpedVRT(
+            dataset,
+            crs=to_rasterio(self.grid.crs),
+            transform=self.grid.transform,
+            width=self.grid.width_px,
+            height=self.grid.height_px,
+            resampling=Resampling.nearest if self.palette else Resampling.bilinear,
+            src_nodata=self.nodata,
+            **options,
+        ) as warped:
+            yield warped
+
+
+# -- facts of a file ---------------------------------------------------------------------------
+
+
+def _palette(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
+    if dataset.colorinterp[0] != ColorInterp.palette:
+        return ()
+    table = dataset.colormap(1)
+    size = max(256, max(table) + 1)
+    return tuple(tuple(table.get(i, (0, 0, 0, 0))) for i in range(size))
+
+
+def _roles(dataset: Any, given: Sequence[str] | None) -> BandRoles:
+    marked = [interpretation.name for interpretation in dataset.colorinterp]
+    asked = [False] * dataset.count
+    if not given:
+        unnamed = {"alpha", "undefined"}
+        asked = [
+            name in unnamed and looks_like_mask(_sample(dataset, i + 1))
+            for i, name in enumerate(marked)
+        ]
+    return find_roles(dataset.descriptions, marked, asked, given)
+
+
+def _sample(dataset: Any, band: int) -> NDArray[Any]:
+    """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
+    parts = []
+    width, height = min(_SAMPLE_PX, dataset.width), min(_SAMPLE_PX, dataset.height)
+    for fraction_y in (0.0, 0.5, 1.0):
+        for fraction_x in (0.0, 0.5, 1.0):
+            column = round((dataset.width - width) * fraction_x)
+            row = round((dataset.height - height) * fraction_y)
+            window = Window(column, row, width, height)
+            parts.append(dataset.read(band, window=window).ravel())
+    return np.concatenate(parts)
+
+
+def _opaque(alpha: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether an alpha band hides less than half."""
+    if alpha.dtype.kind in "ui":
+        top = 1 if alpha.max(initial=0) <= 1 else np.iinfo(alpha.dtype).max
+        if alpha.dtype == np.uint16 and alpha.max(initial=0) <= 255:
+            top = 255
+        return np.asarray(alpha.astype(np.float64) * 2 > top)
+    return np.asarray(alpha > 0)
+
+
+def _crs_of(dataset: Any, path: str) -> CRS:
+    gcps, gcp_crs = dataset.gcps
+    found = dataset.crs or (gcp_crs if gcps else None)
+    if not found:
+        raise CRSError(
+            f"The picture {display_name(path)} does not name its coordinate reference system.",
+            hint="Name it: `gdal_edit.py -a_srs EPSG:32633 FILE`, or `read_scene(..., crs=...)`.",
+        )
+    return to_pyproj(found)

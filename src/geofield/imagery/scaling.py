@@ -1,0 +1,60 @@
+"""Scaling 16 bit, signed and floating point pictures to 0..255.
+
+All colour bands share one scaling, so that their proportions (the hue) stay. The ends are
+percentiles of the pixels shown, computed from all of them: the same window gives the same
+picture every time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import ImageryError
+
+#: The percentiles that become 0 and 255: sun glint and dead pixels lie outside.
+PERCENTILES = (0.5, 99.5)
+
+
+def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[float, float] | None:
+    """The values that become 0 and 255; None for 8 bit bands, which stay as they are.
+
+    Parameters
+    ----------
+    bands : array (bands, rows, columns)
+        The colour bands, of any real type.
+    valid : bool array (rows, columns)
+    """
+    if bands.dtype == np.uint8:
+        return None
+    values = bands[:, valid]
+    if values.dtype.kind == "f":
+        values = values[np.isfinite(values)]
+    if values.size == 0:
+        return (0.0, 1.0)
+    low, high = (float(each) for each in np.percentile(values, PERCENTILES))
+    if not high > low:
+        low, high = float(values.min()), float(values.max())
+    if not high > low:  # one value everywhere: mid grey would be as good
+        high = low + 1.0
+    return low, high
+
+
+def to_uint8(bands: NDArray[Any], limits: tuple[float, float] | None) -> NDArray[np.uint8]:
+    """Bands with the limits stretched to 0..255 and everything outside cut off."""
+    if limits is None:
+        return np.asarray(bands, np.uint8)
+    low, high = limits
+    if not (np.isfinite(low) and np.isfinite(high) and high > low):
+        raise ImageryError(
+            f"A picture cannot be scaled from {low} .. {high} to 0 .. 255.",
+            hint="Give two finite values, the smaller one first.",
+        )
+    scaled = np.empty(bands.shape, np.uint8)
+    for i, band in enumerate(bands):  # band by band: floats of the whole picture are large
+        stretched = (band.astype(np.float64) - low) * (255.0 / (high - low))
+        np.nan_to_num(stretched, copy=False, nan=0.0, posinf=255.0, neginf=0.0)
+        scaled[i] = np.clip(np.rint(stretched), 0, 255)
+    return scaled

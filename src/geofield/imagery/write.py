@@ -1,0 +1,128 @@
+"""Writing a scene as a Cloud Optimized GeoTIFF, the same bytes every time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+import rasterio
+from rasterio.enums import ColorInterp
+from rasterio.errors import RasterioError
+from rasterio.io import MemoryFile
+
+from geofield.errors import FormatError, OutputExistsError
+from geofield.imagery.gdal import gdal_env, to_rasterio
+from geofield.imagery.tags import tags_of
+from geofield.model.scene import Scene
+
+#: Creation options of GDAL's COG driver.
+COG_OPTIONS: dict[str, Any] = {
+    "driver": "COG",
+    "BLOCKSIZE": 512,
+    "COMPRESS": "DEFLATE",
+    "PREDICTOR": "YES",
+    "OVERVIEW_RESAMPLING": "AVERAGE",
+    "BIGTIFF": "IF_SAFER",
+}
+
+_INTERPRETATION = {
+    "red": ColorInterp.red,
+    "green": ColorInterp.green,
+    "blue": ColorInterp.blue,
+    "grey": ColorInterp.gray,
+    "nir": ColorInterp.nir,
+    "other": ColorInterp.undefined,
+}
+
+
+def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a scene as a COG with overviews, mask, provenance and its exact position.
+
+    512 px blocks, DEFLATE with predictor 2, an internal mask only where the scene has pixels
+    without data. Written beside the target and moved into place.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : path
+    overwrite : bool
+        Replace an existing file; refused by default.
+
+    Returns
+    -------
+    Path
+        Where it is.
+
+    Raises
+    ------
+    OutputExistsError
+    FormatError
+        The folder does not exist, is read-only or full.
+    """
+    grid, count = scene.grid, len(scene.roles)
+    with replacing(path, overwrite=overwrite) as temporary, gdal_env(GDAL_TIFF_INTERNAL_MASK=True):
+        profile = {
+            "driver": "GTiff",
+            "width": grid.width_px,
+            "height": grid.height_px,
+            "count": count,
+            "dtype": "uint8",
+            "transform": grid.transform,
+            "crs": to_rasterio(grid.crs),
+            "photometric": "RGB" if scene.roles[:3] == ("red", "green", "blue") else "MINISBLACK",
+        }
+        if count > 3 or (count > 1 and not scene.is_colour):
+            profile["ALPHA"] = "NO"
+        with MemoryFile() as memory:
+            with memory.open(**profile) as staged:
+                staged.write(scene.bands)
+                staged.colorinterp = [_INTERPRETATION[role] for role in scene.roles]
+                for i, role in enumerate(scene.roles):
+                    if role not in ("red", "green", "blue"):
+                        staged.set_band_description(i + 1, role)
+                if not scene.valid.all():
+                    staged.write_mask(np.where(scene.valid, 255, 0).astype(np.uint8))
+                staged.update_tags(**tags_of(scene))
+            with memory.open() as staged:
+                rasterio.shutil.copy(staged, str(temporary), **COG_OPTIONS)
+    return Path(path)
+
+
+@contextmanager
+def replacing(path: str | Path, *, overwrite: bool) -> Iterator[Path]:
+    """A temporary file beside the target that takes its place when all went well."""
+    target = Path(path)
+    if target.exists() and not overwrite:
+        raise OutputExistsError(
+            f"{target} exists already.", hint="Choose another name, or say --overwrite."
+        )
+    if target.is_dir():
+        raise FormatError(f"{target} is a folder.", hint="Give the name of a file.")
+    try:
+        with NamedTemporaryFile(
+            dir=target.parent, prefix=f".{target.name}.", suffix=".part.tif", delete=False
+        ) as handle:
+            temporary = Path(handle.name)
+    except OSError as error:
+        raise FormatError(
+            f"{target} cannot be written: {error.strerror}.",
+            hint="Check that the folder exists and that you may write there.",
+        ) from None
+    try:
+        yield temporary
+        # Readable like any other new file, not only by its owner.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(target)
+    except (RasterioError, OSError) as error:
+        raise FormatError(
+            f"{target} cannot be written: {error}.", hint="Check the free space on the disk."
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,451 @@
+"""Reading scenes: unusual but good input works, bad input is refused with a next step."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rasterio.control import GroundControlPoint
+from rasterio.enums import ColorInterp
+
+from geofield.errors import (
+    CRSError,
+    FormatError,
+    ImageryError,
+    OutputExistsError,
+    PointOutsideError,
+)
+from geofield.grid import Grid
+from geofield.imagery import SceneReader, read_scene, write_scene
+from geofield.model.scene import ImagerySource, Scene
+
+from .pictures import EAST, NORTH, RESOLUTION, UTM, ground, write
+
+R, G, B = ColorInterp.red, ColorInterp.green, ColorInterp.blue
+ALPHA, UNDEFINED = ColorInterp.alpha, ColorInterp.undefined
+
+
+@pytest.fixture
+def rgb(tmp_path: Path) -> str:
+    return write(tmp_path / "rgb.tif", ground(), photometric="RGB")
+
+
+def test_a_plain_picture_is_read_as_it_is(rgb: str) -> None:
+    scene = read_scene(rgb)
+    assert scene.roles == ("red", "green", "blue")
+    assert np.array_equal(scene.bands, ground())
+    assert scene.valid.all()
+    assert scene.notes == ()
+    assert scene.scaling is None
+    assert scene.grid == Grid(128, 96, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    assert scene.source.name == "rgb.tif"
+
+
+@pytest.mark.parametrize("size", [{"size_px": 21}, {"size_m": 10.6}])
+def test_a_window_lies_around_the_point(rgb: str, size: dict[str, float]) -> None:
+    whole = SceneReader.open(rgb).grid
+    lon, lat = whole.to_lonlat(60.5, 40.5)
+    scene = read_scene(rgb, lat=lat, lon=lon, **size)
+    assert scene.bands.shape == (3, 21, 21)
+    assert np.array_equal(scene.bands, ground()[:, 30:51, 50:71])
+    assert scene.grid == whole.crop(50, 30, 21, 21)
+    assert scene.pixel_of(lat=lat, lon=lon) == pytest.approx((10.5, 10.5), abs=1e-6)
+
+
+def test_a_window_is_cut_at_the_edge(rgb: str) -> None:
+    lon, lat = SceneReader.open(rgb).grid.to_lonlat(2.5, 94.5)
+    scene = read_scene(rgb, lat=lat, lon=lon, size_px=11)
+    assert np.array_equal(scene.bands, ground()[:, 89:96, 0:8])
+
+
+def test_a_finer_picture_can_be_read_coarser(rgb: str) -> None:
+    scene = read_scene(rgb, resolution_m=1.0)
+    assert scene.bands.shape == (3, 48, 64)
+    expected = ground().reshape(3, 48, 2, 64, 2).mean(axis=(2, 4))
+    assert np.abs(scene.bands - expected).max() <= 1
+    assert scene.grid.to_native(64, 48) == SceneReader.open(rgb).grid.to_native(128, 96)
+    assert "per pixel instead of" in scene.notes[0]
+
+
+def test_a_reader_is_a_picklable_value(rgb: str) -> None:
+    reader = pickle.loads(pickle.dumps(SceneReader.open(rgb)))
+    assert np.array_equal(reader.read((3, 4, 5, 6)).bands, ground()[:, 4:10, 3:8])
+    with pytest.raises(ImageryError, match="reaches outside"):
+        reader.read((120, 90, 20, 20))
+
+
+# -- bands -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("interpretation", "fourth", "roles", "hidden"),
+    [
+        ([R, G, B, ALPHA], "picture", ("red", "green", "blue", "nir"), 0),
+        ([R, G, B, UNDEFINED], "picture", ("red", "green", "blue", "nir"), 0),
+        ([R, G, B, ColorInterp.nir], "picture", ("red", "green", "blue", "nir"), 0),
+        ([R, G, B, ALPHA], "mask", ("red", "green", "blue"), 960),
+        ([R, G, B, ALPHA], "feathered", ("red", "green", "blue"), 960),
+        ([B, G, R, ALPHA], "mask", ("blue", "green", "red"), 960),
+    ],
+)
+def test_a_fourth_band_is_a_mask_only_if_it_looks_like_one(
+    tmp_path: Path, interpretation: list, fourth: str, roles: tuple, hidden: int
+) -> None:
+    values = ground(bands=4)
+    if fourth != "picture":
+        values[3] = 255
+        values[3, :, :10] = 0
+    if fourth == "feathered":
+        values[3, :, 10:12] = (140, 200)
+    path = write(tmp_path / "x.tif", values, interpretation=interpretation, photometric="RGB")
+    scene = read_scene(path)
+    assert scene.roles == roles
+    assert (~scene.valid).sum() == hidden
+    assert not scene.bands[:, ~scene.valid].any()
+
+
+def test_real_chips_keep_their_near_infrared(shared_data: Path) -> None:
+    chips = sorted((shared_data / "trees").glob("*.tif"))
+    assert len(chips) >= 25
+    for chip in chips:
+        scene = read_scene(chip)
+        assert scene.roles == ("red", "green", "blue", "nir"), chip.name
+        assert scene.valid.all(), chip.name
+
+
+@pytest.mark.parametrize(
+    ("descriptions", "count", "roles"),
+    [
+        (["Blue", "Green", "Red", "NIR"], 4, ("blue", "green", "red", "nir")),
+        (["B02", "B03", "B04", "B08"], 4, ("blue", "green", "red", "nir")),
+        (["Red", "Green", "Blue", "Red edge", "Near infrared"], 5, ("red", "green", "blue", "nir")),
+        (None, 1, ("grey",)),
+        (None, 3, ("red", "green", "blue")),
+        (None, 4, ("red", "green", "blue", "nir")),
+        (None, 6, ("red", "green", "blue")),
+    ],
+)
+def test_roles_come_from_names_or_number(
+    tmp_path: Path, descriptions: list[str] | None, count: int, roles: tuple
+) -> None:
+    path = write(
+        tmp_path / "x.tif", ground(bands=count), descriptions=descriptions, photometric="MINISBLACK"
+    )
+    assert read_scene(path).roles == roles
+
+
+def test_given_roles_win(tmp_path: Path) -> None:
+    path = write(tmp_path / "x.tif", ground(bands=4), photometric="RGB")
+    scene = read_scene(path, bands=("nir", "red", "green", "other"))
+    assert scene.roles == ("nir", "red", "green")
+    assert np.array_equal(scene.band("red"), ground(bands=4)[1])
+    for bad in (("purple",), ("red", "red"), ("red",) * 5, ("other",) * 4):
+        with pytest.raises(ImageryError):
+            read_scene(path, bands=bad)
+
+
+def test_grey_with_alpha(tmp_path: Path) -> None:
+    values = ground(bands=2)
+    values[1] = 255
+    values[1, 5:9, 5:9] = 0
+    scene = read_scene(write(tmp_path / "x.tif", values, photometric="MINISBLACK", ALPHA="YES"))
+    assert scene.roles == ("grey",)
+    assert (~scene.valid).sum() == 16
+
+
+def test_palette_becomes_colour(tmp_path: Path) -> None:
+    index = (ground(bands=1) // 64).astype(np.uint8)
+    path = tmp_path / "p.tif"
+    write(path, index, photometric="PALETTE")
+    colours = {0: (10, 20, 30, 255), 1: (200, 0, 0, 255), 2: (0, 200, 0, 255), 3: (9, 9, 9, 255)}
+    with rasterio.open(path, "r+") as file:
+        file.write_colormap(1, colours)
+    scene = read_scene(path)
+    assert scene.roles == ("red", "green", "blue")
+    table = np.array([colours[i][:3] for i in range(4)])
+    assert np.array_equal(scene.rgb, table[index[0]])
+    assert scene.valid.all()
+
+
+# -- values ------------------------------------------------------------------------------------
+
+
+def test_16_bit_shares_one_scaling_between_colours(tmp_path: Path) -> None:
+    values = ground(bands=4).astype(np.uint16) * 37 + 500
+    values[3] *= 3
+    scene = read_scene(write(tmp_path / "x.tif", values, photometric="MINISBLACK"))
+    low, high = scene.scaling or (0, 0)
+    assert (low, high) == tuple(np.percentile(values[:3], (0.5, 99.5)))
+    expected = np.clip(np.rint((values[:3] - low) * 255.0 / (high - low)), 0, 255)
+    assert np.array_equal(scene.bands[:3], expected)
+    assert scene.nir is not None
+    assert scene.nir.min() == 0
+    assert scene.nir.max() == 255
+    again = read_scene(tmp_path / "x.tif")
+    assert np.array_equal(again.bands, scene.bands)
+
+
+def test_a_second_window_takes_the_first_ones_scaling(tmp_path: Path) -> None:
+    values = ground().astype(np.uint16) * 37
+    path = write(tmp_path / "x.tif", values, photometric="RGB")
+    reader = SceneReader.open(path)
+    small = reader.read((40, 40, 16, 16))
+    large = reader.read(scaling=small.scaling)
+    assert np.array_equal(large.bands[:, 40:56, 40:56], small.bands)
+
+
+def test_float_with_nan_and_infinity(tmp_path: Path) -> None:
+    values = ground().astype(np.float32) / 255
+    values[:, 10:14, 10:20] = np.nan
+    values[1, 50, 50] = np.inf
+    scene = read_scene(write(tmp_path / "x.tif", values, photometric="RGB"))
+    assert (~scene.valid).sum() == 41
+    assert scene.bands[:, scene.valid].min() == 0
+    assert scene.bands[:, scene.valid].max() == 255
+
+
+def test_signed_and_constant(tmp_path: Path) -> None:
+    values = ground().astype(np.int16) * 10 - 3000
+    scene = read_scene(write(tmp_path / "x.tif", values))
+    assert scene.bands.min() == 0
+    assert scene.bands.max() == 255
+    flat = read_scene(write(tmp_path / "flat.tif", np.full((1, 8, 8), 700, np.uint16)))
+    assert np.unique(flat.bands).size == 1
+
+
+@pytest.mark.parametrize("nodata", [0, 255])
+def test_no_data_hides_pixels_where_every_band_has_it(tmp_path: Path, nodata: int) -> None:
+    values = ground()
+    values[:, :5] = nodata
+    values[0, 50, 50] = nodata
+    path = write(tmp_path / "x.tif", values, nodata=nodata, photometric="RGB")
+    assert (~read_scene(path).valid).sum() == 5 * 128
+
+
+def test_internal_mask(tmp_path: Path) -> None:
+    mask = np.full((96, 128), 255, np.uint8)
+    mask[:, :7] = 0
+    path = write(tmp_path / "x.tif", ground(), mask=mask, photometric="RGB")
+    assert np.array_equal(read_scene(path).valid, mask > 0)
+
+
+# -- grids ---------------------------------------------------------------------------------------
+
+
+def test_rotated_and_south_up_stay_as_they_are(tmp_path: Path) -> None:
+    turned = Affine.translation(EAST, NORTH) * Affine.rotation(30) * Affine.scale(0.5, -0.5)
+    scene = read_scene(write(tmp_path / "r.tif", ground(), transform=turned, photometric="RGB"))
+    assert np.array_equal(scene.bands, ground())
+    assert np.allclose(tuple(scene.grid.transform), tuple(turned), rtol=0, atol=1e-9)
+    up = Affine(0.5, 0, EAST, 0, 0.5, NORTH)
+    scene = read_scene(write(tmp_path / "s.tif", ground(), transform=up, photometric="RGB"))
+    assert scene.notes == ()
+    assert np.array_equal(scene.bands, ground())
+
+
+def test_degrees_near_the_equator_stay_degrees(tmp_path: Path) -> None:
+    transform = Affine(5e-6, 0, 33.5, 0, -5e-6, 5.0)
+    path = write(tmp_path / "x.tif", ground(), crs="EPSG:4326", transform=transform)
+    scene = read_scene(path)
+    assert scene.grid.crs.to_epsg() == 4326
+    assert np.array_equal(scene.bands, ground())
+
+
+def test_degrees_at_high_latitude_are_reprojected_and_recorded(tmp_path: Path) -> None:
+    transform = Affine(5e-6, 0, 25.0, 0, -5e-6, 62.0)
+    values = ground(400, 400)
+    values[:, 195:205, 190:210] = 254
+    path = write(tmp_path / "x.tif", values, crs="EPSG:4326", transform=transform)
+    scene = read_scene(path)
+    assert scene.grid.crs.to_epsg() == 32635
+    assert "Reprojected from WGS 84" in scene.notes[-1]
+    # The bright block is where it was, to a pixel.
+    x, y = scene.grid.from_lonlat(25.0 + 200 * 5e-6, 62.0 - 200 * 5e-6)
+    rows, columns = np.nonzero(np.all(scene.bands == 254, axis=0))
+    assert np.mean(columns) + 0.5 == pytest.approx(x, abs=1.0)
+    assert np.mean(rows) + 0.5 == pytest.approx(y, abs=1.0)
+    assert not scene.valid.all()
+    # Twice as many rows as columns of degrees cover the same ground at 62 N.
+    window = read_scene(path, lat=61.999, lon=25.001, size_m=40)
+    assert window.grid.ground_resolution_m == pytest.approx(0.261, abs=0.01)
+    assert abs(window.grid.width_px * window.grid.ground_resolution_m - 40) < 0.5
+
+
+def test_oblong_pixels_are_reprojected(tmp_path: Path) -> None:
+    transform = Affine(0.5, 0, EAST, 0, -1.0, NORTH)
+    scene = read_scene(write(tmp_path / "x.tif", ground(), transform=transform))
+    assert "times longer one way" in scene.notes[-1]
+    assert scene.grid.ground_resolution_m == pytest.approx(0.5, rel=0.01)
+
+
+def test_ground_control_points_place_a_picture(tmp_path: Path) -> None:
+    corners = [(0, 0), (0, 128), (96, 128), (96, 0)]
+    gcps = [
+        GroundControlPoint(row, col, EAST + 0.5 * col, NORTH - 0.5 * row) for row, col in corners
+    ]
+    path = tmp_path / "g.tif"
+    with rasterio.open(
+        path, "w", driver="GTiff", width=128, height=96, count=3, dtype="uint8", photometric="RGB"
+    ) as file:
+        file.write(ground())
+        file.gcps = (gcps, rasterio.crs.CRS.from_string(UTM))
+    scene = read_scene(path)
+    assert "4 ground control points" in scene.notes[-1]
+    lon, lat = Grid(1, 1, Affine(1, 0, EAST, 0, -1, NORTH), UTM).to_lonlat(32, 24)
+    x, y = scene.pixel_of(lat=lat, lon=lon)
+    assert (x, y) == pytest.approx((64, 48), abs=0.5)
+    inner = scene.bands[:, 10:80, 10:110].astype(int)
+    assert np.abs(inner - ground()[:, 10:80, 10:110]).mean() < 6
+
+
+# -- bad input --------------------------------------------------------------------------------
+
+
+def test_points_outside_or_on_no_data(tmp_path: Path) -> None:
+    values = ground()
+    values[:, :20] = 0
+    path = write(tmp_path / "x.tif", values, nodata=0, photometric="RGB")
+    grid = SceneReader.open(path).grid
+    lon, lat = grid.to_lonlat(64, 48)
+    with pytest.raises(PointOutsideError, match="covers lat"):
+        read_scene(path, lat=lat + 1, lon=lon)
+    with pytest.raises(PointOutsideError, match=f"look swapped: try --lat {lat} --lon {lon}"):
+        read_scene(path, lat=lon, lon=lat)
+    lon, lat = grid.to_lonlat(64, 5)
+    with pytest.raises(PointOutsideError, match="no data"):
+        read_scene(path, lat=lat, lon=lon)
+
+
+def test_no_crs_no_position(tmp_path: Path) -> None:
+    path = write(tmp_path / "x.tif", ground(), crs=None)
+    with pytest.raises(CRSError, match="does not name its coordinate reference system"):
+        read_scene(path)
+    assert read_scene(path, crs=UTM).grid.crs.to_epsg() == 32636
+    from PIL import Image
+
+    Image.fromarray(np.moveaxis(ground(), 0, -1)).save(tmp_path / "photo.png")
+    with pytest.raises(CRSError, match="no position on the ground"):
+        read_scene(tmp_path / "photo.png", crs=UTM)
+
+
+def test_unreadable_truncated_empty(tmp_path: Path, rgb: str) -> None:
+    with pytest.raises(ImageryError, match="There is no picture"):
+        read_scene(tmp_path / "missing.tif")
+    (tmp_path / "text.tif").write_text("not a picture")
+    with pytest.raises(ImageryError, match="cannot be opened"):
+        read_scene(tmp_path / "text.tif")
+    (tmp_path / "zero.tif").touch()
+    with pytest.raises(ImageryError, match="0 bytes"):
+        read_scene(tmp_path / "zero.tif")
+    data = Path(rgb).read_bytes()
+    (tmp_path / "cut.tif").write_bytes(data[: len(data) // 2])
+    with pytest.raises(ImageryError, match="truncated or damaged"):
+        read_scene(tmp_path / "cut.tif")
+
+
+def test_nothing_to_see(tmp_path: Path) -> None:
+    path = write(tmp_path / "x.tif", np.full((3, 9, 9), np.nan, np.float32))
+    with pytest.raises(ImageryError, match="holds no data"):
+        read_scene(path)
+    path = write(tmp_path / "c.tif", np.zeros((1, 9, 9), np.complex64))
+    with pytest.raises(ImageryError, match="complex"):
+        read_scene(path)
+
+
+def test_half_a_point_or_two_sizes(rgb: str) -> None:
+    with pytest.raises(ImageryError, match="both lat and lon"):
+        read_scene(rgb, lat=35.0)
+    with pytest.raises(ImageryError, match="needs a point"):
+        read_scene(rgb, size_px=30)
+    with pytest.raises(ImageryError, match="given twice"):
+        read_scene(rgb, lat=35.0, lon=33.5, size_px=30, size_m=3)
+
+
+# -- writing -----------------------------------------------------------------------------------
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    zoom=st.integers(0, 22),
+    lat=st.floats(-80, 80),
+    lon=st.floats(-179, 179),
+    width=st.integers(1, 40),
+    height=st.integers(1, 40),
+)
+def test_georeference_survives_exactly(
+    tmp_path_factory: pytest.TempPathFactory,
+    zoom: int,
+    lat: float,
+    lon: float,
+    width: int,
+    height: int,
+) -> None:
+    grid = Grid.web_mercator(lat=lat, lon=lon, zoom=zoom, width_px=width, height_px=height)
+    scene = Scene(
+        grid, np.ones((1, height, width), np.uint8), ("grey",), np.ones((height, width), bool)
+    )
+    path = write_scene(scene, tmp_path_factory.mktemp("exact") / "x.tif")
+    with rasterio.open(path) as file:
+        assert file.transform == grid.transform
+        assert file.crs.to_epsg() == 3857
+
+
+@pytest.mark.parametrize(
+    "roles", [("grey",), ("red", "green", "blue"), ("red", "green", "blue", "nir"), ("nir", "red")]
+)
+@pytest.mark.parametrize("holes", [False, True])
+def test_a_written_scene_is_read_back_equal(
+    tmp_path: Path, roles: tuple[str, ...], holes: bool
+) -> None:
+    from rio_cogeo import cog_validate
+
+    values = ground(700, 600, len(roles))
+    valid = np.ones(values.shape[1:], bool)
+    valid[100:200, 100:200] = not holes
+    scene = Scene(
+        Grid(600, 700, Affine(0.3, 0.01, EAST, 0.01, -0.3, NORTH), UTM),
+        np.where(valid, values, np.uint8(0)),
+        roles,
+        valid,
+        ImagerySource(
+            "survey", "2024-05-01", "© Survey", "CC BY 4.0", zoom=18, details=(("fetched", "x"),)
+        ),
+        scaling=(3.0, 4000.5),
+        notes=("Reprojected.",),
+    )
+    path = write_scene(scene, tmp_path / "a.tif")
+    back = read_scene(path)
+    assert back.grid == scene.grid
+    assert back.roles == scene.roles
+    assert np.array_equal(back.bands, scene.bands)
+    assert np.array_equal(back.valid, scene.valid)
+    assert back.source == scene.source
+    assert back.scaling == scene.scaling
+    assert back.notes[:1] == scene.notes
+    good, errors, warnings = cog_validate(path, strict=True)
+    assert (good, errors, warnings) == (True, [], [])
+    with rasterio.open(path) as file:
+        assert file.block_shapes[0] == (512, 512)
+        assert file.overviews(1) == [2]
+        assert (rasterio.enums.MaskFlags.per_dataset in file.mask_flag_enums[0]) is holes
+    again = write_scene(scene, tmp_path / "b.tif")
+    assert hashlib.sha256(path.read_bytes()).digest() == hashlib.sha256(again.read_bytes()).digest()
+
+
+def test_an_existing_file_is_refused_and_nothing_is_left(tmp_path: Path, rgb: str) -> None:
+    scene = read_scene(rgb)
+    target = tmp_path / "out.tif"
+    write_scene(scene, target)
+    with pytest.raises(OutputExistsError):
+        write_scene(scene, target)
+    write_scene(scene, target, overwrite=True)
+    with pytest.raises(FormatError, match="folder exists"):
+        write_scene(scene, tmp_path / "no" / "out.tif")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.tif", "rgb.tif"]
