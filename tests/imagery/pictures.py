@@ -53,9 +53,9 @@ def write(
             **profile,
         ) as file,
     ):
-        file.write(values)
         if interpretation:
             file.colorinterp = interpretation
+        file.write(values)
         for i, text in enumerate(descriptions or []):
             file.set_band_description(i + 1, text)
         if mask is not None:

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from affine import Affine
 from pyproj import CRS, Geod
-from rasterio.control import GroundControlPoint
 from rasterio.transform import from_gcps
+from rasterio.vrt import WarpedVRT
 
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import CRSError, PointOutsideError
 from geofield.grid import Grid
-from geofield.imagery.gdal import display_name
+from geofield.imagery.gdal import display_name, to_rasterio
 from geofield.model.scene import outside_message
 
 #: Sides of a ground pixel may differ by this factor before the picture is reprojected.
@@ -35,11 +35,13 @@ LonLat = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class WarpOrigin:
-    """How the file itself is placed, for a picture that is read through a reprojection."""
+    """How the file itself is placed, for a picture that is read through a reprojection.
+
+    Without a transform its ground control points place it.
+    """
 
     crs: CRS
     transform: Affine | None = None
-    gcps: tuple[GroundControlPoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +82,12 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
                 hint="Georeference it (QGIS: Layer > Georeferencer), or put its world file beside.",
             )
         rough = Grid(dataset.width, dataset.height, from_gcps(gcps), crs)
+        target = metric_crs(*rough.centre_lonlat)
+        # GDAL fits the control points only on a grid of its own choice.
+        with WarpedVRT(dataset, src_crs=to_rasterio(crs), crs=to_rasterio(target)) as warped:
+            grid = Grid(warped.width, warped.height, warped.transform, target)
         note = f"Placed by its {len(gcps)} ground control points."
-        return Place(_square_grid(rough, point), WarpOrigin(crs, gcps=tuple(gcps)), (note,))
+        return Place(grid, WarpOrigin(crs), (note,))
     native = Grid(dataset.width, dataset.height, transform, crs)
     aspect, skew_deg = pixel_shape(native, point)
     if aspect <= MAX_ASPECT and skew_deg <= MAX_SKEW_DEG:

@@ -35,7 +35,12 @@ from geofield.imagery.gdal import (
 )
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.scaling import scale_limits, to_uint8
-from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
+from geofield.imagery.tags import (
+    notes_from_tags,
+    roles_from_tags,
+    scaling_from_tags,
+    source_from_tags,
+)
 from geofield.model.scene import ImagerySource, Scene, outside_message
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
@@ -334,10 +339,13 @@ class SceneReader:
             return
         origin = self.warped_from
         options: dict[str, Any] = {"src_crs": to_rasterio(origin.crs)}
-        if origin.gcps:
-            options |= {"gcps": list(origin.gcps)}
-        elif origin.transform is not None:
-            options |= {"src_transform": origin.transform}
+        if origin.transform is not None:
+            options |= {
+                "src_transform": origin.transform,
+                "transform": self.grid.transform,
+                "width": self.grid.width_px,
+                "height": self.grid.height_px,
+            }
         alpha = self.roles.alpha
         options |= (
             {"src_alpha": alpha + 1, "add_alpha": False}
@@ -347,9 +355,6 @@ class SceneReader:
         with WarpedVRT(
             dataset,
             crs=to_rasterio(self.grid.crs),
-            transform=self.grid.transform,
-            width=self.grid.width_px,
-            height=self.grid.height_px,
             resampling=Resampling.nearest if self.palette else Resampling.bilinear,
             src_nodata=self.nodata,
             **options,
@@ -369,6 +374,9 @@ def _palette(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
 
 
 def _roles(dataset: Any, given: Sequence[str] | None) -> BandRoles:
+    remembered = roles_from_tags(dataset.tags())
+    if not given and remembered and len(remembered) == dataset.count:
+        given = remembered
     marked = [interpretation.name for interpretation in dataset.colorinterp]
     asked = [False] * dataset.count
     if not given:

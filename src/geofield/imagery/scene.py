@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from geofield.errors import ImageryError
 from geofield.imagery.reader import MAX_SIDE_PX, SceneReader
 from geofield.model.scene import ImagerySource, Scene
@@ -118,7 +116,7 @@ def _shape(
     elif not exact:
         factor = max(width, height) / MAX_SIDE_PX
     factor = max(factor, 1.0)
-    shape = (max(1, int(np.ceil(height / factor))), max(1, int(np.ceil(width / factor))))
+    shape = (max(1, round(height / factor)), max(1, round(width / factor)))
     if shape[0] * shape[1] > MAX_PIXELS:
         raise ImageryError(
             f"A window of {shape[1]} x {shape[0]} px does not fit in memory.",

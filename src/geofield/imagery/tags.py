@@ -15,7 +15,7 @@ _DATE_TAGS = ("ACQUISITION_DATE", "ACQUISITIONDATETIME", "IMAGERY_DATE", "dateti
 
 def tags_of(scene: Scene) -> dict[str, str]:
     """Every tag of a scene's file."""
-    tags = source_tags(scene.source)
+    tags = source_tags(scene.source) | {_PREFIX + "BANDS": " ".join(scene.roles)}
     if scene.scaling is not None:
         tags[_PREFIX + "SCALING"] = json.dumps(list(scene.scaling))
     if scene.notes:
@@ -64,6 +64,11 @@ def source_from_tags(tags: Mapping[str, str], path: str) -> ImagerySource:
         zoom=int(zoom) if zoom.isdecimal() else None,
         details=tuple(_object(tag("DETAILS")).items()),
     )
+
+
+def roles_from_tags(tags: Mapping[str, str]) -> tuple[str, ...] | None:
+    """What a file of ours says its bands show; None in other files."""
+    return tuple(tags.get(_PREFIX + "BANDS", "").split()) or None
 
 
 def scaling_from_tags(tags: Mapping[str, str]) -> tuple[float, float] | None:
