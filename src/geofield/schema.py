@@ -203,7 +203,89 @@ TRACK_POINTS = Layer(
     ),
 )
 
-LAYERS: tuple[Layer, ...] = (FIELD, OBSTACLES, TRACKS, SEGMENTS, GAPS, TRACK_POINTS)
+HEADLAND = Layer(
+    "headland",
+    "MultiPolygon",
+    "Headland",
+    "The strip along the border that is kept free for turning, and worked last.",
+    ("headland_no",),
+    (
+        Column("headland_no", "int", "Headland", "headl_no"),
+        Column("width_m", "float", "Width", "width_m", "m"),
+        Column("area_ha", "float", "Area", "area_ha", "har"),
+    ),
+    optional=True,
+)
+
+HEADLAND_TRACKS = Layer(
+    "headland_tracks",
+    "LineString",
+    "Headland tracks",
+    "Tracks around the field, parallel to its border, numbered from the border inwards.",
+    ("pass_no", "segment_no"),
+    (
+        Column("pass_no", "int", "Pass", "pass_no"),
+        _SEGMENT_NO,
+        Column("offset_m", "float", "Distance from the border", "offset_m", "m"),
+        _LENGTH,
+    ),
+    optional=True,
+)
+
+ROUTE = Layer(
+    "route",
+    "LineString",
+    "Route",
+    "The whole drive in order: work on segments, and the ways between them.",
+    ("sequence",),
+    (
+        Column("sequence", "int", "Sequence", "sequence"),
+        Column("kind", "str", "Kind", "kind", values=("work", "turn", "drive")),
+        # Of work: with or against the segment's own direction.
+        Column("direction", "str", "Direction", "direction", values=("forward", "backward")),
+        Column("track_no", "int", "Track", "track_no"),
+        Column("segment_no", "int", "Segment", "segment_no"),
+        _LENGTH,
+        Column("start_m", "float", "Driven before", "start_m", "m"),
+    ),
+    optional=True,
+)
+
+TURNS = Layer(
+    "turns",
+    "LineString",
+    "Turns",
+    "The ways from one segment to the next, and whether the machine can drive them.",
+    ("turn_no",),
+    (
+        Column("turn_no", "int", "Turn", "turn_no"),
+        Column("sequence", "int", "Sequence", "sequence"),
+        Column("from_track", "int", "From track", "from_track"),
+        Column("to_track", "int", "To track", "to_track"),
+        # drive: a way around what is between, with corners that no radius is kept in.
+        Column("kind", "str", "Kind", "kind", values=("dubins", "reeds_shepp", "drive")),
+        Column("direction", "str", "Direction", "direction", values=("left", "right", "straight")),
+        Column("radius_m", "float", "Turning radius", "radius_m", "m"),
+        _LENGTH,
+        Column("reverse_m", "float", "Driven backwards", "reverse_m", "m"),
+        Column("outside_m", "float", "Outside the allowed area", "outside_m", "m"),
+        Column("fits", "str", "Fits", "fits", values=("yes", "no")),
+    ),
+    optional=True,
+)
+
+LAYERS: tuple[Layer, ...] = (
+    FIELD,
+    OBSTACLES,
+    TRACKS,
+    SEGMENTS,
+    GAPS,
+    TRACK_POINTS,
+    HEADLAND,
+    HEADLAND_TRACKS,
+    ROUTE,
+    TURNS,
+)
 
 _DTYPES = {"int": "Int64", "float": "float64", "str": "object", "date": "object"}
 

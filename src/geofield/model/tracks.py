@@ -15,6 +15,7 @@ from shapely import Polygon
 from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
+from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
 
 if TYPE_CHECKING:
@@ -53,6 +54,10 @@ class Tracks:
         Tracks of the layout that obstacles leave nothing of; their numbers stay free.
     losses : tuple of ObstacleLoss
         What each obstacle costs.
+    shapes : ObstacleShapes or None
+        What was avoided.
+    headland, headland_tracks, route, turns : GeoDataFrame or None
+        The optional layers of the same names, where they were planned.
     """
 
     lines: gpd.GeoDataFrame
@@ -66,6 +71,11 @@ class Tracks:
     outline: Polygon | None = None
     blocked_count: int = 0
     losses: tuple[ObstacleLoss, ...] = ()
+    shapes: ObstacleShapes | None = None
+    headland: gpd.GeoDataFrame | None = None
+    headland_tracks: gpd.GeoDataFrame | None = None
+    route: gpd.GeoDataFrame | None = None
+    turns: gpd.GeoDataFrame | None = None
 
     @property
     def crs(self) -> CRS:
@@ -73,21 +83,17 @@ class Tracks:
         return CRS(self.segments.crs)
 
     def tables(self) -> dict[str, gpd.GeoDataFrame]:
-        """The tables by layer name, without the points, which are made when asked for."""
-        return {
+        """All layers but the track points, by name; optional ones only where planned."""
+        every = {
             schema.TRACKS.name: self.lines,
             schema.SEGMENTS.name: self.segments,
             schema.GAPS.name: self.gaps,
+            schema.HEADLAND.name: self.headland,
+            schema.HEADLAND_TRACKS.name: self.headland_tracks,
+            schema.ROUTE.name: self.route,
+            schema.TURNS.name: self.turns,
         }
-
-    def evidence(self) -> dict[str, Any]:
-        """What the tables do not say, as plain JSON values."""
-        return {
-            "heading_deg": self.heading_deg,
-            "spacing_m": self.spacing_m,
-            "step_m": self.step_m,
-            "notes": list(self.notes),
-        }
+        return {name: table for name, table in every.items() if table is not None}
 
     @classmethod
     def from_tables(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import TrackError, TrackWarning
 from geofield.grid import Grid
@@ -17,6 +18,7 @@ from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
 from geofield.tracks.frame import FloatArray, TrackFrame
+from geofield.tracks.headland import headland_table, headland_track_table, main_area
 from geofield.tracks.layout import LastStrip, on_the_border, track_positions
 from geofield.tracks.losses import obstacle_losses
 from geofield.tracks.outline import clean_outline, metric
@@ -40,6 +42,8 @@ def plan_tracks(
     offset_m: float | None = None,
     through: Any = None,
     last_strip: LastStrip = "overrun",
+    headland_m: float = 0.0,
+    headland_holes: bool = False,
     min_segment_m: float = 0.0,
     clearance_m: float = 0.0,
     step_m: float = 1.0,
@@ -71,6 +75,11 @@ def plan_tracks(
         through its A by itself.
     last_strip : {"overrun", "leave", "shift", "spread"}
         What becomes of the rest at the far side; see `track_positions`.
+    headland_m : float
+        Width of the strip along the border that straight tracks keep out of. It gets a polygon and
+        tracks of its own, parallel to the border.
+    headland_holes : bool
+        Whether that strip runs around the field's holes too.
     min_segment_m : float
         Shorter segments are not driven; they count as part of the gap.
     clearance_m : float
@@ -98,23 +107,39 @@ def plan_tracks(
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
+    wanted_m = spacing_m
     baseline = find_baseline(
         outline, direction, metric_crs, spacing_m=spacing_m, tolerance_m=straight_tolerance_m
     )
     centre = outline.centroid
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left)
-    edges = polygon_edges(outline, frame, FIELD)
+    inner: BaseGeometry = outline
+    if headland_m != 0.0:
+        inner = main_area(outline, headland_m, holes=headland_holes)
+    edges = polygon_edges(inner, frame, FIELD)
     positions, spacing_m, more = _positions(
         edges,
         frame,
         baseline,
         spacing_m=spacing_m,
         offset_m=offset_m,
+        inset_m=headland_m,
         through=through,
         last_strip=last_strip,
     )
     shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
     pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
+    optional: dict[str, Any] = {}
+    if headland_m > 0.0:
+        optional["headland"] = headland_table(outline, inner, headland_m, metric_crs)
+        optional["headland_tracks"] = headland_track_table(
+            outline,
+            shapes,
+            width_m=headland_m,
+            spacing_m=float(wanted_m),
+            crs=metric_crs,
+            holes=headland_holes,
+        )
     return _tracks(
         pieces,
         crossings,
@@ -128,6 +153,7 @@ def plan_tracks(
         grid=grid,
         outline=outline,
         notes=(*notes, *more),
+        **optional,
     )
 
 
@@ -165,6 +191,7 @@ def _positions(
     *,
     spacing_m: float,
     offset_m: float | None,
+    inset_m: float,
     through: Any,
     last_strip: LastStrip,
 ) -> tuple[FloatArray, float, tuple[str, ...]]:
@@ -178,7 +205,7 @@ def _positions(
     if place is not None:
         first = float(frame.to_frame(*place)[1])
     else:
-        edge = near
+        edge = near - inset_m
         if baseline.edge is not None:
             edge = float(
                 np.mean(
@@ -190,7 +217,7 @@ def _positions(
         offset = spacing_m / 2.0 if offset_m is None else float(offset_m)
         if not np.isfinite(offset):
             raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
-        first = edge + offset
+        first = edge + inset_m + offset
     positions = track_positions(near, far, spacing_m, first_m=first, last_strip=last_strip)
     positions = on_the_border(positions, edges)
     if not len(positions):
@@ -244,6 +271,7 @@ def _tracks(
         heading_deg=heading_deg,
         step_m=step_m,
         outline=outline,
+        shapes=shapes,
         blocked_count=blocked,
         losses=tuple(
             ObstacleLoss(int(no), float(m), 100.0 * float(m) / whole if whole else 0.0)

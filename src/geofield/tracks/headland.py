@@ -1,0 +1,138 @@
+"""The headland: the strip along the border where the machine turns, with its own tracks."""
+
+from __future__ import annotations
+
+import geopandas as gpd
+import numpy as np
+import shapely
+from pyproj import CRS
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from geofield import schema
+from geofield.errors import TrackError
+from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
+
+# Corners stay corners (an implement is turned there), but a spike's corner is cut off.
+_MITRE_LIMIT = 2.0
+_MIN_PIECE_M = 1e-3
+
+
+def inset(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseGeometry:
+    """Move the border inwards by a width.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon
+    width_m : float
+    holes : bool
+        Whether the strip runs around holes too; otherwise they stay as they are.
+
+    Returns
+    -------
+    shapely.Polygon or MultiPolygon
+        Empty where the field is nowhere wider than twice the width.
+    """
+    if holes or not outline.interiors:
+        return shapely.buffer(outline, -width_m, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    shell = Polygon(outline.exterior)
+    inner = shapely.buffer(shell, -width_m, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    return shapely.intersection(inner, outline)
+
+
+def main_area(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseGeometry:
+    """The field without its headland: what straight tracks are laid in.
+
+    Raises
+    ------
+    TrackError
+        When nothing is left.
+    """
+    if not np.isfinite(width_m) or width_m < 0.0:
+        raise TrackError(f"headland_m is {width_m}; it must be 0 or more metres.")
+    inner = inset(outline, width_m, holes=holes)
+    parts = [p for p in shapely.get_parts(inner) if isinstance(p, Polygon) and p.area > 0.0]
+    if not parts:
+        raise TrackError(
+            f"A headland of {width_m:g} m leaves nothing of the field.",
+            hint="Choose a narrower headland.",
+        )
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def headland_table(
+    outline: Polygon, inner: BaseGeometry, width_m: float, crs: CRS
+) -> gpd.GeoDataFrame:
+    """Layer `headland`: the field less its main area, one row."""
+    strip = shapely.difference(outline, inner)
+    parts = [p for p in shapely.get_parts(strip) if isinstance(p, Polygon) and p.area > 0.0]
+    return schema.table(
+        schema.HEADLAND,
+        {
+            "headland_no": np.array([1]),
+            "width_m": [width_m],
+            "area_ha": [sum(p.area for p in parts) / 10_000.0],
+        },
+        [MultiPolygon(parts)],
+        crs,
+    )
+
+
+def headland_track_table(
+    outline: Polygon,
+    shapes: ObstacleShapes,
+    *,
+    width_m: float,
+    spacing_m: float,
+    crs: CRS,
+    holes: bool = False,
+) -> gpd.GeoDataFrame:
+    """Layer `headland_tracks`: rings half a spacing from the border and every spacing inwards.
+
+    As many as fit the headland (at least one), cut where obstacles stand. A ring that nothing
+    cuts stays closed.
+    """
+    passes = max(1, int(np.floor(width_m / spacing_m + 1e-9)))
+    blocked = shapely.union_all(
+        [
+            *shapely.buffer(
+                shapely.points(shapes.circles[:, :2]),
+                shapes.circles[:, 2] / np.cos(np.pi / (8 * QUARTER_SEGMENTS)),
+                quad_segs=2 * QUARTER_SEGMENTS,
+            ),
+            *shapes.polygons,
+        ]
+    )
+    rows: list[tuple[int, int, float]] = []
+    lines: list[BaseGeometry] = []
+    for index in range(passes):
+        offset = min((index + 0.5) * spacing_m, width_m)
+        area = inset(outline, offset, holes=holes)
+        rings: list[BaseGeometry] = []
+        for part in shapely.get_parts(area):
+            rings.append(shapely.LineString(part.exterior.coords))
+            if holes:
+                rings.extend(shapely.LineString(ring.coords) for ring in part.interiors)
+        number = 0
+        for ring in rings:
+            free = shapely.line_merge(shapely.difference(ring, blocked))
+            if not holes:
+                # A hole that reaches into the strip is no place to drive either.
+                free = shapely.line_merge(shapely.intersection(free, outline))
+            for piece in shapely.get_parts(free):
+                if piece.geom_type == "LineString" and piece.length > _MIN_PIECE_M:
+                    number += 1
+                    rows.append((index + 1, number, offset))
+                    lines.append(piece)
+    columns = np.array(rows).reshape(-1, 3)
+    return schema.table(
+        schema.HEADLAND_TRACKS,
+        {
+            "pass_no": columns[:, 0].astype(np.int64),
+            "segment_no": columns[:, 1].astype(np.int64),
+            "offset_m": columns[:, 2],
+            "length_m": shapely.length(lines) if lines else np.empty(0),
+        },
+        lines,
+        crs,
+    )
