@@ -1,0 +1,211 @@
+"""Outline: a mask of pixels as a polygon with straight borders, sharp corners, few vertices.
+
+The border of a mask is a staircase of pixel sides. Its steps' midpoints lie on the true
+border to half a pixel. Douglas and Peucker's method cuts that chain where it turns; a line
+fitted to each piece by total least squares, met with its neighbours', gives the corners to
+a fraction of a pixel.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely import Polygon
+
+from geofield.errors import FieldError
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+
+#: Adjacent lines closer in direction than this (sine) have no well-defined meeting point.
+_PARALLEL_SINE = 0.12
+#: How far a corner may move from where the chain turns, in tolerances.
+_CORNER_REACH = 2.5
+
+
+def mask_polygon(mask: BoolArray) -> Polygon:
+    """The largest 4-connected part of a mask as a polygon on pixel corners, with its holes.
+
+    Raises
+    ------
+    FieldError
+        When the mask is empty.
+    """
+    from rasterio.features import shapes
+
+    labels, count = ndimage.label(mask)
+    if count == 0:
+        raise FieldError("No pixel belongs to the field.", hint="Choose another point or method.")
+    largest = 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
+    part = (labels == largest).astype(np.uint8)
+    geometry, _ = next(shapes(part, mask=part.astype(bool), connectivity=4))
+    polygon = shapely.geometry.shape(geometry)
+    if not polygon.is_valid:  # rings that touch at a corner
+        parts = shapely.get_parts(shapely.make_valid(polygon))
+        polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
+    return cast(Polygon, polygon)
+
+
+def straight_outline(mask: BoolArray, *, tolerance_px: float = 1.5) -> Polygon:
+    """A mask's outline in pixel coordinates, straightened.
+
+    Parameters
+    ----------
+    mask : bool array (rows, columns)
+    tolerance_px : float
+        How far the outline may leave the mask's border; 0 keeps the staircase. It is
+        lowered by itself until the mean distance is below one pixel.
+
+    Returns
+    -------
+    shapely.Polygon
+        Valid; sides on the picture's edge stay exactly there.
+    """
+    exact = mask_polygon(mask)
+    if tolerance_px <= 0:
+        return exact
+    rows, columns = mask.shape
+    tolerance = tolerance_px
+    while tolerance >= 0.25:
+        polygon = _straighten(exact, tolerance, columns, rows)
+        if polygon is not None and mean_deviation_px(polygon, exact) <= 1.0:
+            return polygon
+        tolerance /= 1.5
+    simple = exact.simplify(0.5, preserve_topology=True)
+    return cast(Polygon, simple) if simple.is_valid else exact
+
+
+def mean_deviation_px(outline: Polygon, exact: Polygon) -> float:
+    """Mean distance of the exact border (staircase) from the outline's border, pixels."""
+    ring = shapely.segmentize(exact.exterior, 1.0)
+    points = shapely.points(shapely.get_coordinates(ring))
+    shapely.prepare(border := outline.exterior)
+    return float(np.mean(shapely.distance(points, border)))
+
+
+def _straighten(exact: Polygon, tolerance: float, width: int, height: int) -> Polygon | None:
+    """The polygon with every ring straightened; None when that is not a valid polygon."""
+    shell = _straight_ring(shapely.get_coordinates(exact.exterior), tolerance, width, height)
+    if shell is None:
+        return None
+    polygon = Polygon(shell)
+    if not polygon.is_valid or polygon.area < 0.5 * exact.area:
+        return None
+    holes = []
+    for ring in exact.interiors:
+        hole = _straight_ring(shapely.get_coordinates(ring), tolerance, width, height)
+        if hole is None:
+            hole = shapely.get_coordinates(ring)
+        holes.append(hole)
+    if holes:
+        with_holes = Polygon(shell, holes)
+        # A straightened hole may cross the border or another hole: cut instead.
+        polygon = with_holes if with_holes.is_valid else _cut(polygon, holes)
+    return polygon if polygon.is_valid and not polygon.is_empty else None
+
+
+def _cut(polygon: Polygon, holes: list[FloatArray]) -> Polygon:
+    areas = shapely.union_all([shapely.make_valid(Polygon(hole)) for hole in holes])
+    parts = shapely.get_parts(polygon.difference(areas))
+    return Polygon(max(parts, key=lambda part: part.area))
+
+
+def _straight_ring(
+    corners: FloatArray, tolerance: float, width: int, height: int
+) -> FloatArray | None:
+    """Vertices of a straightened ring, or None when fewer than three are left."""
+    chain = _midpoints(corners)
+    if len(chain) < 12:
+        return corners[:-1]
+    chain = np.roll(chain, -_corner_index(chain), axis=0)
+    closed = np.vstack([chain, chain[:1]])
+    simple = shapely.get_coordinates(shapely.LineString(closed).simplify(tolerance))
+    breaks = _indices(closed, simple)
+    if len(breaks) < 4:
+        return None
+    lines = [_fit(closed[a : b + 1]) for a, b in pairwise(breaks)]
+    on_edge = [_edge_line(closed[a : b + 1], width, height) for a, b in pairwise(breaks)]
+    lines = [edge or line for edge, line in zip(on_edge, lines, strict=True)]
+    vertices = []
+    for i in range(len(lines)):
+        before, after = lines[i - 1], lines[i]
+        turn = closed[breaks[i]]
+        vertices.extend(_corner(before, after, turn, _CORNER_REACH * tolerance + 1.0))
+    ring = np.clip(np.array(vertices), 0, [width, height])
+    # Lines that became one leave vertices that say nothing.
+    return _drop_flat(ring, 0.3 * tolerance)
+
+
+def _midpoints(corners: FloatArray) -> FloatArray:
+    """Midpoints of the unit sides of a ring on pixel corners."""
+    ring = shapely.get_coordinates(shapely.segmentize(shapely.LineString(corners), 1.0))
+    return 0.5 * (ring[:-1] + ring[1:])
+
+
+def _corner_index(chain: FloatArray) -> int:
+    """A point that is surely a turn: the one farthest from the centre."""
+    return int(np.argmax(np.sum((chain - chain.mean(axis=0)) ** 2, axis=1)))
+
+
+def _indices(closed: FloatArray, simple: FloatArray) -> list[int]:
+    """Where the simplified chain's vertices stand in the full one, in order."""
+    found = [0]
+    for x, y in simple[1:-1]:
+        rest = closed[found[-1] + 1 :]
+        step = int(np.argmax((rest[:, 0] == x) & (rest[:, 1] == y)))
+        found.append(found[-1] + 1 + step)
+    return [*found, len(closed) - 1]
+
+
+_Line = tuple[FloatArray, FloatArray]
+
+
+def _fit(points: FloatArray) -> _Line:
+    """Total least squares line: a point on it and its direction."""
+    if len(points) > 8:
+        points = points[2:-2]  # the ends belong half to the neighbours
+    elif len(points) > 4:
+        points = points[1:-1]
+    centre = points.mean(axis=0)
+    if len(points) < 3:
+        direction = points[-1] - points[0]
+    else:
+        direction = np.linalg.svd(points - centre, full_matrices=False)[2][0]
+    return centre, direction / max(float(np.hypot(*direction)), 1e-12)
+
+
+def _edge_line(points: FloatArray, width: int, height: int) -> _Line | None:
+    """The picture's edge, where most of a piece lies on it."""
+    for axis, limit in ((0, 0.0), (0, float(width)), (1, 0.0), (1, float(height))):
+        if np.mean(np.abs(points[:, axis] - limit) < 0.25) > 0.6:
+            centre, direction = points.mean(axis=0), np.zeros(2)
+            centre[axis] = limit
+            direction[1 - axis] = 1.0
+            return centre, direction
+    return None
+
+
+def _corner(before: _Line, after: _Line, turn: FloatArray, reach: float) -> list[FloatArray]:
+    """Where two lines meet; their feet near the turn where they meet too far away."""
+    (p, u), (q, v) = before, after
+    cross = u[0] * v[1] - u[1] * v[0]
+    if abs(cross) > _PARALLEL_SINE:
+        along = ((q - p)[0] * v[1] - (q - p)[1] * v[0]) / cross
+        meeting = p + along * u
+        if np.hypot(*(meeting - turn)) <= reach:
+            return [meeting]
+    feet = [p + ((turn - p) @ u) * u, q + ((turn - q) @ v) * v]
+    if np.hypot(*(feet[0] - feet[1])) < 0.75:
+        return [0.5 * (feet[0] + feet[1])]
+    return feet
+
+
+def _drop_flat(ring: FloatArray, tolerance: float) -> FloatArray | None:
+    closed = shapely.LineString(np.vstack([ring, ring[:1]])).simplify(tolerance)
+    vertices = shapely.get_coordinates(closed)[:-1]
+    return vertices if len(vertices) >= 3 else None

@@ -1,0 +1,75 @@
+"""Quality: how far an outline can be trusted, from what the picture shows along it."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from geofield.field.segmentation import Segmentation
+from geofield.model import FieldQuality, Scene
+
+BoolArray = NDArray[np.bool_]
+
+#: A field below this is hardly one, square metres.
+_SMALL_M2 = 400.0
+
+
+def judge(
+    scene: Scene,
+    mask: BoolArray,
+    outline_px: Polygon,
+    found: Segmentation,
+    seed_px: tuple[float, float],
+) -> FieldQuality:
+    """Measure an outline against its picture.
+
+    Parameters
+    ----------
+    scene : Scene
+    mask : bool array (rows, columns)
+        The field's pixels.
+    outline_px : shapely.Polygon
+        Its outline, pixel coordinates.
+    found : Segmentation
+        What the method measured and noted.
+    seed_px : (float, float)
+        The point, pixel coordinates.
+    """
+    area_m2 = outline_px.area * scene.grid.ground_resolution_m**2
+    touching = edge_share(outline_px, mask.shape[1], mask.shape[0])
+    covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
+    reasons = list(found.notes)
+    score = 1.0 - 0.1 * len(reasons)
+    if touching > 0.02:
+        reasons.append(
+            f"it touches the picture's edge along {touching:.0%} of its length, so the field "
+            "may go on outside"
+        )
+        score -= min(0.3, touching)
+    if covered > 0.95:
+        reasons.append("it fills the whole picture")
+        score -= 0.6
+    if area_m2 < _SMALL_M2:
+        reasons.append(f"it has only {area_m2:.0f} m2")
+        score -= 0.6
+    if not outline_px.covers(shapely.Point(seed_px)):
+        reasons.append("the point lies on something else (a tree, a road, a roof?)")
+        score -= 0.4
+    score = max(0.0, score)
+    figures = (
+        ("edge_share", touching),
+        ("covered_share", covered),
+        ("area_m2", area_m2),
+        *found.figures,
+    )
+    return FieldQuality(score, tuple(reasons), figures, trusted=score >= 0.5)
+
+
+def edge_share(outline_px: Polygon, width: int, height: int) -> float:
+    """Share of an outline's length that lies on the picture's edge."""
+    border = outline_px.exterior
+    frame = shapely.box(0, 0, width, height).exterior
+    inside = shapely.length(border.difference(frame.buffer(0.25)))
+    return float(1.0 - inside / border.length) if border.length else 0.0

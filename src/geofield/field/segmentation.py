@@ -1,0 +1,67 @@
+"""Segmentation: what a method hands on, whatever the method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """A field as pixels.
+
+    Attributes
+    ----------
+    mask : bool array (rows, columns)
+        The field's pixels; what stands in it (crowns, huts, ponds) may be missing.
+    notes : tuple of str
+        What the method had to tell.
+    figures : tuple of (str, float)
+        Evidence that the method measured itself.
+    """
+
+    mask: BoolArray
+    notes: tuple[str, ...] = ()
+    figures: tuple[tuple[str, float], ...] = ()
+
+
+def fill_holes(mask: BoolArray, *, smallest_kept_px: float | None) -> BoolArray:
+    """A mask with its holes filled: all of them, or those below a size.
+
+    Parameters
+    ----------
+    mask : bool array
+    smallest_kept_px : float or None
+        Pixels from which a hole stays one; None fills every hole.
+    """
+    filled: BoolArray = ndimage.binary_fill_holes(mask)
+    if smallest_kept_px is None:
+        return filled
+    labels, count = ndimage.label(filled & ~mask)
+    if count == 0:
+        return filled
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    kept = sizes >= smallest_kept_px
+    kept[0] = False
+    partly: BoolArray = filled & ~kept[labels]
+    return partly
+
+
+def part_at(mask: BoolArray, x_px: float, y_px: float) -> BoolArray:
+    """The 4-connected part of a mask nearest to a pixel position."""
+    labels, count = ndimage.label(mask)
+    if count == 0:
+        return mask
+    y, x = int(y_px), int(x_px)
+    number = labels[y, x]
+    if number == 0:
+        rows, columns = np.nonzero(labels)
+        nearest = int(np.argmin((rows - y) ** 2 + (columns - x) ** 2))
+        number = labels[rows[nearest], columns[nearest]]
+    part: BoolArray = labels == number
+    return part
