@@ -26,6 +26,8 @@ FloatArray = NDArray[np.float64]
 _PARALLEL_SINE = 0.12
 #: How far a corner may move from where the chain turns, in tolerances.
 _CORNER_REACH = 2.5
+#: Pieces of fewer steps than this, in tolerances, say nothing about a direction.
+_SHORT = 2.5
 
 
 def mask_polygon(mask: BoolArray) -> Polygon:
@@ -128,14 +130,17 @@ def _straight_ring(
     breaks = _indices(closed, simple)
     if len(breaks) < 4:
         return None
-    lines = [_fit(closed[a : b + 1]) for a, b in pairwise(breaks)]
-    on_edge = [_edge_line(closed[a : b + 1], width, height) for a, b in pairwise(breaks)]
-    lines = [edge or line for edge, line in zip(on_edge, lines, strict=True)]
+    pieces = list(pairwise(breaks))
+    long = [(a, b) for a, b in pieces if b - a >= _SHORT * tolerance]
+    if len(long) >= 3:
+        pieces = long  # what is left out is the rounding of a corner
+    lines = [
+        _edge_line(closed[a : b + 1], width, height) or _fit(closed[a : b + 1]) for a, b in pieces
+    ]
     vertices = []
-    for i in range(len(lines)):
-        before, after = lines[i - 1], lines[i]
-        turn = closed[breaks[i]]
-        vertices.extend(_corner(before, after, turn, _CORNER_REACH * tolerance + 1.0))
+    for i, (start, _) in enumerate(pieces):
+        turn = 0.5 * (closed[pieces[i - 1][1]] + closed[start])
+        vertices.extend(_corner(lines[i - 1], lines[i], turn, _CORNER_REACH * tolerance + 1.0))
     ring = np.clip(np.array(vertices), 0, [width, height])
     # Lines that became one leave vertices that say nothing.
     return _drop_flat(ring, 0.3 * tolerance)
