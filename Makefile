@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 UV := $(BIN)/uv
 UV_VERSION := 0.13.8
 DEMO_OUT ?= out/demo
-SAMPLE := sample_data/field.tif --lat 35.075373 --lon 33.531142
+SAMPLE := sample_data/field_1.tif --lat 35.075373 --lon 33.531142
 
 # One thread per process: the work is split by process, and figures stay comparable.
 export OMP_NUM_THREADS ?= 1

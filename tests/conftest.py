@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from geofield.simulate import SimulatedField, SimulationSettings, simulate_field
+
 settings.register_profile("geofield", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("geofield")
 
@@ -41,3 +43,21 @@ def _own_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in list(os.environ):
         if name.startswith("GEOFIELD_") and name != "GEOFIELD_SHARED":
             monkeypatch.delenv(name)
+
+
+@pytest.fixture(scope="session")
+def simulated() -> SimulatedField:
+    """A small field with eight trees and its truth."""
+    return simulate_field(
+        11, SimulationSettings(width_px=320, height_px=320, obstacles=8, climate="temperate")
+    )
+
+
+@pytest.fixture(scope="session")
+def simulated_tif(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small field's picture as a GeoTIFF."""
+    from geofield.imagery import write_scene
+
+    path = tmp_path_factory.mktemp("simulated") / "field.tif"
+    write_scene(simulated.scene, path)
+    return path

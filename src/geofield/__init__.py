@@ -1,3 +1,85 @@
-"""geofield: from a point in a farm field and a picture of it to drivable geodata."""
+"""geofield: from a point in a farm field and a picture of it to drivable geodata.
+
+>>> import geofield as gf                                            # doctest: +SKIP
+>>> plan = gf.plan_field("ortho.tif", lat=35.0754, lon=33.5311)      # doctest: +SKIP
+>>> plan.write("out/", formats=["gpkg", "geojson"])                  # doctest: +SKIP
+
+The names below load their modules when they are first used, so that importing the package
+is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from geofield.errors import GeofieldError, GeofieldWarning
+    from geofield.field import extract_field
+    from geofield.grid import Grid
+    from geofield.imagery import read_scene, write_scene
+    from geofield.model import Field, Scene, Tracks
+    from geofield.obstacles import detect_obstacles
+    from geofield.pipeline import plan_field
+    from geofield.plan import Plan, read_plan
+    from geofield.settings import Settings, load_settings
+    from geofield.simulate import simulate_field, simulate_fields
+    from geofield.tracks import plan_tracks
+
+_HOME = {
+    "Field": "model",
+    "GeofieldError": "errors",
+    "GeofieldWarning": "errors",
+    "Grid": "grid",
+    "Plan": "plan",
+    "Scene": "model",
+    "Settings": "settings",
+    "Tracks": "model",
+    "detect_obstacles": "obstacles",
+    "extract_field": "field",
+    "load_settings": "settings",
+    "plan_field": "pipeline",
+    "plan_tracks": "tracks",
+    "read_plan": "plan",
+    "read_scene": "imagery",
+    "simulate_field": "simulate",
+    "simulate_fields": "simulate",
+    "write_scene": "imagery",
+}
+
+__all__ = [
+    "Field",
+    "GeofieldError",
+    "GeofieldWarning",
+    "Grid",
+    "Plan",
+    "Scene",
+    "Settings",
+    "Tracks",
+    "__version__",
+    "detect_obstacles",
+    "extract_field",
+    "load_settings",
+    "plan_field",
+    "plan_tracks",
+    "read_plan",
+    "read_scene",
+    "simulate_field",
+    "simulate_fields",
+    "write_scene",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'geofield' has no attribute {name!r}")
+    # A submodule of the same name (geofield.evaluate) must not shadow the function.
+    value = getattr(import_module(f"geofield.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

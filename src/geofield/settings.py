@@ -42,7 +42,7 @@ class ImagerySettings(Section):
 class FieldSettings(Section):
     """Stage 2: the outline."""
 
-    method: str = Field("auto", description="How the outline is found: auto, study.")
+    method: str = Field("study", description="How the outline is found: auto, study.")
 
 
 class ObstacleSettings(Section):

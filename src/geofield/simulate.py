@@ -183,7 +183,7 @@ def simulate_fields(
         one = settings
         if obstacle_counts:
             one = replace(one, obstacles=int(obstacle_counts[index % len(obstacle_counts)]))
-        if equal_brightness_every and index % equal_brightness_every == 0:
+        if equal_brightness_every and (index + 1) % equal_brightness_every == 0:
             one = replace(one, equal_brightness=True)
         yield simulate_field(seed * 100_003 + index, one)
 

@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "obstacles": ("geofield.cli.obstacles:obstacles", "Stage 3: find the obstacles in it."),
     "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
+    "doctor": ("geofield.cli.doctor:doctor", "Show versions and what looks wrong."),
     "simulate": ("geofield.cli.simulate:simulate", "Make synthetic fields with known truth."),
 }
 
@@ -65,7 +66,7 @@ class LazyGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples (on the project's own sample):
-  geofield run sample_data/field.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
   geofield tracks out/field.gpkg --spacing 6 -o wider.gpkg
 """,
 )

@@ -160,8 +160,8 @@ _FORMATS = (
         "RDF/XML linked data",
         ("obstacles.rdf", "tracks.rdf", "field.rdf"),
         _ALL,
-        "geofield.formats.rdf:write",
-        "geofield.formats.rdf:read",
+        "geofield.formats.rdf.write:write_rdfxml",
+        None,
         suffixes=(".rdf", ".ttl", ".jsonld"),
     ),
 )

@@ -55,9 +55,9 @@ class ObstacleShapes:
 def circle_polygons(x: ArrayLike, y: ArrayLike, radius: ArrayLike) -> NDArray[np.object_]:
     """Polygons that stand for circles, 64 vertices each, all on the circle."""
     points = shapely.points(np.asarray(x, float), np.asarray(y, float))
-    return np.atleast_1d(
-        shapely.buffer(points, np.asarray(radius, float), quad_segs=QUARTER_SEGMENTS)
-    )
+    circles = shapely.buffer(points, np.asarray(radius, float), quad_segs=QUARTER_SEGMENTS)
+    # Counter-clockwise, as files hold them: a plan read back is then the same.
+    return np.atleast_1d(shapely.orient_polygons(circles))
 
 
 def from_circles_px(
@@ -148,7 +148,7 @@ def from_polygons(
             "lat": lat,
             "lon": lon,
         },
-        grown,
+        shapely.orient_polygons(grown),
         crs,
     )
 

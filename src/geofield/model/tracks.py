@@ -95,6 +95,15 @@ class Tracks:
         }
         return {name: table for name, table in every.items() if table is not None}
 
+    def evidence(self) -> dict[str, Any]:
+        """What the tables do not say, as plain JSON values."""
+        return {
+            "heading_deg": self.heading_deg,
+            "spacing_m": self.spacing_m,
+            "step_m": self.step_m,
+            "notes": list(self.notes),
+        }
+
     @classmethod
     def from_tables(
         cls,
@@ -113,6 +122,10 @@ class Tracks:
             step_m=float(evidence["step_m"]),
             grid=grid,
             notes=tuple(evidence.get("notes", ())),
+            headland=tables.get(schema.HEADLAND.name),
+            headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
+            route=tables.get(schema.ROUTE.name),
+            turns=tables.get(schema.TURNS.name),
         )
 
     @cached_property

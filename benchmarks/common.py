@@ -1,0 +1,35 @@
+"""What all benchmarks share: the machine's facts and the page they are written to."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+
+RESULTS = Path(__file__).resolve().parent / "results"
+
+
+def machine(*libraries: str) -> list[str]:
+    """Lines on the machine and the versions that the figures depend on."""
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        cpu = models[0].split(":", 1)[1].strip() if models else cpu
+    names = ("numpy", "scipy", "scikit-image", "shapely", "rasterio", *libraries)
+    found = ", ".join(f"{name} {metadata.version(name)}" for name in dict.fromkeys(names))
+    return [
+        f"Machine: {cpu}, {os.cpu_count()} cores, {platform.system()}; "
+        f"Python {platform.python_version()}.",
+        f"Libraries: {found}.",
+    ]
+
+
+def write_page(name: str, title: str, lines: Iterable[str]) -> None:
+    """Print a page and keep it as ``results/NAME.md``."""
+    text = "\n".join([f"# {title}", "", *lines, ""])
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
+    print(text)

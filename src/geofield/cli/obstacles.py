@@ -1,0 +1,74 @@
+"""``geofield obstacles``: stage 3 alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geofield.cli.console import echo_json, say
+from geofield.cli.options import section_options, section_values, settings_option
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 -o field.gpkg
+  geofield obstacles sample_data/field_1.tif field.gpkg -o field.gpkg
+"""
+)
+@click.argument("imagery", type=click.Path(path_type=str))
+@click.argument(
+    "plan_file", metavar="FIELD.gpkg", type=click.Path(exists=True, dir_okay=False, path_type=Path)
+)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="GeoPackage to write; may be the one that was read.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace another file than the one that was read.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
+@settings_option
+@section_options("obstacles")
+def obstacles(
+    imagery: str,
+    plan_file: Path,
+    output: Path,
+    overwrite: bool,
+    as_json: bool,
+    settings_file: str | None,
+    **options: Any,
+) -> None:
+    """Find the obstacles in a field.
+
+    IMAGERY is the picture that the field was found in. Rows that a person confirmed,
+    rejected or drew in FIELD.gpkg stay as they are; the tracks are removed, for they no
+    longer fit: run `geofield tracks` next.
+    """
+    from geofield.cli.plan_files import save_plan
+    from geofield.pipeline import run_obstacles, scene_of_plan
+    from geofield.plan import read_plan
+    from geofield.settings import load_settings
+
+    settings = load_settings(settings_file, section_values(options))
+    plan = read_plan(plan_file)
+    plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
+    save_plan(plan, output, read_from=plan_file, overwrite=overwrite)
+    table = plan.obstacles
+    if table is None:
+        return
+    if as_json:
+        echo_json(
+            {
+                "file": str(output),
+                "detection": plan.evidence.get("obstacles", {}),
+                "obstacles": table.drop(columns="geometry").to_dict("records"),
+            }
+        )
+        return
+    counts = table["status"].value_counts().sort_index()
+    parts = ", ".join(f"{count} {status}" for status, count in counts.items()) or "none found"
+    say(f"{len(table)} obstacles ({parts}) in {output}")

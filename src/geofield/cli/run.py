@@ -1,0 +1,140 @@
+"""``geofield run``: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.options import point_options, section_options, section_values, settings_option
+
+if TYPE_CHECKING:
+    from geofield.plan import Plan
+    from geofield.settings import Settings
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/ \\
+      --buffer 2 --format gpkg --format geojson --overwrite
+"""
+)
+@click.argument("imagery", type=click.Path(path_type=str))
+@point_options
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the products; made when it does not exist.",
+)
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace earlier products there; reviewed obstacles and a moved outline are kept.",
+)
+@click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
+@settings_option
+@section_options("imagery")
+@section_options("field")
+@section_options("obstacles")
+@section_options("tracks")
+@click.option(
+    "--format", "export__formats", multiple=True, help="Format to write; repeat for several."
+)
+def run(
+    imagery: str,
+    lat: float,
+    lon: float,
+    out: Path,
+    overwrite: bool,
+    fresh: bool,
+    as_json: bool,
+    settings_file: str | None,
+    **options: Any,
+) -> None:
+    """From a picture and a point in a field to outline, obstacles and tracks.
+
+    IMAGERY is a GeoTIFF or any other source that `geofield sources` lists. Written are the
+    picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON, Shapefiles, RDF, a map
+    picture and report.json.
+    """
+    from geofield.pipeline import plan_field
+    from geofield.settings import load_settings
+
+    settings = load_settings(settings_file, section_values(options))
+    _refuse_occupied(out, settings, overwrite=overwrite)
+    previous = None if fresh else _previous(out)
+    timings: dict[str, float] = {}
+    with progress_bar(quiet=as_json) as progress:
+        plan = plan_field(
+            imagery,
+            lat=lat,
+            lon=lon,
+            settings=settings,
+            previous=previous,
+            progress=progress,
+            timings_s=timings,
+        )
+        files = plan.write(out, overwrite=overwrite, timings_s=timings, inputs=[imagery])
+    if as_json:
+        import json
+
+        echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
+    else:
+        summarise(plan, files, timings)
+
+
+def _refuse_occupied(out: Path, settings: Settings, *, overwrite: bool) -> None:
+    """Say at once, not after the work, that there are products already."""
+    from geofield.errors import OutputExistsError
+
+    if not overwrite and out.is_dir() and any(out.iterdir()):
+        raise OutputExistsError(
+            f"{out} is not empty.",
+            hint="Choose another --out, or --overwrite: reviewed obstacles are then kept.",
+        )
+
+
+def _previous(out: Path) -> Plan | None:
+    """The plan of an earlier run in the folder, for what a person edited in it."""
+    from geofield.plan import read_plan
+
+    file = out / "field.gpkg"
+    return read_plan(file) if file.is_file() else None
+
+
+def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
+    """A short account of a plan for the person at the terminal."""
+    field = plan.field
+    say(f"Field      {field.area_ha:.2f} ha, perimeter {field.perimeter_m:.0f} m ({field.method})")
+    if field.quality is not None and not field.quality.trusted:
+        click.secho(
+            "           check this outline: " + "; ".join(field.quality.reasons),
+            fg="yellow",
+            err=True,
+        )
+    if plan.obstacles is not None:
+        counts = plan.obstacles["status"].value_counts().sort_index()
+        parts = ", ".join(f"{count} {status}" for status, count in counts.items())
+        say(f"Obstacles  {len(plan.obstacles)}" + (f" ({parts})" if parts else ""))
+    if plan.tracks is not None:
+        segments = plan.tracks.segments
+        say(
+            f"Tracks     {len(plan.tracks.lines)} in {len(segments)} segments, "
+            f"{segments['length_m'].sum() / 1000:.2f} km, "
+            f"heading {plan.tracks.heading_deg:.1f} degrees"
+        )
+        for note in plan.tracks.notes:
+            say(f"           {note}")
+    if timings:
+        say("Time       " + ", ".join(f"{stage} {value:.1f} s" for stage, value in timings.items()))
+    folder = files[0].parent
+    say(f"Files      {len(files)} in {folder}/")
+    for name, text in (("map.png", "look at this first"), ("field.gpkg", "open this in QGIS")):
+        if folder / name in files:
+            say(f"           {folder / name}  ({text})")

@@ -1,0 +1,218 @@
+"""The pipeline: picture and point in, plan out; the four stages in their order.
+
+Each ``run_*`` function takes a plan as far as it has come and adds one stage, honouring
+what a person has edited since: a moved outline, a confirmed, rejected or added obstacle.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, MutableMapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import shapely
+
+from geofield.crs import LONLAT, transformer
+from geofield.errors import GeofieldError
+from geofield.model.field import Field
+from geofield.model.review import complete_review, merge_reviewed
+from geofield.model.scene import Scene
+from geofield.plan import Plan, outline_digest
+from geofield.settings import Settings
+
+#: Called with (done, total, what).
+Progress = Callable[[int, int, str], None]
+
+STAGES = ("picture", "field", "obstacles", "tracks")
+
+
+def plan_field(
+    scene: Scene | str | Path,
+    *,
+    lat: float,
+    lon: float,
+    settings: Settings | None = None,
+    previous: Plan | None = None,
+    progress: Progress | None = None,
+    timings_s: MutableMapping[str, float] | None = None,
+) -> Plan:
+    """Run all four stages.
+
+    Parameters
+    ----------
+    scene : Scene or path
+        The picture, in memory or as a file.
+    lat, lon : float
+        A point in the field, degrees, WGS 84.
+    settings : Settings, optional
+    previous : Plan, optional
+        An earlier plan of the same field: its outline, where a person drew it, and its
+        reviewed obstacles are kept.
+    progress : callable, optional
+        Called with (done, total, what) at each stage.
+    timings_s : mutable mapping, optional
+        Filled with the seconds of each stage.
+
+    Returns
+    -------
+    Plan
+    """
+    settings = settings or Settings()
+    tell = progress or (lambda done, total, what: None)
+    timings = timings_s if timings_s is not None else {}
+    with _timed("picture", timings, tell):
+        picture = scene if isinstance(scene, Scene) else open_scene(scene, lat, lon, settings)
+    with _timed("field", timings, tell):
+        plan = run_field(picture, lat=lat, lon=lon, settings=settings, previous=previous)
+    with _timed("obstacles", timings, tell):
+        plan = run_obstacles(plan, picture, settings=settings)
+    with _timed("tracks", timings, tell):
+        return run_tracks(plan, settings=settings)
+
+
+def open_scene(path: str | Path, lat: float, lon: float, settings: Settings) -> Scene:
+    """Read the picture around a point (stage 1)."""
+    from geofield.imagery import read_scene
+
+    return read_scene(path, lat=lat, lon=lon, **settings.imagery.model_dump())
+
+
+def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
+    """Read the picture that a plan was made from, at the point it was made for."""
+    point = plan.evidence.get("point")
+    if point is None:
+        inside = plan.field.polygon_lonlat.representative_point()
+        point = {"lat": inside.y, "lon": inside.x}
+    imagery = (plan.settings or settings).imagery
+    return open_scene(
+        path, point["lat"], point["lon"], settings.model_copy(update={"imagery": imagery})
+    )
+
+
+def run_field(
+    scene: Scene,
+    *,
+    lat: float,
+    lon: float,
+    settings: Settings,
+    previous: Plan | None = None,
+) -> Plan:
+    """Stage 2: find the outline, unless a person drew it."""
+    from geofield.field import extract_field
+
+    if previous is not None and keeps_outline(previous, lat=lat, lon=lon):
+        field = replace(previous.field, method="drawn", quality=None)
+    else:
+        field = extract_field(scene, lat=lat, lon=lon, **settings.field.model_dump())
+        field = replace(
+            field,
+            imagery=scene.source.name,
+            imagery_date=scene.source.date,
+            licence=scene.source.licence,
+        )
+        if previous is not None and previous.field.polygon.intersects(field.polygon):
+            # The same field, found again: its names are the user's to keep.
+            field = replace(field, field_id=previous.field.field_id, name=previous.field.name)
+    evidence: dict[str, Any] = {"point": {"lat": lat, "lon": lon}, "field": _field_evidence(field)}
+    obstacles = None
+    if previous is not None and previous.obstacles is not None:
+        obstacles = complete_review(previous.obstacles, scene.grid)
+    return Plan(
+        field=field,
+        obstacles=obstacles,
+        settings=settings,
+        source=scene.source,
+        grid=scene.grid,
+        evidence=evidence,
+        scene=scene,
+    )
+
+
+def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
+    """Stage 3: find obstacles; rows that a person reviewed or drew stay as they are."""
+    from geofield.obstacles import detect_obstacles
+
+    detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
+    found = dict(detected.attrs.get("detection", {}))
+    if plan.obstacles is not None and len(plan.obstacles):
+        detected = merge_reviewed(detected, complete_review(plan.obstacles, scene.grid))
+    detected.attrs.clear()
+    return replace(
+        plan,
+        obstacles=detected,
+        tracks=None,
+        settings=_with_section(plan.settings, settings, "obstacles"),
+        source=scene.source,
+        grid=scene.grid,
+        evidence={**_without(plan.evidence, "tracks"), "obstacles": found},
+        scene=scene,
+    )
+
+
+def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
+    """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
+    from geofield.tracks import plan_tracks
+
+    field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
+    obstacles = None if plan.obstacles is None else complete_review(plan.obstacles, plan.grid)
+    tracks = plan_tracks(
+        field.polygon, obstacles, crs=field.crs, grid=plan.grid, **settings.tracks.model_dump()
+    )
+    evidence = dict(plan.evidence)
+    if field is not plan.field:
+        evidence["field"] = _field_evidence(field)
+    return replace(
+        plan,
+        field=field,
+        obstacles=obstacles,
+        tracks=tracks,
+        settings=_with_section(plan.settings, settings, "tracks"),
+        evidence={**evidence, "tracks": tracks.evidence()},
+    )
+
+
+def keeps_outline(previous: Plan, *, lat: float, lon: float) -> bool:
+    """Whether an earlier plan's outline is a person's and holds the point."""
+    if not (previous.outline_edited or previous.field.method in ("drawn", "boundary")):
+        return False
+    x, y = transformer(LONLAT, previous.field.crs).transform(lon, lat)
+    return bool(shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)))
+
+
+def _field_evidence(field: Field) -> dict[str, Any]:
+    evidence: dict[str, Any] = {"method": field.method, "outline_sha256": outline_digest(field)}
+    if field.quality is not None:
+        quality = asdict(field.quality)
+        evidence["quality"] = {
+            **quality,
+            "reasons": list(quality["reasons"]),
+            "figures": [[name, float(value)] for name, value in quality["figures"]],
+        }
+    return evidence
+
+
+def _with_section(old: Settings | None, new: Settings, section: str) -> Settings:
+    """The settings that led to the plan: each stage's own, from the run that did it."""
+    if old is None:
+        return new
+    return old.model_copy(update={section: getattr(new, section)})
+
+
+def _without(values: Any, *names: str) -> dict[str, Any]:
+    return {name: value for name, value in dict(values).items() if name not in names}
+
+
+@contextmanager
+def _timed(stage: str, timings: MutableMapping[str, float], tell: Progress) -> Iterator[None]:
+    tell(STAGES.index(stage), len(STAGES), stage)
+    start = time.perf_counter()
+    try:
+        yield
+    except GeofieldError as error:
+        error.add_note(f"while working on: {stage}")
+        raise
+    timings[stage] = time.perf_counter() - start
+    tell(STAGES.index(stage) + 1, len(STAGES), stage)

@@ -1,0 +1,271 @@
+"""Plan: field, obstacles, tracks, settings and provenance; what is written and read back."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shapely
+
+from geofield import __version__, schema
+from geofield.errors import FormatError
+from geofield.grid import Grid
+from geofield.model.dataset import Dataset, Provenance
+from geofield.model.field import Field, FieldQuality
+from geofield.model.scene import ImagerySource, Scene
+from geofield.model.tracks import Tracks
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from geofield.settings import Settings
+
+SOFTWARE = f"geofield {__version__}"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All that is known of one field; stages that have not run are None.
+
+    Attributes
+    ----------
+    field : Field
+    obstacles : GeoDataFrame or None
+        Layer `obstacles`.
+    tracks : Tracks or None
+    settings : Settings or None
+        Of the run; None where nobody recorded them.
+    source : ImagerySource
+    grid : Grid or None
+        Of the picture: gives pixel columns their meaning.
+    evidence : mapping
+        What the stages measured, by stage; plain JSON values.
+    scene : Scene or None
+        The picture itself, where it is at hand; no part of equality.
+    """
+
+    field: Field
+    obstacles: gpd.GeoDataFrame | None = None
+    tracks: Tracks | None = None
+    settings: Settings | None = None
+    source: ImagerySource = dataclasses.field(default_factory=ImagerySource)
+    grid: Grid | None = None
+    evidence: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    scene: Scene | None = None
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all tables, settings, source, grid and evidence are the same."""
+        if not isinstance(other, Plan):
+            return NotImplemented
+        mine, theirs = self.to_dataset(), other.to_dataset()
+        return (
+            mine.crs == theirs.crs
+            and mine.provenance == theirs.provenance
+            and mine.grid == theirs.grid
+            and mine.tables.keys() == theirs.tables.keys()
+            and all(mine.tables[name].equals(theirs.tables[name]) for name in mine.tables)
+        )
+
+    @property
+    def outline_edited(self) -> bool:
+        """Whether a person moved the outline since a stage wrote it."""
+        recorded = self.evidence.get("field", {}).get("outline_sha256")
+        return recorded is not None and recorded != outline_digest(self.field)
+
+    def to_dataset(self) -> Dataset:
+        """The tables of the plan, as formats write them."""
+        tables = {schema.FIELD.name: self._field_table()}
+        if self.obstacles is not None:
+            tables[schema.OBSTACLES.name] = self.obstacles
+        points = None
+        if self.tracks is not None:
+            tables |= self.tracks.tables()
+            points = self.tracks.point_chunks
+        return Dataset(
+            tables=tables,
+            crs=self.field.crs,
+            name=self.field.name,
+            provenance=Provenance(
+                software=SOFTWARE,
+                source=self.source,
+                settings=self.settings.model_dump(mode="json") if self.settings else {},
+                evidence=dict(self.evidence),
+            ),
+            grid=self.grid,
+            points=points,
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: Dataset) -> Plan:
+        """The plan that a dataset's tables describe; a person's edits are taken as they are.
+
+        Raises
+        ------
+        FormatError
+            When there is no field, or more than one.
+        """
+        from geofield.settings import from_mapping
+
+        rows = dataset.table(schema.FIELD.name)
+        if len(rows) != 1:
+            raise FormatError(
+                f"A plan has one field; this file has {len(rows)}.",
+                hint="For many fields at once use `geofield tracks`.",
+            )
+        evidence = dict(dataset.provenance.evidence)
+        settings = (
+            from_mapping(dataset.provenance.settings) if dataset.provenance.settings else None
+        )
+        obstacles = dataset.tables.get(schema.OBSTACLES.name)
+        tracks = None
+        if schema.SEGMENTS.name in dataset.tables and "tracks" in evidence:
+            tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
+        return cls(
+            field=_field_from_row(rows, dataset, evidence),
+            obstacles=obstacles,
+            tracks=tracks,
+            settings=settings,
+            source=dataset.provenance.source,
+            grid=dataset.grid,
+            evidence=evidence,
+        )
+
+    def write(
+        self,
+        folder: str | Path,
+        *,
+        formats: Sequence[str] | None = None,
+        overwrite: bool = False,
+        options: Mapping[str, Any] | None = None,
+        timings_s: Mapping[str, float] | None = None,
+        inputs: Sequence[str | Path] = (),
+    ) -> list[Path]:
+        """Write the plan's products into a folder, all or nothing.
+
+        Parameters
+        ----------
+        folder : path
+            Made where it does not exist.
+        formats : sequence of str, optional
+            Names of `geofield formats`; those of the settings when not given.
+        overwrite : bool
+            Replace products that are there already.
+        options : mapping, optional
+            Options of single formats, by format name.
+        timings_s : mapping, optional
+            Seconds per stage, for the report.
+        inputs : sequence of path
+            Files that were read and must never be replaced.
+
+        Returns
+        -------
+        list of Path
+            The files, in the order written.
+        """
+        from geofield.products import write_products
+
+        if formats is None:
+            from geofield.settings import ExportSettings
+
+            export = self.settings.export if self.settings else ExportSettings()
+            formats = export.formats
+        return write_products(
+            self.to_dataset(),
+            self.scene,
+            Path(folder),
+            formats=formats,
+            overwrite=overwrite,
+            options=options,
+            timings_s=timings_s,
+            inputs=inputs,
+        )
+
+    def _field_table(self) -> gpd.GeoDataFrame:
+        from geofield.tracks.direction import find_baseline
+
+        one = self.field
+        baseline = find_baseline(one.polygon, "longest_edge", one.crs, spacing_m=1.0)
+        edge_m = baseline.edge.length_m if baseline.edge else None
+        heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
+        return schema.table(
+            schema.FIELD,
+            {
+                "field_id": [one.field_id],
+                "name": [one.name],
+                "area_ha": [one.area_ha],
+                "perimeter_m": [one.perimeter_m],
+                "longest_edge_m": [edge_m],
+                "heading_deg": [heading],
+                "method": [one.method],
+                "imagery": [one.imagery or None],
+                "imagery_date": [one.imagery_date],
+                "licence": [one.licence or None],
+            },
+            [one.polygon],
+            one.crs,
+        )
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a plan back from a product that carries all of it.
+
+    Parameters
+    ----------
+    path : path
+        A GeoPackage or RDF file that geofield wrote, edited or not.
+    """
+    from geofield.formats import read_dataset
+
+    return Plan.from_dataset(read_dataset(Path(path)))
+
+
+def outline_digest(one: Field) -> str:
+    """A fingerprint of an outline, to tell whether a person has moved it since."""
+    ring = shapely.normalize(one.polygon)
+    return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
+
+
+def _field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[str, Any]) -> Field:
+    row = rows.iloc[0]
+    recorded = evidence.get("field", {}).get("quality")
+    quality = None
+    if recorded:
+        quality = FieldQuality(
+            score=recorded["score"],
+            reasons=tuple(recorded["reasons"]),
+            figures=tuple((name, value) for name, value in recorded["figures"]),
+            trusted=recorded["trusted"],
+        )
+
+    def text(name: str) -> str:
+        value = row.get(name)
+        return value if isinstance(value, str) else ""
+
+    return Field(
+        polygon=_single_polygon(row.geometry),
+        crs=dataset.crs,
+        name=text("name"),
+        field_id=text("field_id"),
+        method=text("method") or "given",
+        quality=quality,
+        imagery=text("imagery"),
+        imagery_date=text("imagery_date") or None,
+        licence=text("licence"),
+    )
+
+
+def _single_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
+    """The one polygon of a geometry: editors like to save multi-polygons."""
+    parts = shapely.get_parts(geometry) if geometry is not None else []
+    if len(parts) != 1 or not isinstance(parts[0], shapely.Polygon):
+        raise FormatError(
+            f"The field's outline has {len(parts)} parts; a plan needs one polygon.",
+            hint="Delete or merge parts in the field layer.",
+        )
+    return parts[0]

@@ -1,0 +1,129 @@
+"""The products of a run: formats, picture, map and report, written all or nothing."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from geofield import schema
+from geofield.crs import authority_name
+from geofield.formats import write_dataset
+from geofield.formats.atomic import staged_folder
+from geofield.model.dataset import Dataset
+from geofield.model.scene import Scene
+
+SCENE_FILE = "scene.tif"
+MAP_FILE = "map.png"
+REPORT_FILE = "report.json"
+
+
+def write_products(
+    dataset: Dataset,
+    scene: Scene | None,
+    folder: Path,
+    *,
+    formats: Sequence[str],
+    overwrite: bool = False,
+    options: Mapping[str, Any] | None = None,
+    timings_s: Mapping[str, float] | None = None,
+    inputs: Sequence[str | Path] = (),
+) -> list[Path]:
+    """Write a dataset and its picture into a folder.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    scene : Scene or None
+        Written as `scene.tif` and drawn below the map.
+    folder : Path
+    formats : sequence of str
+        Names of registered formats.
+    overwrite : bool
+        Replace products that are there already.
+    options : mapping of format name to mapping, optional
+    timings_s : mapping, optional
+        Seconds per stage, for the report.
+    inputs : sequence of path
+        Files that were read and must never be replaced.
+
+    Returns
+    -------
+    list of Path
+        In the order written.
+    """
+    from geofield.mapping import draw_map
+
+    with staged_folder(folder, overwrite=overwrite, inputs=inputs) as staging:
+        written: list[Path] = []
+        if scene is not None:
+            from geofield.imagery import write_scene
+
+            write_scene(scene, staging / SCENE_FILE)
+            written.append(staging / SCENE_FILE)
+            dataset = replace(dataset, scene_path=staging / SCENE_FILE)
+        written += write_dataset(dataset, staging, formats, overwrite=True, options=options)
+        draw_map(dataset, scene).save(staging / MAP_FILE, optimize=False)
+        report = json.dumps(
+            make_report(dataset, timings_s or {}), indent=2, ensure_ascii=False, allow_nan=False
+        )
+        (staging / REPORT_FILE).write_text(report + "\n", encoding="utf-8")
+        written += [staging / MAP_FILE, staging / REPORT_FILE]
+    return [folder / path.relative_to(staging) for path in written]
+
+
+def make_report(dataset: Dataset, timings_s: Mapping[str, float]) -> dict[str, Any]:
+    """Counts, lengths, areas, timings, settings, versions and terms, as plain JSON values."""
+    field = dataset.table(schema.FIELD.name).iloc[0]
+    obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
+    segments, gaps = dataset.table("segments"), dataset.table("gaps")
+    status = obstacles["status"].value_counts().sort_index()
+    provenance = dataset.provenance
+    return {
+        "field": {
+            "field_id": field["field_id"],
+            "name": field["name"],
+            "crs": authority_name(dataset.crs),
+            "area_ha": _rounded(field["area_ha"], 4),
+            "perimeter_m": _rounded(field["perimeter_m"], 2),
+            "longest_edge_m": _rounded(field["longest_edge_m"], 2),
+            "heading_deg": _rounded(field["heading_deg"], 3),
+            "method": field["method"],
+        },
+        "obstacles": {"count": len(obstacles), **{str(k): int(v) for k, v in status.items()}},
+        "tracks": {
+            "tracks": len(tracks),
+            "segments": len(segments),
+            "gaps": len(gaps),
+            "points": int(tracks["point_count"].sum()),
+            "length_m": _rounded(segments["length_m"].sum(), 3),
+        },
+        "evidence": dict(provenance.evidence),
+        "source": asdict(provenance.source),
+        "settings": dict(provenance.settings),
+        "timings_s": {stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of the software and of the libraries that the figures depend on."""
+    found = {"python": platform.python_version()}
+    for name in ("geofield", "numpy", "scipy", "scikit-image", "shapely", "pyproj", "rasterio"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            from geofield import __version__
+
+            found[name] = __version__ if name == "geofield" else "unknown"
+    return found
+
+
+def _rounded(value: Any, digits: int) -> float | None:
+    number = float(value)
+    return round(number, digits) if math.isfinite(number) else None

@@ -1,0 +1,297 @@
+"""The command line as a newcomer meets it: the main job, the stages, wrong input."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from pyproj import CRS
+
+import geofield as gf
+from geofield.cli.main import COMMANDS, main
+from geofield.grid import Grid
+from geofield.model import Scene
+from geofield.plan import read_plan
+from geofield.simulate import SimulatedField
+
+
+def geofield(*args: object) -> int:
+    """Run the command line in this process; returns the exit code."""
+    try:
+        main([str(arg) for arg in args])
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def point(made: SimulatedField) -> list[object]:
+    return ["--lat", made.lat, "--lon", made.lon]
+
+
+@pytest.fixture
+def ran(simulated: SimulatedField, simulated_tif: Path, tmp_path: Path) -> Path:
+    out = tmp_path / "out"
+    assert geofield("run", simulated_tif, *point(simulated), "--spacing", 6, "--out", out) == 0
+    return out
+
+
+def test_the_main_job(ran: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert "map.png" in output.err
+    assert (ran / "field.gpkg").is_file()
+    plan = read_plan(ran / "field.gpkg")
+    assert plan.settings is not None
+    assert plan.settings.tracks.spacing_m == 6
+    with rasterio.open(ran / "map.png") as picture:
+        assert picture.width > 1000
+
+
+def test_json_goes_to_stdout_alone(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "out"
+    assert geofield("run", simulated_tif, *point(simulated), "--out", out, "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["tracks"]["tracks"] > 0
+
+
+def test_stage_by_stage_gives_the_same_plan(
+    ran: Path, simulated: SimulatedField, simulated_tif: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "stages.gpkg"
+    scene = tmp_path / "scene.tif"
+    where = point(simulated)
+    assert geofield("tiles", simulated_tif, *where, "-o", scene) == 0
+    assert geofield("field", scene, *where, "-o", file) == 0
+    assert geofield("obstacles", scene, file, "-o", file) == 0
+    assert geofield("tracks", file, "--spacing", 6, "-o", file) == 0
+    assert geofield("export", file, "--format", "geojson", "--out", tmp_path / "export") == 0
+    one, other = read_plan(ran / "field.gpkg"), read_plan(file)
+    assert one.tracks is not None
+    assert other.tracks is not None
+    assert one.field.polygon.equals(other.field.polygon)
+    assert one.obstacles is not None
+    assert other.obstacles is not None
+    assert one.obstacles.equals(other.obstacles)
+    assert one.tracks.segments.equals(other.tracks.segments)
+    exported = (tmp_path / "export/geojson/segments.geojson").read_bytes()
+    assert exported == (ran / "geojson/segments.geojson").read_bytes()
+
+
+def test_overwriting_keeps_a_persons_edits(
+    ran: Path, simulated: SimulatedField, simulated_tif: Path
+) -> None:
+    import geopandas as gpd
+
+    file = ran / "field.gpkg"
+    table = gpd.read_file(file, layer="obstacles")
+    table.loc[0, "status"] = "rejected"
+    table.to_file(file, layer="obstacles", driver="GPKG", geometry_name="geom")
+    run = ["run", simulated_tif, *point(simulated), "--spacing", 6, "--out", ran]
+    assert geofield(*run) == 1
+    assert geofield(*run, "--overwrite") == 0
+    kept = read_plan(file).obstacles
+    assert kept is not None
+    assert kept["status"].tolist().count("rejected") == 1
+    assert geofield(*run, "--overwrite", "--fresh") == 0
+    fresh = read_plan(file).obstacles
+    assert fresh is not None
+    assert set(fresh["status"]) == {"detected"}
+
+
+def fails(capsys: pytest.CaptureFixture[str], out: Path, *args: object, code: int = 1) -> str:
+    """Run the main job with wrong input; it must say why and write nothing."""
+    assert geofield("run", *args, "--out", out) == code
+    message = capsys.readouterr().err
+    assert "Traceback" not in message
+    assert not out.exists()
+    return message
+
+
+def test_wrong_points(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "out"
+    message = fails(capsys, out, simulated_tif, "--lat", 10, "--lon", 10)
+    assert "outside the picture" in message
+    message = fails(capsys, out, simulated_tif, "--lat", simulated.lon, "--lon", simulated.lat)
+    assert "swapped" in message
+    message = fails(capsys, out, simulated_tif, "--lat", 95, "--lon", 0, code=2)
+    assert "--lat" in message
+    fails(capsys, out, simulated_tif, "--lat", "nan", "--lon", 0, code=2)
+
+
+@pytest.mark.parametrize("spacing", ["0", "-2", "nan", "inf"])
+def test_wrong_spacing(
+    spacing: str,
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "out"
+    message = fails(capsys, out, simulated_tif, *point(simulated), "--spacing", spacing)
+    assert "spacing" in message
+
+
+def test_a_spacing_wider_than_the_field_is_said(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run = ["run", simulated_tif, *point(simulated), "--spacing", 5000, "--out", tmp_path / "out"]
+    code = geofield(*run)
+    assert "5000" in capsys.readouterr().err
+    assert code in (0, 1)
+
+
+def test_wrong_pictures(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out, where = tmp_path / "out", point(simulated)
+    assert "missing.tif" in fails(capsys, out, tmp_path / "missing.tif", *where)
+    text = tmp_path / "text.tif"
+    text.write_text("this is no picture")
+    assert "text.tif" in fails(capsys, out, text, *where)
+    cut = tmp_path / "cut.tif"
+    cut.write_bytes(simulated_tif.read_bytes()[:4000])
+    assert "cut.tif" in fails(capsys, out, cut, *where)
+    plain = tmp_path / "plain.tif"
+    with rasterio.open(simulated_tif) as source:
+        bands = source.read()
+    with rasterio.open(
+        plain,
+        "w",
+        driver="GTiff",
+        width=bands.shape[2],
+        height=bands.shape[1],
+        count=4,
+        dtype="uint8",
+    ) as target:
+        target.write(bands)
+    message = fails(capsys, out, plain, *where)
+    assert "coordinate reference system" in message or "CRS" in message
+
+
+def test_an_empty_scene_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grid = Grid(200, 200, Affine(0.6, 0, 500_000, 0, -0.6, 3_900_000), CRS.from_epsg(32636))
+    scene = Scene(
+        grid,
+        np.full((3, 200, 200), 128, np.uint8),
+        ("red", "green", "blue"),
+        np.ones((200, 200), bool),
+    )
+    gf.write_scene(scene, tmp_path / "empty.tif")
+    lon, lat = grid.centre_lonlat
+    code = geofield(
+        "run", tmp_path / "empty.tif", "--lat", lat, "--lon", lon, "--out", tmp_path / "out"
+    )
+    message = capsys.readouterr().err
+    if code == 0:
+        assert "check this outline" in message or "Note" in message
+    else:
+        assert code == 1
+        assert not (tmp_path / "out").exists()
+
+
+def test_output_folders(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    where = point(simulated)
+    occupied = tmp_path / "occupied"
+    occupied.mkdir()
+    (occupied / "diary.txt").write_text("mine")
+    assert geofield("run", simulated_tif, *where, "--out", occupied) == 1
+    assert "--overwrite" in capsys.readouterr().err
+    assert [path.name for path in occupied.iterdir()] == ["diary.txt"]
+    assert geofield("run", simulated_tif, *where, "--out", occupied, "--overwrite") == 0
+    assert (occupied / "diary.txt").read_text() == "mine"
+    assert geofield("run", simulated_tif, *where, "--out", simulated_tif) == 2
+
+
+def test_a_full_disk_leaves_nothing(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "map.png")
+
+    monkeypatch.setattr("PIL.Image.Image.save", full)
+    message = fails(capsys, tmp_path / "out", simulated_tif, *point(simulated))
+    assert "disk is full" in message
+
+
+def test_an_input_is_never_overwritten(
+    simulated: SimulatedField, simulated_tif: Path, tmp_path: Path
+) -> None:
+    picture = tmp_path / "scene.tif"
+    picture.write_bytes(simulated_tif.read_bytes())
+    before = picture.read_bytes()
+    run = ["run", picture, *point(simulated), "--out", tmp_path, "--overwrite"]
+    assert geofield(*run) == 1
+    assert picture.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.tif"]
+
+
+def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in COMMANDS:
+        assert geofield(name, "--help") == 0
+        text = capsys.readouterr().out
+        assert "Example" in text, name
+        assert f"geofield {name}" in text, name
+
+
+def test_a_mistyped_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
+    assert geofield("tracs") == 2
+    assert "'tracks'" in capsys.readouterr().err
+
+
+def test_light_imports() -> None:
+    heavy = "{'numpy', 'rasterio', 'geopandas', 'shapely', 'pydantic'}"
+    code = f"import sys, geofield.cli; sys.exit(bool({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_doctor_reports_versions(capsys: pytest.CaptureFixture[str]) -> None:
+    geofield("doctor", "--json")
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["native"]["GDAL of rasterio"]
+
+
+def test_simulate_writes_pictures_and_truth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    args = ["simulate", "--fields", 2, "--seed", 4, "--size", 160, "--obstacles", 3, "--out"]
+    assert geofield(*args, tmp_path / "sim", "--json") == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert len(rows) == 2
+    truth = read_plan(tmp_path / "sim" / rows[0]["truth"])
+    assert truth.obstacles is not None
+    assert len(truth.obstacles) == 3
+    assert (tmp_path / "sim" / "seeds.csv").is_file()
+    assert geofield(*args, tmp_path / "sim") == 1

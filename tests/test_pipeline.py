@@ -1,0 +1,234 @@
+"""The pipeline: one call or stage by stage, a person's edits kept, plans read back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+
+import geofield as gf
+from geofield.errors import OutputExistsError
+from geofield.model.review import complete_review
+from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
+from geofield.plan import Plan, read_plan
+from geofield.settings import Settings, load_settings
+from geofield.simulate import SimulatedField
+
+SETTINGS = load_settings(None, {"tracks": {"spacing_m": 6.0}, "obstacles": {"buffer_m": 1.5}})
+
+
+@pytest.fixture(scope="module")
+def plan(simulated: SimulatedField) -> Plan:
+    return plan_field(simulated.scene, lat=simulated.lat, lon=simulated.lon, settings=SETTINGS)
+
+
+@pytest.fixture
+def file(plan: Plan, tmp_path: Path) -> Path:
+    plan.write(tmp_path / "out", formats=["gpkg"])
+    return tmp_path / "out" / "field.gpkg"
+
+
+def edit(file: Path, layer: str, change: object) -> None:
+    """Change a layer of a GeoPackage as an editor would: other layers stay."""
+    table = gpd.read_file(file, layer=layer)
+    table = change(table)  # type: ignore[operator]
+    table.to_file(file, layer=layer, driver="GPKG", geometry_name="geom")
+
+
+def test_the_plan_fits_the_truth(plan: Plan, simulated: SimulatedField) -> None:
+    truth = simulated.field.polygon
+    union = plan.field.polygon.union(truth).area
+    assert plan.field.polygon.intersection(truth).area / union > 0.95
+    assert plan.obstacles is not None
+    found = shapely.points(plan.obstacles.geometry.centroid.get_coordinates().to_numpy())
+    for crown in simulated.obstacles.geometry:
+        assert min(shapely.distance(found, crown.centroid)) < 2.0
+    assert plan.tracks is not None
+    free = plan.field.polygon.difference(plan.obstacles.union_all().buffer(-0.05))
+    assert all(free.buffer(1e-6).covers(segment) for segment in plan.tracks.segments.geometry)
+
+
+def test_stage_by_stage_is_the_same(plan: Plan, simulated: SimulatedField) -> None:
+    scene = simulated.scene
+    staged = run_field(scene, lat=simulated.lat, lon=simulated.lon, settings=SETTINGS)
+    staged = run_obstacles(staged, scene, settings=SETTINGS)
+    staged = run_tracks(staged, settings=SETTINGS)
+    assert staged == plan
+
+
+def test_a_plan_is_read_back_equal(plan: Plan, file: Path) -> None:
+    again = read_plan(file)
+    assert again == plan
+    assert again.tracks is not None
+    assert plan.tracks is not None
+    assert again.tracks.points.equals(plan.tracks.points)
+    assert again.settings == SETTINGS
+    assert again != run_tracks(plan, settings=load_settings(None, {"tracks": {"spacing_m": 7.0}}))
+
+
+def test_a_rejected_obstacle_no_longer_blocks(plan: Plan, file: Path) -> None:
+    def reject(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        table.loc[table["obstacle_no"] == 1, "status"] = "rejected"
+        return table
+
+    edit(file, "obstacles", reject)
+    again = run_tracks(read_plan(file), settings=SETTINGS)
+    assert again.tracks is not None
+    assert plan.tracks is not None
+    assert (plan.tracks.gaps["obstacle_no"] == 1).any()
+    assert not (again.tracks.gaps["obstacle_no"] == 1).any()
+    assert len(again.tracks.lines) == len(plan.tracks.lines)
+
+
+def test_a_drawn_obstacle_is_avoided_as_drawn(plan: Plan, file: Path) -> None:
+    assert plan.obstacles is not None
+    taken = plan.obstacles.union_all().buffer(12)
+    spot = plan.field.polygon.buffer(-15).difference(taken).representative_point()
+    drawn = spot.buffer(7, cap_style="square")
+
+    def draw(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        row = gpd.GeoDataFrame(geometry=[drawn], crs=table.crs)
+        import pandas as pd
+
+        return pd.concat([table, row.rename_geometry(table.geometry.name)], ignore_index=True)
+
+    edit(file, "obstacles", draw)
+    again = run_tracks(read_plan(file), settings=SETTINGS)
+    assert again.obstacles is not None
+    added = again.obstacles[again.obstacles["status"] == "added"]
+    assert added["obstacle_no"].tolist() == [len(plan.obstacles) + 1]
+    assert added.geometry.iloc[0].equals(drawn)
+    assert again.tracks is not None
+    assert (again.tracks.gaps["obstacle_no"] == len(plan.obstacles) + 1).any()
+    hit = shapely.length(shapely.intersection(again.tracks.segments.geometry.to_numpy(), drawn))
+    assert hit.max() < 1e-6
+
+
+def test_a_persons_word_survives_detection(
+    plan: Plan, file: Path, simulated: SimulatedField
+) -> None:
+    def review(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        table.loc[table["obstacle_no"] == 1, "status"] = "rejected"
+        table.loc[table["obstacle_no"] == 2, "status"] = "confirmed"
+        return table
+
+    edit(file, "obstacles", review)
+    again = run_obstacles(read_plan(file), simulated.scene, settings=SETTINGS)
+    assert plan.obstacles is not None
+    assert again.obstacles is not None
+    assert len(again.obstacles) == len(plan.obstacles)
+    status = again.obstacles.set_index("obstacle_no")["status"]
+    assert status[1] == "rejected"
+    assert status[2] == "confirmed"
+    assert again.tracks is None
+
+
+def test_a_moved_outline_is_kept(file: Path, simulated: SimulatedField) -> None:
+    def move(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        table.geometry = table.geometry.buffer(-8)
+        return table
+
+    edit(file, "field", move)
+    edited = read_plan(file)
+    assert edited.outline_edited
+    tracks = run_tracks(edited, settings=SETTINGS)
+    assert tracks.field.method == "drawn"
+    assert tracks.tracks is not None
+    inside = edited.field.polygon.buffer(1e-6)
+    assert all(inside.covers(segment) for segment in tracks.tracks.segments.geometry)
+    # Running everything again keeps it too, and knows it as a person's from then on.
+    where = {"lat": simulated.lat, "lon": simulated.lon}
+    again = plan_field(simulated.scene, **where, settings=SETTINGS, previous=edited)
+    assert again.field.polygon.equals(edited.field.polygon)
+    assert again.field.method == "drawn"
+    third = plan_field(simulated.scene, **where, settings=SETTINGS, previous=again)
+    assert third.field.polygon.equals(edited.field.polygon)
+
+
+def test_incomplete_rows_become_added_obstacles(plan: Plan) -> None:
+    assert plan.obstacles is not None
+    table = plan.obstacles.copy()
+    table.loc[0, "obstacle_no"] = None
+    table.loc[1, "status"] = None
+    table.loc[2, "obstacle_no"] = table.loc[3, "obstacle_no"]
+    done = complete_review(table)
+    assert len(done) == len(table)
+    assert done["obstacle_no"].is_unique
+    assert done["obstacle_no"].notna().all()
+    assert done["status"].isin(["detected", "added"]).all()
+    assert (done["status"] == "added").sum() == 3
+
+
+def test_products_of_a_run(plan: Plan, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    files = plan.write(out, timings_s={"field": 0.1})
+    names = {path.relative_to(out).as_posix() for path in files}
+    assert {
+        "scene.tif",
+        "field.gpkg",
+        "field.qgz",
+        "map.png",
+        "report.json",
+        "obstacles.rdf",
+        "tracks.rdf",
+        "field.rdf",
+        "geojson/field.geojson",
+        "geojson/track_points.geojson",
+        "shapefile/boundary.shp",
+        "shapefile/obstacles.shp",
+        "shapefile/guidance.shp",
+    } <= names
+    assert all(path.stat().st_size > 0 for path in files)
+    report = json.loads((out / "report.json").read_text())
+    assert plan.tracks is not None
+    assert report["tracks"]["points"] == len(plan.tracks.points)
+    assert report["tracks"]["length_m"] == pytest.approx(
+        plan.tracks.segments["length_m"].sum(), abs=0.01
+    )
+    assert report["field"]["area_ha"] == pytest.approx(plan.field.polygon.area / 1e4, abs=1e-4)
+    with pytest.raises(OutputExistsError):
+        plan.write(out)
+    before = {path: path.read_bytes() for path in files if path.suffix not in (".json",)}
+    plan.write(out, overwrite=True)
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_failure_leaves_the_previous_products(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    files = plan.write(out, formats=["gpkg"])
+    before = {path: path.read_bytes() for path in files}
+
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("power cut")
+
+    monkeypatch.setattr("geofield.mapping.draw_map", fail)
+    with pytest.raises(RuntimeError, match="power cut"):
+        plan.write(out, formats=["gpkg"], overwrite=True)
+    assert {path: path.read_bytes() for path in before} == before
+    assert sorted(path.name for path in out.iterdir()) == sorted(path.name for path in files)
+
+
+def test_the_public_names_load() -> None:
+    for name in gf.__all__:
+        assert getattr(gf, name) is not None
+    assert callable(gf.plan_field)
+    with pytest.raises(AttributeError, match="no attribute"):
+        _ = gf.nothing  # type: ignore[attr-defined]
+
+
+def test_plans_differ_when_anything_differs(plan: Plan) -> None:
+    from dataclasses import replace
+
+    assert plan != "a plan"
+    assert replace(plan, grid=None) != plan
+    assert replace(plan, settings=Settings()) != plan
+    assert plan.obstacles is not None
+    moved = plan.obstacles.copy()
+    moved.loc[0, "confidence"] = np.nextafter(moved.loc[0, "confidence"], 2)
+    assert replace(plan, obstacles=moved) != plan
