@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +44,17 @@ def ran(simulated: SimulatedField, simulated_tif: Path, tmp_path: Path) -> Path:
     return out
 
 
-def test_the_main_job(ran: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_main_job(
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    ran = tmp_path / "out"
+    assert geofield("run", simulated_tif, *point(simulated), "--spacing", 6, "--out", ran) == 0
     output = capsys.readouterr()
     assert output.out == ""
     assert "map.png" in output.err
-    assert (ran / "field.gpkg").is_file()
     plan = read_plan(ran / "field.gpkg")
     assert plan.settings is not None
     assert plan.settings.tracks.spacing_m == 6
@@ -178,15 +185,18 @@ def test_wrong_pictures(
     plain = tmp_path / "plain.tif"
     with rasterio.open(simulated_tif) as source:
         bands = source.read()
-    with rasterio.open(
-        plain,
-        "w",
-        driver="GTiff",
-        width=bands.shape[2],
-        height=bands.shape[1],
-        count=4,
-        dtype="uint8",
-    ) as target:
+    with (
+        warnings.catch_warnings(action="ignore"),
+        rasterio.open(
+            plain,
+            "w",
+            driver="GTiff",
+            width=bands.shape[2],
+            height=bands.shape[1],
+            count=4,
+            dtype="uint8",
+        ) as target,
+    ):
         target.write(bands)
     message = fails(capsys, out, plain, *where)
     assert "coordinate reference system" in message or "CRS" in message

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import geopandas as gpd
 import numpy as np
+import pandas as pd
 import pytest
 import shapely
 
@@ -92,9 +93,7 @@ def test_a_drawn_obstacle_is_avoided_as_drawn(plan: Plan, file: Path) -> None:
 
     def draw(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         row = gpd.GeoDataFrame(geometry=[drawn], crs=table.crs)
-        import pandas as pd
-
-        return pd.concat([table, row.rename_geometry(table.geometry.name)], ignore_index=True)
+        return pd.concat([table, row], ignore_index=True)
 
     edit(file, "obstacles", draw)
     again = run_tracks(read_plan(file), settings=SETTINGS)
@@ -230,5 +229,5 @@ def test_plans_differ_when_anything_differs(plan: Plan) -> None:
     assert replace(plan, settings=Settings()) != plan
     assert plan.obstacles is not None
     moved = plan.obstacles.copy()
-    moved.loc[0, "confidence"] = np.nextafter(moved.loc[0, "confidence"], 2)
+    moved.loc[0, "radius_m"] = np.nextafter(moved.loc[0, "radius_m"], 99)
     assert replace(plan, obstacles=moved) != plan

@@ -13,8 +13,9 @@ from typing import Any
 
 from geofield import schema
 from geofield.crs import authority_name
-from geofield.formats import write_dataset
+from geofield.formats import format_named, write_dataset
 from geofield.formats.atomic import staged_folder
+from geofield.formats.export import dropped
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 
@@ -67,17 +68,26 @@ def write_products(
             write_scene(scene, staging / SCENE_FILE)
             written.append(staging / SCENE_FILE)
             dataset = replace(dataset, scene_path=staging / SCENE_FILE)
-        written += write_dataset(dataset, staging, formats, overwrite=True, options=options)
+        # What a format leaves out stands in the report: the GeoPackage beside it has all.
+        told = "gpkg" in formats
+        written += write_dataset(
+            dataset, staging, formats, overwrite=True, options=options, tell_drops=not told
+        )
         draw_map(dataset, scene).save(staging / MAP_FILE, optimize=False)
         report = json.dumps(
-            make_report(dataset, timings_s or {}), indent=2, ensure_ascii=False, allow_nan=False
+            make_report(dataset, timings_s or {}, formats),
+            indent=2,
+            ensure_ascii=False,
+            allow_nan=False,
         )
         (staging / REPORT_FILE).write_text(report + "\n", encoding="utf-8")
         written += [staging / MAP_FILE, staging / REPORT_FILE]
     return [folder / path.relative_to(staging) for path in written]
 
 
-def make_report(dataset: Dataset, timings_s: Mapping[str, float]) -> dict[str, Any]:
+def make_report(
+    dataset: Dataset, timings_s: Mapping[str, float], formats: Sequence[str] = ()
+) -> dict[str, Any]:
     """Counts, lengths, areas, timings, settings, versions and terms, as plain JSON values."""
     field = dataset.table(schema.FIELD.name).iloc[0]
     obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
@@ -103,6 +113,7 @@ def make_report(dataset: Dataset, timings_s: Mapping[str, float]) -> dict[str, A
             "points": int(tracks["point_count"].sum()),
             "length_m": _rounded(segments["length_m"].sum(), 3),
         },
+        "formats": {name: {"leaves_out": dropped(dataset, format_named(name))} for name in formats},
         "evidence": dict(provenance.evidence),
         "source": asdict(provenance.source),
         "settings": dict(provenance.settings),

@@ -6,6 +6,7 @@ section into click options with the same types, defaults and help.
 
 from __future__ import annotations
 
+import math
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -22,22 +23,29 @@ _UNITS = ("_m", "_deg", "_px", "_ha")
 _SEPARATOR = "__"
 
 
-class LatitudeType(click.FloatRange):
-    """A latitude in degrees."""
+class Degrees(click.FloatRange):
+    """An angle between plus and minus a limit; not a number is no angle."""
 
     name = "degrees"
 
     def __init__(self, limit: float) -> None:
         super().__init__(-limit, limit)
 
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The angle as a float."""
+        angle = super().convert(value, param, ctx)
+        if not math.isfinite(angle):
+            self.fail(f"{value!r} is not an angle.", param, ctx)
+        return angle
+
 
 def point_options(command: Command) -> Command:
     """Add ``--lat`` and ``--lon``, both required."""
     command = click.option(
-        "--lon", type=LatitudeType(180), required=True, help="Longitude of a point in the field."
+        "--lon", type=Degrees(180), required=True, help="Longitude of a point in the field."
     )(command)
     return click.option(
-        "--lat", type=LatitudeType(90), required=True, help="Latitude of a point in the field."
+        "--lat", type=Degrees(90), required=True, help="Latitude of a point in the field."
     )(command)
 
 

@@ -25,6 +25,7 @@ def write_dataset(
     overwrite: bool = False,
     options: Mapping[str, Any] | None = None,
     inputs: Iterable[Path | str] = (),
+    tell_drops: bool = True,
 ) -> list[Path]:
     """Write a dataset in one or more formats.
 
@@ -45,6 +46,8 @@ def write_dataset(
         Options of the writers (see `Format.options`); each writer gets those it knows.
     inputs : iterable of Path
         Files that were read for this dataset: they are never replaced.
+    tell_drops : bool
+        Warn of what a format cannot carry; False where the caller tells it another way.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def write_dataset(
             own = {key: value for key, value in given.items() if key in each.options}
             for path in write(dataset, staging, stem=stem, options=own):
                 written.append(target / path.relative_to(staging))
-    for each in chosen:
+    for each in chosen if tell_drops else ():
         words = dropped(dataset, each)
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
