@@ -16,6 +16,7 @@ from typing import Any
 from geofield import schema
 from geofield.formats import origin
 from geofield.formats.arrow import arrow_table, batches, gdal_config, write_layer
+from geofield.formats.qgis import add_project, add_styles, project_xml, qgz_bytes
 from geofield.model import Dataset
 
 #: GDAL 3.4 and QGIS 3.22 warn about 1.4.
@@ -68,14 +69,15 @@ CREATE TABLE gpkg_data_column_constraints (
 
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write ``{stem}.gpkg``.
+    """Write ``{stem}.gpkg`` and, over it, the QGIS project ``{stem}.qgz``.
 
-    The option ``points`` (default true) says whether the track points are written; they are
-    streamed.
+    Options: ``points`` (default true) says whether the track points are written, which are
+    streamed; ``project`` (default true) whether the ``.qgz`` is.
     """
     path = folder / f"{stem}.gpkg"
     with_points = bool(options.get("points", True))
-    with gdal_config(OGR_CURRENT_DATE=origin.timestamp(dataset)):
+    stamp = origin.timestamp(dataset)
+    with gdal_config(OGR_CURRENT_DATE=stamp):
         for layer in dataset.layers():
             if layer.name == schema.TRACK_POINTS.name:
                 chunks = dataset.point_chunks() if with_points else iter(())
@@ -99,7 +101,14 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     with closing(sqlite3.connect(path)) as connection, connection:
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
-    return [path]
+        add_styles(connection, dataset.layers(), stamp)
+        project = qgz_bytes(project_xml(dataset, path.name), stem, stamp)
+        add_project(connection, stem, project, stamp)
+    if not options.get("project", True):
+        return [path]
+    beside = path.with_suffix(".qgz")
+    beside.write_bytes(project)
+    return [path, beside]
 
 
 def _add_origin(connection: sqlite3.Connection, dataset: Dataset) -> None:

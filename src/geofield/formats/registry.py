@@ -121,14 +121,14 @@ _FORMATS = (
     Format(
         "gpkg",
         "GeoPackage 1.3",
-        ("{stem}.gpkg",),
+        ("{stem}.gpkg", "{stem}.qgz"),
         _ALL,
         "geofield.formats.gpkg:write",
         "geofield.formats.gpkg_read:read",
         suffixes=(".gpkg",),
         precision_m=0.0,
         crs="metric",
-        options=("points",),
+        options=("points", "project"),
     ),
     Format(
         "geojson",

@@ -1,0 +1,257 @@
+"""What each layer looks like: on a dark or light picture, at field and at region scale.
+
+Yellow is the field's edge, cyan where the machine drives, dashed where it does not, red what
+it must not touch; magenta is a person's own addition, grey a rejected detection. Doubtful
+detections are lighter and dashed, so that the eye goes there first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geofield.formats.qgis.symbols import Label, Rule, arrows, at_centre, fill, line, marker
+
+_NONE = "0,0,0,0"
+_BLACK = "0,0,0,190"
+_WHITE = "255,255,255,255"
+_DARK = "20,20,20,255"
+_FIELD = "255,214,10,255"
+_DRIVE = "0,229,255,255"
+_GAP = "255,120,0,255"
+_AVOID = "226,26,28,255"
+_ADDED = "230,0,190,255"
+
+#: Below this confidence a detection is drawn as doubtful.
+DOUBTFUL = 0.5
+#: Scale denominator from which a field is a name on the map, not a shape.
+REGION_SCALE = 30_000
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The picture of one layer.
+
+    Attributes
+    ----------
+    rules : tuple of Rule
+    labels : tuple of Label
+    max_scale : int
+        Scale denominator beyond which the layer is not drawn; 0 for always.
+    visible : bool
+        Whether the project shows it at first.
+    tip : str
+        First line of the map tip, HTML with QGIS expressions.
+    """
+
+    rules: tuple[Rule, ...]
+    labels: tuple[Label, ...] = ()
+    max_scale: int = 0
+    visible: bool = True
+    tip: str = ""
+
+
+def _is(status: str) -> str:
+    return f"\"status\" = '{status}'"
+
+
+_SURE = f'coalesce("confidence", 1) >= {DOUBTFUL}'
+_FIRST = "start_point(extend(geometry_n($geometry, 1), {0}, 0))"
+_LAST = "end_point(extend(geometry_n($geometry, num_geometries($geometry)), 0, {0}))"
+_END_OFFSET_M = 2.5
+
+LOOKS: dict[str, Look] = {
+    "field": Look(
+        (
+            Rule("Outline", "fill", (line(_BLACK, 1.3), line(_FIELD, 0.8)), max_scale=REGION_SCALE),
+            Rule(
+                "Field",
+                "fill",
+                (
+                    fill("255,214,10,110", _FIELD, 0.5),
+                    at_centre(marker("circle", _FIELD, _BLACK, 3)),
+                ),
+                min_scale=REGION_SCALE,
+            ),
+        ),
+        (
+            # Above the outline, where it hides neither tracks nor obstacles.
+            Label(
+                "\"name\" || '\\n' || format_number(\"area_ha\", 2) || ' ha'",
+                10,
+                _DARK,
+                "255,255,255,230",
+                geometry=(
+                    "make_point((x_min($geometry) + x_max($geometry)) / 2, "
+                    "y_max($geometry) + 0.06 * (y_max($geometry) - y_min($geometry)))"
+                ),
+                max_scale=REGION_SCALE,
+            ),
+            Label(
+                "\"name\" || ' (' || format_number(\"area_ha\", 1) || ' ha)'",
+                9,
+                _DARK,
+                "255,255,255,230",
+                geometry="point_on_surface($geometry)",
+                min_scale=REGION_SCALE,
+                above=True,
+            ),
+        ),
+        tip='<b>[% "name" %]</b><br>[% format_number("area_ha", 2) %] ha, '
+        '[% format_number("perimeter_m", 0) %] m around, imagery of [% "imagery_date" %]',
+    ),
+    "obstacles": Look(
+        (
+            Rule(
+                "Confirmed",
+                "fill",
+                (fill("226,26,28,150", _AVOID, 0.5),),
+                _is("confirmed"),
+            ),
+            Rule(
+                "Detected",
+                "fill",
+                (fill("226,26,28,60", _AVOID, 0.4),),
+                f"{_is('detected')} AND {_SURE}",
+            ),
+            Rule(
+                "Detected, doubtful",
+                "fill",
+                (fill("255,200,0,50", _NONE, 0), line("255,170,0,255", 0.5, dash="1.4;1")),
+                f"{_is('detected')} AND NOT {_SURE}",
+            ),
+            Rule(
+                "Added by a person",
+                "fill",
+                (fill("230,0,190,80", _ADDED, 0.5),),
+                f'{_is("added")} OR "status" IS NULL',
+            ),
+            Rule(
+                "Rejected by a person",
+                "fill",
+                (line("235,235,235,220", 0.3, dash="0.6;0.9"),),
+                _is("rejected"),
+            ),
+        ),
+        (
+            Label(
+                'to_string("obstacle_no")',
+                8,
+                _WHITE,
+                "120,0,0,230",
+                geometry="point_on_surface($geometry)",
+                filter='"status" IS NULL OR "status" <> \'rejected\'',
+                max_scale=2500,
+            ),
+        ),
+        max_scale=REGION_SCALE,
+        tip='<b>Obstacle [% "obstacle_no" %]</b>: [% "kind" %], [% "status" %]'
+        "[% if(\"confidence\" IS NULL, '', ', confidence ' || round(\"confidence\", 2)) %]"
+        "<br>[% if(\"radius_m\" IS NULL, '', 'radius ' || round(\"radius_m\", 1) || ' m + ') %]"
+        'margin [% round("buffer_m", 1) %] m',
+    ),
+    "tracks": Look(
+        (
+            Rule("Track", "line", (line(_DRIVE, 0.25),), min_scale=2500),
+            Rule(
+                "Track with direction",
+                "line",
+                (
+                    line("0,40,60,160", 0.6),
+                    line(_DRIVE, 0.35),
+                    arrows(_DRIVE, every_m=20, size_m=1.8),
+                ),
+                max_scale=2500,
+            ),
+        ),
+        (
+            Label(
+                'to_string("track_no")',
+                7,
+                "0,60,80,255",
+                "255,255,255,230",
+                geometry=_FIRST.format(_END_OFFSET_M),
+                max_scale=4000,
+            ),
+            Label(
+                'to_string("track_no")',
+                7,
+                "0,60,80,255",
+                "255,255,255,230",
+                geometry=_LAST.format(_END_OFFSET_M),
+                max_scale=4000,
+            ),
+        ),
+        max_scale=REGION_SCALE,
+        tip='<b>Track [% "track_no" %]</b>: [% round("length_m", 1) %] m, '
+        'heading [% round("heading_deg", 1) %]°<br>[% "segment_count" %] segments, '
+        '[% "gap_count" %] gaps',
+    ),
+    "segments": Look(
+        (Rule("Segment", "line", (line("120,255,120,255", 0.3),)),),
+        max_scale=REGION_SCALE,
+        visible=False,
+        tip='<b>Track [% "track_no" %], segment [% "segment_no" %]</b>: '
+        '[% round("length_m", 1) %] m',
+    ),
+    "gaps": Look(
+        (Rule("Gap", "line", (line(_GAP, 0.35, dash="1.2;1.2"),)),),
+        max_scale=5000,
+        tip='<b>Gap [% "gap_no" %] of track [% "track_no" %]</b>: [% "cause" %], '
+        '[% round("length_m", 1) %] m',
+    ),
+    "track_points": Look(
+        (Rule("Track point", "marker", (marker("circle", _WHITE, "0,60,80,255", 0.9),)),),
+        (
+            Label(
+                'to_string("point_no")',
+                6,
+                _DARK,
+                "255,255,255,200",
+                max_scale=120,
+            ),
+        ),
+        max_scale=500,
+        tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
+    ),
+    "headland": Look(
+        (Rule("Headland", "fill", (fill("255,214,10,40", "255,214,10,200", 0.25),)),),
+        max_scale=REGION_SCALE,
+        tip="<b>Headland</b>",
+    ),
+    "headland_tracks": Look(
+        (Rule("Headland track", "line", (line("150,255,170,255", 0.3),)),),
+        max_scale=REGION_SCALE,
+        tip="<b>Headland track</b>",
+    ),
+    "turns": Look(
+        (Rule("Turn", "line", (line("255,255,255,230", 0.3),)),),
+        max_scale=5000,
+        tip="<b>Turn</b>",
+    ),
+    "route": Look(
+        (
+            Rule(
+                "Route",
+                "line",
+                (line("255,255,255,200", 0.3), arrows(_WHITE, every_m=30, size_m=1.6)),
+            ),
+        ),
+        max_scale=REGION_SCALE,
+        visible=False,
+        tip="<b>Route</b>",
+    ),
+}
+
+#: From top to bottom in the project.
+ORDER = (
+    "obstacles",
+    "track_points",
+    "gaps",
+    "tracks",
+    "turns",
+    "route",
+    "headland_tracks",
+    "segments",
+    "headland",
+    "field",
+)
