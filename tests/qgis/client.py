@@ -82,7 +82,10 @@ def vector(uri):
     if layer.isValid():
         extent = layer.extent()
         facts["extent"] = [
-            extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
+            extent.xMinimum(),
+            extent.yMinimum(),
+            extent.xMaximum(),
+            extent.yMaximum(),
         ]
         facts["wkb"] = int(layer.wkbType())
     return facts
