@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import rasterio
 import shapely
 
 from geofield.errors import SettingsError
@@ -72,3 +75,16 @@ def test_without_near_infrared_there_are_three_bands() -> None:
 def test_impossible_settings_are_refused(settings: dict[str, object]) -> None:
     with pytest.raises(SettingsError):
         SimulationSettings(**settings)  # type: ignore[arg-type]
+
+
+def test_the_sample_data_come_from_their_seed(sample: Path) -> None:
+    settings = SimulationSettings(width_px=480, height_px=480)
+    for index, made in enumerate(simulate_fields(2, 5, settings), start=1):
+        with rasterio.open(sample / f"field_{index}.tif") as file:
+            assert np.array_equal(file.read(), made.scene.bands)
+            assert file.transform == made.scene.grid.transform
+        # The examples' point lies in both fields, on no crown.
+        x, y = made.scene.grid.from_lonlat(33.531142, 35.075373)
+        assert made.field.polygon_px(made.scene.grid).contains(shapely.Point(x, y))
+    total = sum(path.stat().st_size for path in sample.iterdir())
+    assert total < 2_000_000
