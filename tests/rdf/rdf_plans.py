@@ -53,9 +53,9 @@ def small_plan(
         crs,
     )
     lines = tracks.lines.copy()
-    lines["point_count"] = (
-        tracks.points.groupby("track_no").size().reindex(lines["track_no"]).to_numpy()
-    )
+    counts = tracks.points.groupby("track_no").size().reindex(lines["track_no"])
+    lines["point_count"] = counts.to_numpy(dtype="int64")
+    lines = schema.conform(schema.TRACKS, lines)
     return Dataset(
         {
             "field": field_table,

@@ -110,7 +110,8 @@ class StudyDescription(Description):
 
     def _obstacle_groups(self, frame: gpd.GeoDataFrame, types: tuple[str, ...]) -> Iterator[Group]:
         layer = layer_map(schema.OBSTACLES.name)
-        whole = feature_group(layer, frame, self.names, accuracy_m=self.accuracy_m)
+        inside = Property(GF + "inField", IRI, (constant(self.names.field, len(frame)),))
+        whole = feature_group(layer, frame, self.names, extra=[inside], accuracy_m=self.accuracy_m)
         study = {expand(name): column.name for column, name in layer.properties()}
         kept = [
             prop

@@ -1,0 +1,115 @@
+"""Complete: what another program's file leaves out and the rest of it tells."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, grid_north_deg, transformer
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+
+def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS) -> None:
+    """Fill gaps in the tables of a file in place; never change a value that is there.
+
+    Lengths, areas and positions come from the geometry, counts from the other tables,
+    segments from tracks that have none. An obstacle without a word on its status counts as
+    added by a person, so that no re-run drops it.
+    """
+    _field(tables["field"])
+    _obstacles(tables["obstacles"], crs)
+    _numbers(tables)
+    if len(tables["tracks"]) and not len(tables["segments"]):
+        tables["segments"] = _segments(tables["tracks"], crs)
+    _tracks(tables)
+    for name in ("tracks", "segments", "gaps"):
+        _fill(tables[name], "length_m", shapely.length(tables[name].geometry.to_numpy()))
+    _positions(tables["track_points"], crs)
+
+
+def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
+    if len(frame) and frame[column].isna().any():
+        missing = frame[column].isna()
+        frame.loc[missing, column] = np.asarray(values)[missing.to_numpy()]
+
+
+def _field(frame: gpd.GeoDataFrame) -> None:
+    shapes = frame.geometry.to_numpy()
+    _fill(frame, "area_ha", shapely.area(shapes) / 1e4)
+    if len(frame):
+        _fill(frame, "perimeter_m", shapely.length(shapely.get_exterior_ring(shapes)))
+
+
+def _obstacles(frame: gpd.GeoDataFrame, crs: CRS) -> None:
+    if not len(frame):
+        return
+    _fill(frame, "kind", np.full(len(frame), "other", dtype=object))
+    _fill(frame, "status", np.full(len(frame), "added", dtype=object))
+    _fill(frame, "buffer_m", np.zeros(len(frame)))
+    _fill(frame, "obstacle_no", _free_numbers(frame, "obstacle_no"))
+    _positions(frame, crs)
+
+
+def _free_numbers(frame: gpd.GeoDataFrame, column: str) -> object:
+    numbers = frame[column].to_numpy(dtype="float64", na_value=np.nan)
+    missing = np.isnan(numbers)
+    start = int(np.nanmax(numbers, initial=0)) + 1
+    result = np.zeros(len(frame), dtype=np.int64)
+    result[missing] = np.arange(start, start + int(missing.sum()))
+    return result
+
+
+def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
+    if not len(frame) or not (frame["lat"].isna() | frame["lon"].isna()).any():
+        return
+    centre = shapely.centroid(frame.geometry.to_numpy())
+    lon, lat = transformer(crs, LONLAT).transform(shapely.get_x(centre), shapely.get_y(centre))
+    _fill(frame, "lon", lon)
+    _fill(frame, "lat", lat)
+
+
+def _numbers(tables: dict[str, gpd.GeoDataFrame]) -> None:
+    for name, column in (("tracks", "track_no"), ("track_points", "point_no")):
+        _fill(tables[name], column, _free_numbers(tables[name], column))
+
+
+def _segments(tracks: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
+    """Each part of a track as a segment."""
+    parts, owner = shapely.get_parts(tracks.geometry.to_numpy(), return_index=True)
+    numbers = tracks["track_no"].to_numpy(dtype=np.int64)[owner]
+    first = np.r_[True, owner[1:] != owner[:-1]] if len(owner) else np.zeros(0, bool)
+    starts = np.maximum.accumulate(np.where(first, np.arange(len(owner)), 0))
+    return schema.table(
+        schema.SEGMENTS,
+        {"track_no": numbers, "segment_no": np.arange(len(owner)) - starts + 1},
+        parts,
+        crs,
+    )
+
+
+def _tracks(tables: dict[str, gpd.GeoDataFrame]) -> None:
+    tracks = tables["tracks"]
+    if not len(tracks):
+        return
+    number = tracks["track_no"]
+    for column, layer in (("segment_count", "segments"), ("gap_count", "gaps")):
+        counts = tables[layer].groupby("track_no").size()
+        _fill(tracks, column, counts.reindex(number, fill_value=0).to_numpy())
+    if len(tables["track_points"]):
+        counts = tables["track_points"].groupby("track_no").size()
+        _fill(tracks, "point_count", counts.reindex(number, fill_value=0).to_numpy())
+    if tracks["heading_deg"].isna().any():
+        crs = CRS(tracks.crs)
+        _fill(tracks, "heading_deg", [_heading(line, crs) for line in tracks.geometry])
+
+
+def _heading(line: shapely.Geometry, crs: CRS) -> float:
+    (x0, y0), *_, (x1, y1) = shapely.get_coordinates(line)
+    grid = np.degrees(np.arctan2(x1 - x0, y1 - y0))
+    return float((grid + grid_north_deg(crs, float(x0), float(y0))) % 360.0)

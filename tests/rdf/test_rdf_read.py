@@ -1,0 +1,212 @@
+"""Back from RDF to the same dataset, and files of other programs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rdf_plans import small_plan
+
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats.rdf import write
+from geofield.formats.rdf.parse import Graph, parse
+from geofield.formats.rdf.read import from_graph, read
+
+WRITERS = {
+    "xml": write.write_rdfxml,
+    "turtle": write.write_turtle,
+    "json-ld": write.write_jsonld,
+    "nt": write.write_ntriples,
+}
+
+
+def assert_same_tables(got, wanted):
+    """Every column and every coordinate identical, to the last bit."""
+    assert set(got.tables) == set(wanted.tables)
+    for name, table in wanted.tables.items():
+        other = got.tables[name]
+        pd.testing.assert_frame_equal(
+            pd.DataFrame(other.drop(columns="geometry")),
+            pd.DataFrame(table.drop(columns="geometry")),
+            check_exact=True,
+            obj=name,
+        )
+        same = shapely.equals_identical(other.geometry.to_numpy(), table.geometry.to_numpy())
+        assert same.all(), name
+
+
+@pytest.mark.parametrize("profile", write.PROFILES)
+@pytest.mark.parametrize("syntax", WRITERS)
+def test_a_plan_reads_back_whole(plan, tmp_path, profile, syntax):
+    paths = WRITERS[syntax](plan, tmp_path, options={"profile": profile})
+    for path in paths:
+        got = read(path)
+        assert_same_tables(got, plan)
+        assert got.crs == plan.crs
+        assert got.name == plan.name
+        assert got.grid == plan.grid
+        assert got.provenance == plan.provenance
+
+
+@pytest.mark.parametrize("crs", ["EPSG:25832", "EPSG:3044", "EPSG:32736", "EPSG:26910"])
+def test_utm_zones_of_any_datum_and_axis_order_read_back(tmp_path, crs):
+    # EPSG:3044 is ETRS89 / UTM 32N with the northing first: WKT must swap, tables must not.
+    plan = small_plan(crs=crs)
+    (path,) = write.write_turtle(plan, tmp_path, options={})
+    assert_same_tables(read(path), plan)
+
+
+def test_a_metric_crs_without_epsg_code_reads_back_to_less_than_a_micrometre(tmp_path):
+    plan = small_plan(crs="+proj=tmerc +lat_0=35 +lon_0=33.5 +x_0=548000 +y_0=3881000 +units=m")
+    (path,) = write.write_turtle(plan, tmp_path, options={})
+    assert "metricCrsWkt" in path.read_text()
+    got = read(path)
+    assert got.crs == plan.crs
+    for name, table in plan.tables.items():
+        difference = shapely.get_coordinates(
+            got.tables[name].geometry.to_numpy()
+        ) - shapely.get_coordinates(table.geometry.to_numpy())
+        assert np.abs(difference).max() < 1e-6, name
+
+
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    text=st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1).filter(str.strip),
+    radius=st.floats(0, 1e6, allow_subnormal=True),
+    confidence=st.one_of(st.just(np.nan), st.floats(0, 1)),
+    syntax=st.sampled_from(sorted(WRITERS)),
+)
+def test_any_text_and_number_reads_back(tmp_path, text, radius, confidence, syntax):
+    plan = small_plan(spacing_m=30)
+    plan.tables["field"].loc[0, ["name", "imagery", "method"]] = text
+    plan.tables["obstacles"].loc[0, "radius_m"] = radius
+    plan.tables["obstacles"].loc[1, "confidence"] = confidence
+    assert_same_tables(read(WRITERS[syntax](plan, tmp_path, options={})[0]), plan)
+
+
+def test_an_empty_plan_is_written_and_read(tmp_path):
+    plan = small_plan()
+    only_field = type(plan)({"field": plan.tables["field"]}, plan.crs, plan.name)
+    for writer in WRITERS.values():
+        path = writer(only_field, tmp_path, options={})[0]
+        got = read(path)
+        assert len(got.table("field")) == 1
+        assert not got.has("tracks")
+        assert not got.has("obstacles")
+
+
+def test_files_of_another_field_beside_are_left_alone(plan, tmp_path):
+    write.write_rdfxml(plan, tmp_path, options={})
+    other = small_plan()
+    other.tables["field"].loc[0, "field_id"] = "other"
+    (tmp_path / "b").mkdir()
+    write.write_rdfxml(other, tmp_path / "b", options={})
+    (tmp_path / "b" / "obstacles.rdf").replace(tmp_path / "obstacles.rdf")
+    with pytest.warns(FormatWarning, match=r"obstacles\.rdf is of another field"):
+        got = read(tmp_path / "field.rdf")
+    assert not got.has("obstacles")
+    assert got.has("tracks")
+
+
+OTHER_PLANNER = """
+@prefix geo: <http://www.opengis.net/ont/geosparql#> .
+@prefix gf: <https://w3id.org/geofield#> .
+@prefix my: <https://planner.example/> .
+
+my:f a gf:Field ; geo:hasDefaultGeometry my:fg .
+my:fg geo:asWKT
+  "POLYGON ((33.530 35.075, 33.532 35.075, 33.532 35.076, 33.530 35.076, 33.530 35.075))"^^geo:wktLiteral .
+my:tree a gf:Obstacle ; geo:hasGeometry my:og .
+my:og geo:asWKT '''<http://www.opengis.net/def/crs/EPSG/0/4326>
+  POLYGON ((35.0755 33.5310, 35.0756 33.5310, 35.0756 33.5311, 35.0755 33.5310))'''^^geo:wktLiteral .
+my:a a gf:Track ; gf:trackNo 1 ; geo:hasGeometry my:ag .
+my:ag geo:asWKT "LINESTRING (33.5301 35.0751, 33.5319 35.0751)"^^geo:wktLiteral .
+my:b a gf:Track ; gf:trackNo 2 ; geo:hasGeometry my:bg .
+my:bg geo:asWKT
+  "MULTILINESTRING ((33.5301 35.0753, 33.5305 35.0753), (33.5310 35.0753, 33.5319 35.0753))"^^geo:wktLiteral .
+"""
+
+
+def test_another_planners_sparse_file_loads(tmp_path):
+    path = tmp_path / "other.ttl"
+    path.write_text(OTHER_PLANNER)
+    got = read(path)
+    assert got.crs.to_epsg() == 32636
+    assert got.table("field")["area_ha"].iloc[0] == pytest.approx(2.02, abs=0.02)
+    assert got.table("tracks")["segment_count"].tolist() == [1, 2]
+    assert got.table("tracks")["length_m"].iloc[0] == pytest.approx(164.1, abs=0.3)
+    assert got.table("tracks")["heading_deg"].iloc[0] == pytest.approx(90.0, abs=0.01)
+    assert got.table("segments")[["track_no", "segment_no"]].values.tolist() == [
+        [1, 1],
+        [2, 1],
+        [2, 2],
+    ]
+    obstacle = got.table("obstacles").iloc[0]
+    assert (obstacle["obstacle_no"], obstacle["kind"], obstacle["status"]) == (1, "other", "added")
+    # EPSG:4326 is latitude first: the obstacle must lie in the field all the same.
+    assert got.table("field").geometry.iloc[0].contains(obstacle["geometry"])
+
+
+def test_two_planners_share_the_obstacles_and_merge(plan, tmp_path):
+    other = small_plan(spacing_m=12)
+    (mine,) = write.write_turtle(plan, tmp_path, stem="mine", options={})
+    (theirs,) = write.write_turtle(other, tmp_path, stem="theirs", options={"plan": "acme"})
+    merged = Graph()
+    merged.add(parse(mine))
+    before = set(merged.of_type("https://w3id.org/geofield#Obstacle"))
+    merged.add(parse(theirs))
+    assert set(merged.of_type("https://w3id.org/geofield#Obstacle")) == before
+    for node in merged.nodes.values():
+        # Nothing says two different things of one obstacle, track or geometry.
+        assert len(set(node.get("http://www.opengis.net/ont/geosparql#asWKT", ["-"]))) == 1
+        assert len(set(node.get("https://w3id.org/geofield#status", ["-"]))) == 1
+    assert_same_tables(from_graph(merged, plan="acme"), other)
+    with pytest.warns(FormatWarning, match="2 track plans"):
+        assert_same_tables(from_graph(merged), plan)
+    with pytest.raises(FormatError, match="no one track plan"):
+        from_graph(merged, plan="nobody")
+
+
+def test_the_study_alone_is_enough_for_obstacles(tmp_path):
+    # As the study prints a node, without a word of geofield's vocabulary but the radius.
+    path = tmp_path / "sample.rdf"
+    path.write_text(
+        """<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+ xmlns:o="http://www.DLC.org/Obstacle#" xmlns:w="http://www.w3.org/2003/01/geo/wgs84_pos#"
+ xmlns:gf="https://w3id.org/geofield#" xmlns:t="http://www.DLC.org/trajectory#"
+ xmlns:po="http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#"
+ xmlns:gml="http://www.opengis.net/gml/">
+<po:tree rdf:about="http://www.DLC.org/Obstacle#1"><o:no>1</o:no><w:lat>35.075575</w:lat>
+<w:long>33.530917</w:long><gf:radiusInMetres>1.03</gf:radiusInMetres></po:tree>
+<gml:point rdf:about="http://www.DLC.org/Trajectory#1"><t:no>1</t:no><t:track>1</t:track>
+<gml:lat>35.07558507</gml:lat><gml:long>33.53089255</gml:long></gml:point>
+</rdf:RDF>"""
+    )
+    got = read(path)
+    obstacle = got.table("obstacles").iloc[0]
+    assert obstacle["obstacle_no"] == 1
+    assert obstacle["geometry"].area == pytest.approx(np.pi * 1.03**2, rel=0.01)
+    point = got.table("track_points").iloc[0]
+    assert (point["point_no"], point["track_no"]) == (1, 1)
+    assert point["lat"] == 35.07558507
+
+
+def test_two_rows_of_one_number_are_refused(plan, tmp_path):
+    obstacles = plan.tables["obstacles"].copy()
+    obstacles.loc[1, "obstacle_no"] = 1
+    twice = type(plan)({**plan.tables, "obstacles": obstacles}, plan.crs, plan.name)
+    with pytest.raises(FormatError, match="two rows with obstacle_no 1"):
+        write.write_turtle(twice, tmp_path, options={})
+
+
+def test_an_infinite_number_is_refused(plan, tmp_path):
+    obstacles = plan.tables["obstacles"].copy()
+    obstacles.loc[1, "radius_m"] = np.inf
+    endless = type(plan)({**plan.tables, "obstacles": obstacles}, plan.crs, plan.name)
+    with pytest.raises(FormatError, match="radius_m is infinite"):
+        write.write_turtle(endless, tmp_path, options={})
