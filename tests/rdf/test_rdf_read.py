@@ -120,15 +120,19 @@ OTHER_PLANNER = """
 
 my:f a gf:Field ; geo:hasDefaultGeometry my:fg .
 my:fg geo:asWKT
-  "POLYGON ((33.530 35.075, 33.532 35.075, 33.532 35.076, 33.530 35.076, 33.530 35.075))"^^geo:wktLiteral .
+  "POLYGON ((33.530 35.075, 33.532 35.075, 33.532 35.076, 33.530 35.076, 33.530 35.075))"
+  ^^geo:wktLiteral .
 my:tree a gf:Obstacle ; geo:hasGeometry my:og .
 my:og geo:asWKT '''<http://www.opengis.net/def/crs/EPSG/0/4326>
-  POLYGON ((35.0755 33.5310, 35.0756 33.5310, 35.0756 33.5311, 35.0755 33.5310))'''^^geo:wktLiteral .
+  POLYGON ((35.0755 33.5310, 35.0756 33.5310, 35.0756 33.5311, 35.0755 33.5310))'''
+  ^^geo:wktLiteral .
 my:a a gf:Track ; gf:trackNo 1 ; geo:hasGeometry my:ag .
-my:ag geo:asWKT "LINESTRING (33.5301 35.0751, 33.5319 35.0751)"^^geo:wktLiteral .
+my:ag geo:asWKT "LINESTRING (33.5301 35.0751, 33.5319 35.0751)"
+  ^^geo:wktLiteral .
 my:b a gf:Track ; gf:trackNo 2 ; geo:hasGeometry my:bg .
 my:bg geo:asWKT
-  "MULTILINESTRING ((33.5301 35.0753, 33.5305 35.0753), (33.5310 35.0753, 33.5319 35.0753))"^^geo:wktLiteral .
+  "MULTILINESTRING ((33.5301 35.0753, 33.5305 35.0753), (33.5310 35.0753, 33.5319 35.0753))"
+  ^^geo:wktLiteral .
 """
 
 
