@@ -41,7 +41,7 @@ def assert_same_tables(got, wanted):
 @pytest.mark.parametrize("profile", write.PROFILES)
 @pytest.mark.parametrize("syntax", WRITERS)
 def test_a_plan_reads_back_whole(plan, tmp_path, profile, syntax):
-    paths = WRITERS[syntax](plan, tmp_path, options={"profile": profile})
+    paths = WRITERS[syntax](plan, tmp_path, options={"rdf_profile": profile})
     for path in paths:
         got = read(path)
         assert_same_tables(got, plan)
@@ -159,7 +159,7 @@ def test_another_planners_sparse_file_loads(tmp_path):
 def test_two_planners_share_the_obstacles_and_merge(plan, tmp_path):
     other = small_plan(spacing_m=12)
     (mine,) = write.write_turtle(plan, tmp_path, stem="mine", options={})
-    (theirs,) = write.write_turtle(other, tmp_path, stem="theirs", options={"plan": "acme"})
+    (theirs,) = write.write_turtle(other, tmp_path, stem="theirs", options={"plan_name": "acme"})
     merged = Graph()
     merged.add(parse(mine))
     before = set(merged.of_type("https://w3id.org/geofield#Obstacle"))

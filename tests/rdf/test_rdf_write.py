@@ -27,7 +27,7 @@ def triples(paths):
 
 @pytest.mark.parametrize("profile", write.PROFILES)
 def test_the_four_syntaxes_hold_the_same_triples_and_no_blank_node(plan, tmp_path, profile):
-    options = {"profile": profile, "base": BASE}
+    options = {"rdf_profile": profile, "base_iri": BASE}
     graphs = {
         name: triples(writer(plan, tmp_path, options=options)) for name, writer in WRITERS.items()
     }
@@ -44,7 +44,7 @@ def test_the_four_syntaxes_hold_the_same_triples_and_no_blank_node(plan, tmp_pat
 def test_rdflib_reads_the_same_graph(plan, tmp_path, syntax):
     def graph(name):
         result = rdflib.Graph()
-        for path in WRITERS[name](plan, tmp_path, options={"base": BASE}):
+        for path in WRITERS[name](plan, tmp_path, options={"base_iri": BASE}):
             result.parse(path, format=name)
         return result
 
@@ -61,7 +61,7 @@ def test_two_runs_write_the_same_bytes(tmp_path, writer):
 
 
 def test_the_base_names_every_feature(plan, tmp_path):
-    graph = triples(write.write_ntriples(plan, tmp_path, options={"base": BASE.rstrip("/")}))
+    graph = triples(write.write_ntriples(plan, tmp_path, options={"base_iri": BASE.rstrip("/")}))
     own = {str(t.subject.value) for t in graph}
     assert all(iri.startswith(BASE) for iri in own)
     assert f"{BASE}field/cy-1/track/7/geometry" in own
@@ -74,12 +74,12 @@ def test_the_base_names_every_feature(plan, tmp_path):
 )
 def test_a_base_that_cannot_name_features_is_refused(plan, tmp_path, base):
     with pytest.raises(FormatError, match="cannot name features"):
-        write.write_turtle(plan, tmp_path, options={"base": base})
+        write.write_turtle(plan, tmp_path, options={"base_iri": base})
 
 
 def test_an_unknown_profile_is_refused(plan, tmp_path):
     with pytest.raises(FormatError, match="Profiles: geosparql, study"):
-        write.write_turtle(plan, tmp_path, options={"profile": "other"})
+        write.write_turtle(plan, tmp_path, options={"rdf_profile": "other"})
 
 
 @pytest.mark.parametrize("name", ["a b/c#d?é", "..", 'x"<y>&{z}', "日本\n"])

@@ -116,6 +116,7 @@ def _load(reference: str) -> Any:
 
 
 _ALL = ("field", "obstacles", "tracks", "segments", "gaps", "track_points")
+_RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name")
 
 _FORMATS = (
     Format(
@@ -161,8 +162,65 @@ _FORMATS = (
         ("obstacles.rdf", "tracks.rdf", "field.rdf"),
         _ALL,
         "geofield.formats.rdf.write:write_rdfxml",
-        None,
-        suffixes=(".rdf", ".ttl", ".jsonld"),
+        "geofield.formats.rdf.read:read",
+        suffixes=(".rdf", ".owl"),
+        precision_m=0.0,
+        options=_RDF_OPTIONS,
+    ),
+    Format(
+        "turtle",
+        "Turtle linked data",
+        ("{stem}.ttl",),
+        _ALL,
+        "geofield.formats.rdf.write:write_turtle",
+        "geofield.formats.rdf.read:read",
+        suffixes=(".ttl",),
+        precision_m=0.0,
+        options=_RDF_OPTIONS,
+    ),
+    Format(
+        "jsonld",
+        "JSON-LD linked data",
+        ("{stem}.jsonld",),
+        _ALL,
+        "geofield.formats.rdf.write:write_jsonld",
+        "geofield.formats.rdf.read:read",
+        suffixes=(".jsonld",),
+        precision_m=0.0,
+        options=_RDF_OPTIONS,
+    ),
+    Format(
+        "ntriples",
+        "N-Triples linked data",
+        ("{stem}.nt",),
+        _ALL,
+        "geofield.formats.rdf.write:write_ntriples",
+        "geofield.formats.rdf.read:read",
+        suffixes=(".nt",),
+        precision_m=0.0,
+        options=_RDF_OPTIONS,
+    ),
+    Format(
+        "rdf-study",
+        "RDF/XML in the source study's vocabulary",
+        ("obstacles.rdf", "tracks.rdf", "field.rdf"),
+        _ALL,
+        "geofield.formats.rdf.write:write_study",
+        "geofield.formats.rdf.read:read",
+        precision_m=0.0,
+        options=("base_iri", "plan_name"),
+    ),
+    Format(
+        "study-xml",
+        "Plain XML of the source study",
+        ("obstacles.xml", "path.xml"),
+        ("obstacles", "track_points"),
+        "geofield.formats.rdf.study_xml:write_study_xml",
+        drops=(
+            Drop("settings and evidence", "provenance"),
+            Drop("the outlines of obstacles that are not round", "polygons"),
+            Drop("the confidence of obstacles", "obstacles.confidence"),
+        ),
     ),
 )
 

@@ -36,7 +36,7 @@ def write_rdfxml(
     stem : str
         Other than ``field``, it stands before the names: ``north_obstacles.rdf``.
     options : mapping
-        ``profile`` (``geosparql`` or ``study``), ``base`` (IRI) and ``plan`` (name of the
+        ``rdf_profile`` (``geosparql`` or ``study``), ``base_iri`` and ``plan_name`` (name of the
         track plan).
 
     Returns
@@ -58,7 +58,7 @@ def write_study(
     dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
 ) -> list[Path]:
     """RDF/XML in the study's vocabulary: :func:`write_rdfxml` with that profile."""
-    return write_rdfxml(dataset, folder, stem=stem, options={**options, "profile": "study"})
+    return write_rdfxml(dataset, folder, stem=stem, options={**options, "rdf_profile": "study"})
 
 
 def write_turtle(
@@ -97,11 +97,11 @@ def _write_one(
 
 def _description(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     kind = StudyDescription if _profile(options) == "study" else Description
-    return kind.of(dataset, base=options.get("base"), plan=str(options.get("plan") or ""))
+    return kind.of(dataset, base=options.get("base_iri"), plan=str(options.get("plan_name") or ""))
 
 
 def _profile(options: Mapping[str, Any]) -> str:
-    profile = str(options.get("profile") or PROFILES[0])
+    profile = str(options.get("rdf_profile") or PROFILES[0])
     if profile not in PROFILES:
         raise FormatError(
             f"There is no RDF profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
