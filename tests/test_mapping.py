@@ -1,0 +1,74 @@
+"""The map picture shows things where they are."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from geofield.mapping import OUTLINE, STATUS_COLOURS, draw_map
+from geofield.pipeline import run_tracks
+from geofield.plan import Plan
+from geofield.settings import load_settings
+from geofield.simulate import SimulatedField
+
+
+@pytest.fixture(scope="module")
+def plan(simulated: SimulatedField) -> Plan:
+    obstacles = simulated.obstacles.copy()
+    obstacles.loc[0, "status"] = "rejected"
+    plan = Plan(
+        simulated.field,
+        obstacles=obstacles,
+        source=simulated.scene.source,
+        grid=simulated.scene.grid,
+        scene=simulated.scene,
+    )
+    return run_tracks(plan, settings=load_settings(None, {"tracks": {"spacing_m": 8.0}}))
+
+
+def near(picture: Image.Image, x: float, y: float, colour: tuple[int, ...]) -> bool:
+    """Whether a colour occurs within three pixels of a place."""
+    pixels = np.asarray(picture)[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4].reshape(-1, 3)
+    return bool((np.abs(pixels.astype(int) - colour[:3]).max(axis=1) < 60).any())
+
+
+def test_outline_and_circles_lie_where_the_grid_says(plan: Plan, simulated: SimulatedField) -> None:
+    grid = simulated.scene.grid
+    scale = 1000 / grid.width_px
+    picture = draw_map(plan.to_dataset(), simulated.scene, long_side_px=1000)
+    assert picture.width == 1000
+    ring = np.array(simulated.field.polygon_px(grid).exterior.coords)
+    for a, b in itertools.pairwise(ring):
+        x, y = (a + b) / 2 * scale
+        assert near(picture, x, y, OUTLINE)
+    assert plan.obstacles is not None
+    hits = []
+    for row in plan.obstacles.itertuples():
+        colour = STATUS_COLOURS[row.status]
+        angles = np.radians(np.arange(0, 360, 10))
+        x = (row.x_px + row.radius_px * np.cos(angles)) * scale
+        y = (row.y_px + row.radius_px * np.sin(angles)) * scale
+        hits.append(np.mean([near(picture, *at, colour) for at in zip(x, y, strict=True)]))
+    # Rejected ones are dashed; all others closed.
+    assert hits[0] > 0.5
+    assert min(hits[1:]) > 0.9
+
+
+def test_the_map_is_the_same_twice_and_needs_no_picture(
+    plan: Plan, simulated: SimulatedField
+) -> None:
+    one = draw_map(plan.to_dataset(), simulated.scene, long_side_px=500)
+    two = draw_map(plan.to_dataset(), simulated.scene, long_side_px=500)
+    assert one.tobytes() == two.tobytes()
+    plain = draw_map(plan.to_dataset(), None, long_side_px=500)
+    assert min(plain.size) > 300
+    colours = np.asarray(plain).reshape(-1, 3)
+    assert (np.abs(colours.astype(int) - OUTLINE[:3]).max(axis=1) < 40).sum() > 200
+
+
+def test_a_field_alone_is_drawn_too(simulated: SimulatedField) -> None:
+    picture = draw_map(Plan(simulated.field).to_dataset(), long_side_px=400)
+    assert picture.mode == "RGB"
