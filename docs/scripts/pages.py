@@ -1,0 +1,293 @@
+"""The text of the generated pages, from the code that they describe."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+REPOSITORY_NOTE = "This page is generated from the code it describes."
+
+
+def generated_pages(root: Path) -> dict[str, str | bytes]:
+    """Path in the documentation to content."""
+    pages: dict[str, str | bytes] = {
+        "reference/cli.md": command_line(),
+        "reference/settings.md": settings(),
+        "reference/layers.md": layers(),
+        "reference/changes.md": changes(root / "CHANGES.md"),
+        "benchmarks.md": benchmarks(root / "benchmarks" / "results"),
+    }
+    return pages | notebooks(root / "notebooks")
+
+
+# --- command line
+
+
+def command_line() -> str:
+    """Every command with its arguments, options and examples."""
+    from geofield.cli.main import COMMANDS, cli
+
+    commands = {k: v for k, v in COMMANDS.items() if importlib.util.find_spec(v[0].partition(":")[0])}
+    context = click.Context(cli, info_name="geofield")
+    rows = [f"| [`{name}`](#geofield-{name}) | {text} |" for name, (_, text) in commands.items()]
+    lines = [
+        "# Command line",
+        "",
+        REPOSITORY_NOTE,
+        "",
+        "Exit codes: 0 done, 1 the work failed and a message says why, 2 wrong usage. Messages "
+        "and progress go to stderr, data (`--json`) to stdout. Angles and positions are named "
+        "options. Options that are also settings can stand in a TOML file or in the "
+        "environment: see [Settings](settings.md).",
+        "",
+        "| command | what it does |",
+        "| --- | --- |",
+        *rows,
+        "",
+    ]
+    for name in commands:
+        command = cli.get_command(context, name)
+        if command is not None:
+            lines += _command(command, f"geofield {name}", context)
+    return "\n".join(lines)
+
+
+def _command(command: click.Command, name: str, parent: click.Context, level: int = 2) -> list[str]:
+    context = click.Context(command, info_name=name.split()[-1], parent=parent)
+    usage = " ".join([name, *command.collect_usage_pieces(context)])
+    lines = [f"{'#' * level} {name}", "", f"```text\n{usage}\n```", ""]
+    lines += [_prose(command.help or ""), ""]
+    options = [
+        record
+        for each in command.get_params(context)
+        if (record := each.get_help_record(context)) is not None
+    ]
+    for flags, text in options:
+        lines += [f"`{flags}`", f":   {_cell(text) or 'No description.'}", ""]
+    if command.epilog:
+        lines += _epilog(command.epilog)
+    if isinstance(command, click.Group):
+        for sub in command.list_commands(context):
+            child = command.get_command(context, sub)
+            if child is not None:
+                lines += _command(child, f"{name} {sub}", context, level + 1)
+    return lines
+
+
+def _prose(text: str) -> str:
+    """Help as click shows it: paragraphs, and blocks that keep their lines."""
+    paragraphs = []
+    for part in re.split(r"\n\s*\n", text.strip()):
+        if part.strip().startswith("\b"):
+            body = part.replace("\b", "").strip("\n")
+            paragraphs.append(f"```text\n{body}\n```")
+        else:
+            paragraphs.append(_cell(" ".join(part.split())))
+    return "\n\n".join(paragraphs)
+
+
+def _epilog(text: str) -> list[str]:
+    lines = text.replace("\b", "").strip().splitlines()
+    title = lines[0].strip().rstrip(":")
+    body = [line.removeprefix("  ") for line in lines[1:]]
+    return [f"**{title}**", "", "```bash", *body, "```", ""]
+
+
+def _cell(text: str) -> str:
+    """Text that Markdown must not read as links or HTML."""
+    text = " ".join(text.split())
+    return text.replace("<", "&lt;").replace("[", "&#91;").replace("|", "&#124;")
+
+
+# --- settings
+
+
+def settings() -> str:
+    """Every setting with its option, environment variable, default and meaning."""
+    from geofield.settings import SECTIONS, Settings
+
+    lines = [
+        "# Settings",
+        "",
+        REPOSITORY_NOTE,
+        "",
+        "A setting can stand in a TOML file (`--settings FILE`, or `geofield.toml` in the "
+        "working folder), in the environment, or on the command line; the later one wins. "
+        "The settings of a run travel in its GeoPackage and in `report.json`.",
+        "",
+        "```toml",
+        "[tracks]",
+        "spacing_m = 3.0",
+        "",
+        "[obstacles]",
+        "buffer_m = 1.5",
+        "```",
+        "",
+        "The same in the environment: `GEOFIELD_TRACKS__SPACING_M=3`.",
+        "",
+    ]
+    for section in SECTIONS:
+        model: Any = Settings.model_fields[section].annotation
+        lines += [f"## {section}", "", _cell((model.__doc__ or "").strip()), ""]
+        for name, field in model.model_fields.items():
+            default = field.get_default()
+            shown = "not set" if default is None else json.dumps(default)
+            lines += [
+                f"`{section}.{name}`",
+                f":   {_cell(field.description or '')} Default: `{shown}`.",
+                "",
+            ]
+    return "\n".join(lines)
+
+
+# --- layers
+
+
+def layers() -> str:
+    """Every layer with its columns, as written to files."""
+    from geofield import schema
+
+    lines = [
+        "# Layers and columns",
+        "",
+        REPOSITORY_NOTE,
+        "",
+        "Lengths, radii and areas are true ground measures in the field's UTM zone. Headings "
+        "are degrees clockwise from true north. `x_px`, `y_px` have their origin at the corner "
+        "of the picture's top-left pixel, whose centre is (0.5, 0.5). Times are UTC.",
+        "",
+    ]
+    for layer in schema.LAYERS:
+        key = ", ".join(f"`{name}`" for name in layer.key)
+        note = " Written only when the plan has it." if layer.optional else ""
+        lines += [
+            f"## {layer.name}",
+            "",
+            f"{layer.description} Geometry: {layer.geometry}. Key: {key}.{note}",
+            "",
+            "| column | type | unit | meaning | in a Shapefile |",
+            "| --- | --- | --- | --- | --- |",
+        ]
+        for column in layer.columns:
+            meaning = column.title
+            if column.values:
+                meaning += ": " + ", ".join(f"`{value}`" for value in column.values)
+            lines.append(
+                f"| `{column.name}` | {column.type} | {column.unit} | {meaning} "
+                f"| `{column.shapefile}` |"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+# --- changes, benchmarks
+
+
+def changes(path: Path) -> str:
+    """The list of changes as a page."""
+    return path.read_text(encoding="utf-8")
+
+
+def benchmarks(results: Path) -> str:
+    """All measured pages under one heading."""
+    lines = [
+        "# Benchmarks",
+        "",
+        "Every figure is measured side by side with its peers in one run on one machine; times "
+        "are medians. Compare ratios, not seconds: another machine gives other seconds. "
+        "Measure them yourself with `make bench`, or one page with "
+        "`python benchmarks/NAME.py`.",
+        "",
+    ]
+    for path in sorted(results.glob("*.md")):
+        if path.stem == "all":
+            continue
+        text = path.read_text(encoding="utf-8").strip()
+        # One level down, outside fenced code.
+        fenced = False
+        for line in text.splitlines():
+            fenced ^= line.startswith("```")
+            lines.append("#" + line if line.startswith("#") and not fenced else line)
+        lines += ["", f"Measured by `benchmarks/{path.stem}.py`.", ""]
+    return "\n".join(lines)
+
+
+# --- notebooks
+
+
+def notebooks(folder: Path) -> dict[str, str | bytes]:
+    """A page per notebook with its code, texts and pictures, and one that lists them."""
+    import nbformat
+
+    pages: dict[str, str | bytes] = {}
+    lines = [
+        "# Notebooks",
+        "",
+        "Short stories with pictures. Each is a Jupyter notebook of the repository's "
+        "`notebooks/` folder, run again by the tests; its outputs are shown as they were "
+        "when it was last run.",
+        "",
+    ]
+    for path in sorted(folder.glob("*.ipynb")):
+        notebook = nbformat.read(path, as_version=4)
+        title, text, files = _notebook(path.stem, notebook)
+        summary = _first_paragraph(notebook)
+        lines += [f"**[{title}](notebooks/{path.stem}.md)**  ", f"{summary}", ""]
+        pages[f"notebooks/{path.stem}.md"] = text
+        pages |= {f"notebooks/{name}": content for name, content in files.items()}
+    pages["notebooks.md"] = "\n".join(lines)
+    return pages
+
+
+def _first_paragraph(notebook: Any) -> str:
+    for part in notebook.cells[0].source.split("\n\n")[1:]:
+        return " ".join(part.split())
+    return ""
+
+
+def _notebook(stem: str, notebook: Any) -> tuple[str, str, dict[str, bytes]]:
+    title = notebook.cells[0].source.splitlines()[0].lstrip("# ").strip()
+    files: dict[str, bytes] = {}
+    lines: list[str] = []
+    for index, cell in enumerate(notebook.cells):
+        if cell.cell_type == "markdown":
+            lines += [cell.source, ""]
+            if index == 0:
+                lines += [f"The notebook itself: `notebooks/{stem}.ipynb`.", ""]
+            continue
+        if "hide" in cell.metadata.get("tags", []):
+            lines += ['??? note "The code of this step"', ""]
+            lines += [f"    {line}".rstrip() for line in _fence(cell.source, "python")] + [""]
+        else:
+            lines += [*_fence(cell.source, "python"), ""]
+        for number, output in enumerate(cell.get("outputs", [])):
+            lines += list(_output(output, f"{stem}_{index}_{number}", files))
+    return title, "\n".join(lines), files
+
+
+def _output(output: Any, name: str, files: dict[str, bytes]) -> Iterator[str]:
+    if output.output_type == "stream":
+        yield from [*_fence(output.text.rstrip(), "text"), ""]
+        return
+    data = output.get("data", {})
+    for kind, ending in (("image/png", "png"), ("image/jpeg", "jpg")):
+        if kind in data:
+            files[f"{name}.{ending}"] = base64.b64decode(data[kind])
+            yield from [f"![Output of the step above]({name}.{ending})", ""]
+            return
+    if "text/markdown" in data:
+        yield from [data["text/markdown"], ""]
+    elif "text/plain" in data:
+        yield from [*_fence(data["text/plain"], "text"), ""]
+
+
+def _fence(text: str, language: str) -> list[str]:
+    mark = "```" if "```" not in text else "~~~~"
+    return [f"{mark}{language}", *text.splitlines(), mark]

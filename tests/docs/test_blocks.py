@@ -1,0 +1,58 @@
+"""Every code block of the documentation runs and prints what the page says."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs" / "scripts"))
+
+import blocks  # noqa: E402
+
+PAGES = blocks.pages()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    shared = None
+    if "../shared" in page.read_text(encoding="utf-8"):
+        shared = request.getfixturevalue("shared")
+    assert blocks.run_page(page, tmp_path, shared) > 0
+
+
+def test_a_wrong_output_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blocks, "ROOT", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text('```python\nprint(1 + 1)\n```\n\n```text title="Output"\n3\n```\n')
+    with pytest.raises(blocks.BlockError, match="line 1 prints"):
+        blocks.run_page(page, tmp_path / "a")
+    blocks.run_page(page, tmp_path / "b", update=True)
+    assert page.read_text().endswith('title="Output"\n2\n```\n')
+    blocks.run_page(page, tmp_path / "c")
+
+
+def test_a_failing_command_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blocks, "ROOT", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text("```bash\nfalse | cat\n```\n")
+    with pytest.raises(blocks.BlockError, match="ends with 1"):
+        blocks.run_page(page, tmp_path / "a")
+
+
+@pytest.mark.parametrize(
+    ("title", "want", "got", "same"),
+    [
+        ("Output", "12 trees", "12 trees\n", True),
+        ("Output", "12 trees", "13 trees\n", False),
+        ("Output", "... trees", "13 trees\n", True),
+        ("For example", "12.5 m in 3 s", "11.25 m in 4 s\n", True),
+        ("For example", "12.5 m in 3 s", "11.25 km in 4 s\n", False),
+    ],
+)
+def test_agreement(title: str, want: str, got: str, same: bool) -> None:
+    block = blocks.Block("text", title, want, 0, 0, 1)
+    assert blocks.agrees(block, got) is same
