@@ -13,7 +13,7 @@ SAMPLE := sample_data/field_1.tif --lat 35.075373 --lon 33.531142
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test check pytest format lock bench docs clean
+.PHONY: help demo test check pytest format lock bench docs notebooks pictures clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
@@ -36,6 +36,18 @@ pytest: $(VENV)/dev.stamp
 format: $(VENV)/dev.stamp  ## format the code and mend what ruff can mend
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+docs: $(VENV)/dev.stamp  ## build the documentation into site/, warnings as errors
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+notebooks: $(VENV)/dev.stamp  ## run the notebooks again and keep their outputs
+	$(BIN)/python docs/scripts/run_notebooks.py
+
+pictures: $(VENV)/dev.stamp  ## draw the documentation's pictures again
+	$(BIN)/python docs/scripts/make_pictures.py
+
+bench: $(VENV)/dev.stamp  ## run all benchmarks beside their peers; writes benchmarks/results
+	$(BIN)/python benchmarks/all.py
 
 lock:  ## refresh the locked dependencies from pyproject.toml (needs uv)
 	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \

@@ -106,9 +106,7 @@ def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
     return work, environment
 
 
-def run_page(
-    path: Path, folder: Path, shared: Path | None = None, *, update: bool = False
-) -> int:
+def run_page(path: Path, folder: Path, shared: Path | None = None, *, update: bool = False) -> int:
     """Run a page's blocks; the number of blocks run.
 
     Raises
@@ -158,7 +156,7 @@ def agrees(block: Block, printed: str) -> bool:
 def _run_python(block: Block, work: Path, namespace: dict[str, object], where: str) -> str:
     printed = io.StringIO()
     # Blank lines put the code at its line of the page, for a traceback that leads there.
-    code = compile("\n" * block.line + block.body, where.split(",")[0], "exec")
+    code = compile("\n" * block.line + block.body, where.split(",", maxsplit=1)[0], "exec")
     with contextlib.chdir(work), contextlib.redirect_stdout(printed):
         exec(code, namespace)  # noqa: S102 - the project's own documentation
     return printed.getvalue()

@@ -34,7 +34,11 @@ def command_line() -> str:
     """Every command with its arguments, options and examples."""
     from geofield.cli.main import COMMANDS, cli
 
-    commands = {k: v for k, v in COMMANDS.items() if importlib.util.find_spec(v[0].partition(":")[0])}
+    commands = {
+        name: home
+        for name, home in COMMANDS.items()
+        if importlib.util.find_spec(home[0].partition(":")[0])
+    }
     context = click.Context(cli, info_name="geofield")
     rows = [f"| [`{name}`](#geofield-{name}) | {text} |" for name, (_, text) in commands.items()]
     lines = [
@@ -60,7 +64,7 @@ def command_line() -> str:
 
 
 def _command(command: click.Command, name: str, parent: click.Context, level: int = 2) -> list[str]:
-    context = click.Context(command, info_name=name.split()[-1], parent=parent)
+    context = click.Context(command, info_name=name.rsplit(maxsplit=1)[-1], parent=parent)
     usage = " ".join([name, *command.collect_usage_pieces(context)])
     lines = [f"{'#' * level} {name}", "", f"```text\n{usage}\n```", ""]
     lines += [_prose(command.help or ""), ""]
