@@ -6,6 +6,7 @@ import json
 import math
 import platform
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from importlib import metadata
 from pathlib import Path
@@ -58,9 +59,10 @@ def write_products(
     list of Path
         In the order written.
     """
-    from geofield.mapping import draw_map
-
-    with staged_folder(folder, overwrite=overwrite, inputs=inputs) as staging:
+    with (
+        staged_folder(folder, overwrite=overwrite, inputs=inputs) as staging,
+        ThreadPoolExecutor(max_workers=1) as beside,
+    ):
         written: list[Path] = []
         if scene is not None:
             from geofield.imagery import write_scene
@@ -68,12 +70,14 @@ def write_products(
             write_scene(scene, staging / SCENE_FILE)
             written.append(staging / SCENE_FILE)
             dataset = replace(dataset, scene_path=staging / SCENE_FILE)
+        # Compressing the map takes as long as several formats, and holds no lock.
+        map_picture = beside.submit(_draw, dataset, scene, staging / MAP_FILE)
         # What a format leaves out stands in the report: the GeoPackage beside it has all.
         told = "gpkg" in formats
         written += write_dataset(
             dataset, staging, formats, overwrite=True, options=options, tell_drops=not told
         )
-        draw_map(dataset, scene).save(staging / MAP_FILE, optimize=False)
+        map_picture.result()
         report = json.dumps(
             make_report(dataset, timings_s or {}, formats),
             indent=2,
@@ -83,6 +87,12 @@ def write_products(
         (staging / REPORT_FILE).write_text(report + "\n", encoding="utf-8")
         written += [staging / MAP_FILE, staging / REPORT_FILE]
     return [folder / path.relative_to(staging) for path in written]
+
+
+def _draw(dataset: Dataset, scene: Scene | None, path: Path) -> None:
+    from geofield.mapping import draw_map
+
+    draw_map(dataset, scene).save(path)
 
 
 def make_report(
