@@ -68,6 +68,23 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     return frame
 
 
+def layer_names(path: Path) -> list[str]:
+    """The layers of a file, in order.
+
+    Raises
+    ------
+    FormatError
+        When GDAL cannot open it.
+    """
+    import pyogrio
+    from pyogrio.errors import DataSourceError
+
+    try:
+        return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+    except DataSourceError as error:
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
+
+
 def read_foreign(
     layers: list[RawLayer], path: Path, *, crs: CRS | None = None, name: str | None = None
 ) -> Dataset:

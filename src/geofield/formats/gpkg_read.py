@@ -13,7 +13,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
-from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -79,23 +79,6 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
         )
         frame = frame[~absent]
     return schema.conform(of, frame, extras=True)
-
-
-def layer_names(path: Path) -> list[str]:
-    """The layers of a file, in order.
-
-    Raises
-    ------
-    FormatError
-        When GDAL cannot open it.
-    """
-    import pyogrio
-    from pyogrio.errors import DataSourceError
-
-    try:
-        return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
-    except DataSourceError as error:
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
 
 
 def _origin(path: Path) -> origin.Origin | None:

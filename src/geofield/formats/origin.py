@@ -106,6 +106,21 @@ def from_json(text: str) -> Origin:
         raise FormatError(f"The record of the file's origin is damaged: {error!r}.") from error
 
 
+def restored(dataset: Dataset, record: Origin | None) -> Dataset:
+    """A dataset read from tables with the origin that stood beside them.
+
+    The grid comes back only where the coordinates are still those it was made for.
+    """
+    if record is None:
+        return dataset
+    return dataclasses.replace(
+        dataset,
+        name=record.name,
+        provenance=record.provenance,
+        grid=record.grid if record.crs == dataset.crs else None,
+    )
+
+
 def lineage(dataset: Dataset) -> str:
     """One line for people: the picture, its date, licence and attribution, the software."""
     source = dataset.provenance.source

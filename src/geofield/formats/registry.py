@@ -118,6 +118,11 @@ def _load(reference: str) -> Any:
 _ALL = ("field", "obstacles", "tracks", "segments", "gaps", "track_points")
 _RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name")
 
+_TERMINAL_DROPS = (
+    Drop("rejected obstacles and the status, radius and confidence of the others", "obstacles"),
+    Drop("settings and evidence", "provenance"),
+)
+
 _FORMATS = (
     Format(
         "gpkg",
@@ -155,6 +160,120 @@ _FORMATS = (
         precision_m=1e-6,
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
+    ),
+    Format(
+        "geoparquet",
+        "GeoParquet 1.1",
+        tuple(f"geoparquet/{name}.parquet" for name in _ALL),
+        _ALL,
+        "geofield.formats.geoparquet:write",
+        "geofield.formats.geoparquet:read",
+        suffixes=(".parquet",),
+        precision_m=0.0,
+        crs="metric",
+    ),
+    Format(
+        "flatgeobuf",
+        "FlatGeobuf",
+        tuple(f"flatgeobuf/{name}.fgb" for name in _ALL),
+        _ALL,
+        "geofield.formats.flatgeobuf:write",
+        "geofield.formats.flatgeobuf:read",
+        suffixes=(".fgb",),
+        drops=(Drop("settings and evidence", "provenance"),),
+        precision_m=0.0,
+        crs="metric",
+    ),
+    Format(
+        "kml",
+        "KML 2.2",
+        ("{stem}.kml",),
+        ("field", "obstacles", "tracks", "gaps"),
+        "geofield.formats.kml:write",
+        "geofield.formats.kml:read",
+        suffixes=(".kml", ".kmz"),
+        drops=(Drop("settings and evidence", "provenance"),),
+        precision_m=0.0002,
+    ),
+    Format(
+        "gpx",
+        "GPX 1.1",
+        ("{stem}.gpx",),
+        ("tracks",),
+        "geofield.formats.gpx:write",
+        suffixes=(".gpx",),
+        drops=(
+            Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
+            Drop("settings and evidence", "provenance"),
+        ),
+    ),
+    Format(
+        "csv",
+        "CSV of track points and obstacles",
+        ("csv/track_points.csv", "csv/obstacles.csv"),
+        ("track_points", "obstacles"),
+        "geofield.formats.tables_csv:write",
+        drops=(Drop("settings and evidence", "provenance"),),
+    ),
+    Format(
+        "fiboa",
+        "fiboa 0.3.0 (GeoJSON and GeoParquet)",
+        ("fiboa/{stem}.geojson", "fiboa/{stem}.parquet"),
+        ("field",),
+        "geofield.formats.fiboa:write",
+        drops=(Drop("settings and evidence", "provenance"),),
+    ),
+    Format(
+        "dxf",
+        "DXF of lines",
+        ("{stem}.dxf", "{stem}.prj"),
+        ("field", "obstacles", "segments", "gaps"),
+        "geofield.formats.dxf:write",
+        suffixes=(".dxf",),
+        drops=(
+            Drop("names, numbers and statuses", "field"),
+            Drop("settings and evidence", "provenance"),
+        ),
+        crs="metric",
+    ),
+    Format(
+        "isoxml",
+        "ISOXML version 4 (ISO 11783-10)",
+        ("isoxml/TASKDATA/TASKDATA.XML",),
+        ("field", "obstacles", "segments", "headland"),
+        "geofield.formats.isoxml:write_v4",
+        "geofield.formats.isoxml:read",
+        drops=_TERMINAL_DROPS,
+        precision_m=0.0002,
+        options=("customer", "farm"),
+    ),
+    Format(
+        "isoxml-v3",
+        "ISOXML version 3 (ISO 11783-10)",
+        ("isoxml-v3/TASKDATA/TASKDATA.XML",),
+        ("field", "obstacles", "segments"),
+        "geofield.formats.isoxml:write_v3",
+        "geofield.formats.isoxml:read",
+        drops=_TERMINAL_DROPS,
+        precision_m=0.0002,
+        options=("customer", "farm"),
+    ),
+    Format(
+        "agopengps",
+        "AgOpenGPS field folder",
+        tuple(
+            f"agopengps/Fields/<name>/{file}.txt"
+            for file in ("Field", "Boundary", "TrackLines", "Flags")
+        ),
+        ("field", "obstacles", "tracks"),
+        "geofield.formats.agopengps:write",
+        "geofield.formats.agopengps:read",
+        drops=(
+            Drop("the breaks in tracks (it has whole lines)", "gaps"),
+            Drop("holes in obstacles", "polygons"),
+            *_TERMINAL_DROPS,
+        ),
+        precision_m=0.005,
     ),
     Format(
         "rdf",

@@ -1,0 +1,144 @@
+"""Reading the folder of a field from AgOpenGPS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import geopandas as gpd
+import numpy as np
+import shapely
+
+from geofield.crs import LONLAT
+from geofield.errors import FormatError
+from geofield.formats.agopengps.plane import LocalPlane
+from geofield.formats.foreign import RawLayer, read_foreign
+from geofield.model import Dataset
+
+#: Vertices that lie so near the line between their neighbours came from densifying, metres.
+COLLINEAR_M = 0.002
+_CURVE = 4
+
+
+def read(path: Path) -> Dataset:
+    """The field in a folder of AgOpenGPS, or in the folder of one of its files.
+
+    The first ring is the field, rings in it are obstacles: the program has no other word for
+    them.
+
+    Raises
+    ------
+    FormatError
+        When a file is missing or does not follow the format.
+    """
+    folder = field_folder(path)
+    plane = _plane(folder)
+    layers = []
+    rings = [_lonlat_polygon(ring, plane) for ring in _rings(folder)]
+    if rings:
+        layers.append(_layer("boundary", [{"name": folder.name, "geometry": rings[0]}]))
+    if rings[1:]:
+        layers.append(_layer("obstacles", [{"geometry": ring} for ring in rings[1:]]))
+    lines = [
+        {"name": name, "geometry": shapely.LineString(plane.to_lonlat(*points.T))}
+        for name, points in _lines(folder)
+    ]
+    if lines:
+        layers.append(_layer("guidance", lines))
+    return read_foreign(layers, folder, name=folder.name)
+
+
+def field_folder(path: Path) -> Path:
+    """The folder that holds ``Field.txt``: the path, its parent, or its only field.
+
+    Raises
+    ------
+    FormatError
+        When there is none, or more than one.
+    """
+    start = path if path.is_dir() else path.parent
+    if (start / "Field.txt").is_file():
+        return start
+    found = sorted(file.parent for file in start.rglob("Field.txt"))
+    if len(found) != 1:
+        names = ", ".join(folder.name for folder in found)
+        raise FormatError(
+            f"{path} holds {len(found)} AgOpenGPS fields{f' ({names})' if names else ''}.",
+            hint="Name the folder of one field, the one with Field.txt in it.",
+        )
+    return found[0]
+
+
+def _plane(folder: Path) -> LocalPlane:
+    lines = _text(folder / "Field.txt")
+    try:
+        lat, lon = _numbers(lines[lines.index("StartFix") + 1])[:2]
+    except (ValueError, IndexError) as error:
+        raise FormatError(f"{folder / 'Field.txt'} has no StartFix.") from error
+    return LocalPlane(lat, lon)
+
+
+def _rings(folder: Path) -> list[np.ndarray]:
+    """The rings of ``Boundary.txt`` as (n, 2) arrays of easting and northing."""
+    path = folder / "Boundary.txt"
+    if not path.exists():
+        return []
+    lines = [line for line in _text(path)[1:] if line]
+    rings, position = [], 0
+    try:
+        while position < len(lines):
+            # One or two words (drive-through, and in old files one more), then the count.
+            while lines[position] in ("True", "False"):
+                position += 1
+            count = int(lines[position])
+            rows = lines[position + 1 : position + 1 + count]
+            rings.append(np.array([_numbers(row)[:2] for row in rows]))
+            if len(rows) != count:
+                raise IndexError
+            position += 1 + count
+    except (ValueError, IndexError) as error:
+        raise FormatError(f"{path} breaks off or is damaged in ring {len(rings) + 1}.") from error
+    return [ring for ring in rings if len(ring) >= 3]
+
+
+def _lines(folder: Path) -> list[tuple[str, np.ndarray]]:
+    """The tracks of ``TrackLines.txt`` as names and (n, 2) arrays."""
+    path = folder / "TrackLines.txt"
+    if not path.exists():
+        return []
+    lines = _text(path)[1:]
+    while lines and not lines[-1]:
+        lines.pop()
+    found, position = [], 0
+    try:
+        while position < len(lines):
+            name, _, start, end, _, mode, _, count = lines[position : position + 8]
+            points = [_numbers(row)[:2] for row in lines[position + 8 : position + 8 + int(count)]]
+            if int(mode) != _CURVE or len(points) < 2:
+                points = [_numbers(start)[:2], _numbers(end)[:2]]
+            found.append((name, np.array(points)))
+            position += 8 + int(count)
+    except ValueError as error:
+        raise FormatError(f"{path} breaks off or is damaged in track {len(found) + 1}.") from error
+    return found
+
+
+def _lonlat_polygon(ring: np.ndarray, plane: LocalPlane) -> Any:
+    simple = shapely.simplify(shapely.Polygon(ring), COLLINEAR_M)
+    polygon = simple if simple.is_valid and not simple.is_empty else shapely.Polygon(ring)
+    return shapely.transform(polygon, lambda c: plane.to_lonlat(c[:, 0], c[:, 1]))
+
+
+def _layer(name: str, rows: list[dict[str, Any]]) -> RawLayer:
+    return RawLayer(name, gpd.GeoDataFrame(rows, geometry="geometry", crs=LONLAT))
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
+
+
+def _text(path: Path) -> list[str]:
+    try:
+        return [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise FormatError(f"{path} cannot be read: {error}.") from error

@@ -1,0 +1,138 @@
+"""Writing the folder of a field for AgOpenGPS. Not tried on a tractor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from geofield import schema
+from geofield.errors import FormatError
+from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
+from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.names import safe_name
+from geofield.formats.origin import timestamp
+from geofield.model import Dataset
+
+#: Largest distance of boundary vertices in metres, by area in hectares.
+_STEPS = ((20.0, 1.1), (40.0, 2.2), (float("inf"), 3.3))
+_RED = 0
+_STRAIGHT = 2
+_NAME_CHARACTERS = 60
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write the four text files of ``agopengps/Fields/<name>/``."""
+    field = dataset.table(schema.FIELD.name)
+    if len(field) != 1:
+        raise FormatError(f"AgOpenGPS needs one field; there are {len(field)}.")
+    polygon = exact_geometry(schema.FIELD, field)[0]
+    start = to_lonlat(np.array([polygon.representative_point()], dtype=object), dataset.crs)[0]
+    # The file holds the start point with seven decimals: measure from what is written.
+    plane = LocalPlane(round(start.y, 7), round(start.x, 7))
+    name = safe_name(dataset.name, length=_NAME_CHARACTERS)
+    out = folder / "agopengps" / "Fields" / name
+    files = {
+        "Field.txt": _field(name, plane, timestamp(dataset)),
+        "Boundary.txt": _boundary(dataset, polygon, plane),
+        "TrackLines.txt": _track_lines(dataset, plane),
+        "Flags.txt": _flags(dataset, plane),
+    }
+    out.mkdir(parents=True)
+    written = []
+    for file, lines in files.items():
+        path = out / file
+        path.write_bytes("".join(f"{line}\r\n" for line in lines).encode())
+        written.append(path)
+    return written
+
+
+def _field(name: str, plane: LocalPlane, stamp: str) -> list[str]:
+    date = datetime.fromisoformat(stamp)
+    return [
+        date.strftime("%Y-%m-%d %H:%M:%S"),
+        "$FieldDir",
+        name,
+        "$Offsets",
+        "0,0",
+        "Convergence",
+        "0",
+        "StartFix",
+        f"{plane.lat:.7f},{plane.lon:.7f}",
+    ]
+
+
+def _boundary(dataset: Dataset, polygon: Any, plane: LocalPlane) -> list[str]:
+    area_ha = polygon.area / 10_000.0
+    step = next(step for limit, step in _STEPS if area_ha < limit)
+    obstacles = dataset.table(schema.OBSTACLES.name)
+    obstacles = obstacles[obstacles["status"] != "rejected"]
+    inner = [*polygon.interiors]
+    inner += [shape.exterior for shape in exact_geometry(schema.OBSTACLES, obstacles)]
+    lines = ["$Boundary"]
+    # The outer ring runs clockwise, inner rings the other way, as the program itself has them.
+    lines += _ring(_plane_ring(dataset, polygon.exterior, plane, clockwise=True), step)
+    for ring in inner:
+        lines += _ring(_plane_ring(dataset, ring, plane, clockwise=False), step / 2)
+    return lines
+
+
+def _plane_ring(dataset: Dataset, ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
+    lonlat = shapely.get_coordinates(to_lonlat(np.array([ring], dtype=object), dataset.crs))[:-1]
+    placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
+    is_ccw = shapely.is_ccw(shapely.LinearRing(placed))
+    return placed[::-1] if is_ccw == clockwise else placed
+
+
+def _ring(ring: FloatArray, step: float) -> list[str]:
+    vertices = np.round(densified(ring, step), 3)
+    headings = ring_headings(vertices)
+    # False: nothing drives through this ring.
+    return ["False", str(len(vertices))] + [
+        f"{east:.3f},{north:.3f},{heading:.5f}"
+        for (east, north), heading in zip(vertices, headings, strict=True)
+    ]
+
+
+def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
+    lines = ["$TrackLines"]
+    tracks = dataset.table(schema.TRACKS.name)
+    for number, shape in zip(tracks["track_no"], tracks.geometry, strict=True):
+        coordinates = shapely.get_coordinates(shape)[[0, -1]]
+        ends = to_lonlat(np.array([shapely.LineString(coordinates)], dtype=object), dataset.crs)
+        lonlat = shapely.get_coordinates(ends)
+        a, b = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
+        heading = np.arctan2(b[0] - a[0], b[1] - a[1]) % (2 * np.pi)
+        lines += [
+            f"Track {number}",
+            f"{heading:.8f}",
+            f"{a[0]:.3f},{a[1]:.3f}",
+            f"{b[0]:.3f},{b[1]:.3f}",
+            "0",
+            str(_STRAIGHT),
+            "True",
+            "0",
+        ]
+    return lines
+
+
+def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
+    """One flag per obstacle that is to be avoided, at its centre."""
+    obstacles = dataset.table(schema.OBSTACLES.name)
+    obstacles = obstacles[obstacles["status"] != "rejected"]
+    lines = ["$Flags", str(len(obstacles))]
+    centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
+    if not len(centres):
+        return lines
+    lonlat = shapely.get_coordinates(to_lonlat(centres, dataset.crs))
+    placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
+    for (lon, lat), (east, north), number, radius in zip(
+        lonlat, placed, obstacles["obstacle_no"], obstacles["radius_m"], strict=True
+    ):
+        note = f"Obstacle {number}" + (f" radius {radius:.2f} m" if radius > 0 else "")
+        lines.append(f"{lat:.9f},{lon:.9f},{east:.3f},{north:.3f},0,{_RED},{number},{note}")
+    return lines

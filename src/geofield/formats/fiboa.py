@@ -1,0 +1,114 @@
+"""fiboa 0.3.0, field boundaries for agriculture: the field as GeoJSON and GeoParquet."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import shapely
+
+from geofield import schema
+from geofield.crs import LONLAT
+from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.geoparquet import GEOMETRY, write_geoparquet
+from geofield.formats.origin import lineage
+from geofield.model import Dataset
+
+SCHEMAS = (
+    "https://vecorel.org/specification/v0.1.0/schema.yaml",
+    "https://vecorel.org/geometry-metrics-extension/v0.1.0/schema.yaml",
+    "https://fiboa.org/specification/v0.3.0/schema.yaml",
+)
+COLLECTION = "geofield"
+#: How the outline came to be, in fiboa's words.
+_DRAWN = {"drawn": "manual", "boundary": "unknown", "given": "unknown"}
+#: Degrees: a centimetre, RFC 7946's advice and a half.
+DECIMALS = 7
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write ``fiboa/{stem}.geojson`` and ``fiboa/{stem}.parquet``."""
+    table = dataset.table(schema.FIELD.name)
+    shapes = to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs)
+    rows = [
+        _properties(row, shape, dataset)
+        for row, shape in zip(table.to_dict("records"), table.geometry, strict=True)
+    ]
+    out = folder / "fiboa"
+    out.mkdir()
+    geojson, parquet = out / f"{stem}.geojson", out / f"{stem}.parquet"
+    _write_geojson(geojson, rows, shapes)
+    _write_parquet(parquet, rows, shapes)
+    return [geojson, parquet]
+
+
+def _properties(row: Mapping[str, Any], shape: Any, dataset: Dataset) -> dict[str, Any]:
+    method = str(row["method"]) if isinstance(row["method"], str) else "given"
+    date = row["imagery_date"]
+    properties: dict[str, Any] = {
+        "id": str(row["field_id"]),
+        "collection": COLLECTION,
+        "category": ["operational"],
+        "metrics:area": round(float(shape.area), 2),
+        "metrics:perimeter": round(float(shapely.length(shape)), 2),
+        "determination:method": _DRAWN.get(method, "auto-imagery"),
+        "determination:details": f"{method}; {lineage(dataset)}".strip("; "),
+    }
+    if not pd.isna(date):
+        properties["determination:datetime"] = f"{str(date)[:10]}T00:00:00Z"
+    return properties
+
+
+def _write_geojson(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
+    rounded = shapely.orient_polygons(shapely.transform(shapes, lambda c: np.round(c, DECIMALS)))
+    features = [
+        {
+            "type": "Feature",
+            "id": row["id"],
+            "properties": {key: value for key, value in row.items() if key != "id"},
+            "geometry": json.loads(shapely.to_geojson(shape)),
+        }
+        for row, shape in zip(rows, rounded, strict=True)
+    ]
+    collection = {
+        "type": "FeatureCollection",
+        "schemas": {COLLECTION: list(SCHEMAS)},
+        "features": features,
+    }
+    path.write_text(json.dumps(collection, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+
+
+def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
+    import pyarrow as pa
+
+    fields = pa.schema(
+        [
+            pa.field("id", pa.string(), nullable=False),
+            pa.field("collection", pa.string(), nullable=False),
+            pa.field("category", pa.list_(pa.string())),
+            pa.field("metrics:area", pa.float32()),
+            pa.field("metrics:perimeter", pa.float32()),
+            pa.field("determination:method", pa.string()),
+            pa.field("determination:details", pa.string()),
+            pa.field("determination:datetime", pa.timestamp("ms", tz="UTC")),
+            pa.field(GEOMETRY, pa.binary(), nullable=False),
+        ]
+    )
+    data: dict[str, Any] = {
+        name: [row.get(name) for row in rows]
+        for name in fields.names
+        if name not in (GEOMETRY, "determination:datetime")
+    }
+    dates = [row.get("determination:datetime") for row in rows]
+    data["determination:datetime"] = [
+        None if date is None else datetime.fromisoformat(date) for date in dates
+    ]
+    data[GEOMETRY] = shapely.to_wkb(shapes, flavor="iso")
+    table = pa.table(data, schema=fields)
+    collection = json.dumps({"schemas": {COLLECTION: list(SCHEMAS)}})
+    write_geoparquet(path, iter([table]), fields, LONLAT, "Polygon", {"collection": collection})

@@ -1,0 +1,78 @@
+"""GPX 1.1: one ``trk`` per track with one ``trkseg`` per segment, a waypoint per obstacle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import shapely
+
+from geofield import schema
+from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.origin import lineage, timestamp
+from geofield.formats.xml import write_xml
+from geofield.model import Dataset
+
+GPX = "http://www.topografix.com/GPX/1/1"
+_SCHEMA = "http://www.w3.org/2001/XMLSchema-instance"
+DECIMALS = 9
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write ``{stem}.gpx``."""
+    root = ET.Element(
+        "gpx",
+        {
+            "version": "1.1",
+            "creator": dataset.provenance.software or "geofield",
+            "xmlns": GPX,
+            "xmlns:xsi": _SCHEMA,
+            "xsi:schemaLocation": f"{GPX} {GPX}/gpx.xsd",
+        },
+    )
+    metadata = ET.SubElement(root, "metadata")
+    ET.SubElement(metadata, "name").text = dataset.name
+    ET.SubElement(metadata, "desc").text = lineage(dataset)
+    ET.SubElement(metadata, "time").text = f"{timestamp(dataset)[:19]}Z"
+    obstacles = dataset.table(schema.OBSTACLES.name)
+    obstacles = obstacles[obstacles["status"] != "rejected"]
+    centres = shapely.point_on_surface(obstacles.geometry.to_numpy())
+    for row, (lon, lat) in zip(
+        obstacles.to_dict("records"), _lonlat(centres, dataset), strict=True
+    ):
+        point = ET.SubElement(root, "wpt", _position(lon, lat))
+        ET.SubElement(point, "name").text = f"Obstacle {row['obstacle_no']}"
+        ET.SubElement(point, "desc").text = _describe(row)
+    table = dataset.table(schema.TRACKS.name)
+    shapes = to_lonlat(exact_geometry(schema.TRACKS, table), dataset.crs)
+    for number, shape in zip(table["track_no"], shapes, strict=True):
+        track = ET.SubElement(root, "trk")
+        ET.SubElement(track, "name").text = f"Track {number}"
+        ET.SubElement(track, "number").text = str(number)
+        for part in shape.geoms:
+            segment = ET.SubElement(track, "trkseg")
+            for lon, lat in part.coords:
+                ET.SubElement(segment, "trkpt", _position(lon, lat))
+    path = folder / f"{stem}.gpx"
+    write_xml(root, path)
+    return [path]
+
+
+def _lonlat(points: Any, dataset: Dataset) -> Any:
+    return shapely.get_coordinates(to_lonlat(np.asarray(points, dtype=object), dataset.crs))
+
+
+def _position(lon: float, lat: float) -> dict[str, str]:
+    return {"lat": f"{lat:.{DECIMALS}f}", "lon": f"{lon:.{DECIMALS}f}"}
+
+
+def _describe(row: Mapping[str, Any]) -> str:
+    words = [str(row["kind"]) if isinstance(row["kind"], str) else "obstacle"]
+    if np.isfinite(row["radius_m"]):
+        words.append(f"radius {row['radius_m']:.2f} m")
+    if np.isfinite(row["buffer_m"]):
+        words.append(f"safety margin {row['buffer_m']:.2f} m")
+    return ", ".join(words)

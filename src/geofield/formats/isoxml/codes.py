@@ -1,0 +1,51 @@
+"""Codes of ISO 11783-10 that field, obstacles and guidance need, by name."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+#: Designators hold so many characters.
+DESIGNATOR = 32
+#: Decimals of a position: at most nine, a tenth of a millimetre.
+DECIMALS = 9
+
+
+class PolygonType(StrEnum):
+    """PLN, attribute A."""
+
+    BOUNDARY = "1"
+    OBSTACLE = "6"
+    HEADLAND = "10"
+
+
+class LineType(StrEnum):
+    """LSG, attribute A."""
+
+    EXTERIOR = "1"
+    INTERIOR = "2"
+    GUIDANCE = "5"
+
+
+class PointType(StrEnum):
+    """PNT, attribute A."""
+
+    OTHER = "2"
+    OBSTACLE = "5"
+    GUIDANCE_A = "6"
+    GUIDANCE_B = "7"
+    GUIDANCE_POINT = "9"
+
+
+class Guidance(StrEnum):
+    """GPN, attribute C."""
+
+    AB = "1"
+    CURVE = "3"
+
+
+#: GPN, attribute E: the terminal repeats the line on both sides, or not at all.
+REPEAT_BOTH, REPEAT_NONE = "1", "4"
+#: GPN, attribute F: the line does not go on beyond its ends.
+EXTEND_NONE = "4"
+#: GPN, attribute I: made on a desk, not by a receiver.
+DESKTOP = "16"

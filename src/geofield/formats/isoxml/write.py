@@ -1,0 +1,270 @@
+"""Writing ISOXML: one customer, farm and field with boundary, obstacles and guidance.
+
+Version 4 has guidance groups; version 3 knows guidance only as lines of the field. None has
+been tried on a physical terminal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import shapely
+
+from geofield import schema
+from geofield.errors import FormatError
+from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.isoxml.codes import (
+    DECIMALS,
+    DESIGNATOR,
+    DESKTOP,
+    EXTEND_NONE,
+    REPEAT_BOTH,
+    REPEAT_NONE,
+    Guidance,
+    LineType,
+    PointType,
+    PolygonType,
+)
+from geofield.formats.names import cut_name
+from geofield.formats.xml import write_xml
+from geofield.model import Dataset
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+
+def write_v4(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3.
+
+    Options: ``customer`` and ``farm``, names for the terminal.
+    """
+    return _write(dataset, folder / "isoxml", 4, options)
+
+
+def write_v3(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
+    return _write(dataset, folder / "isoxml-v3", 3, options)
+
+
+def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, Any]) -> list[Path]:
+    field = dataset.table(schema.FIELD.name)
+    if len(field) != 1:
+        raise FormatError(f"ISOXML needs one field; there are {len(field)}.")
+    software = dataset.provenance.software or "geofield"
+    maker, _, number = software.partition(" ")
+    root = ET.Element(
+        "ISO11783_TaskData",
+        VersionMajor=str(version),
+        VersionMinor="3",
+        ManagementSoftwareManufacturer=maker[:DESIGNATOR],
+        ManagementSoftwareVersion=(number or "0")[:DESIGNATOR],
+        DataTransferOrigin="1",
+    )
+    customer = str(options.get("customer") or "Customer")
+    farm = str(options.get("farm") or "Farm")
+    ET.SubElement(root, "CTR", A="CTR1", B=cut_name(customer, DESIGNATOR))
+    ET.SubElement(root, "FRM", A="FRM1", B=cut_name(farm, DESIGNATOR), I="CTR1")
+    polygon = exact_geometry(schema.FIELD, field)[0]
+    part = ET.SubElement(
+        root,
+        "PFD",
+        A="PFD1",
+        C=cut_name(dataset.name, DESIGNATOR),
+        D=str(round(polygon.area)),
+        E="CTR1",
+        F="FRM1",
+    )
+    _add_polygons(part, dataset, polygon, version)
+    if version == 4:
+        _add_guidance_groups(part, dataset)
+    else:
+        _add_guidance_lines(part, dataset)
+    path = folder / "TASKDATA" / "TASKDATA.XML"
+    write_xml(root, path)
+    return [path]
+
+
+def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:
+    outline = to_lonlat(np.array([polygon], dtype=object), dataset.crs)[0]
+    _add_polygon(part, PolygonType.BOUNDARY, dataset.name, polygon.area, outline)
+    obstacles = dataset.table(schema.OBSTACLES.name)
+    obstacles = obstacles[obstacles["status"] != "rejected"]
+    shapes = exact_geometry(schema.OBSTACLES, obstacles)
+    placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes
+    names = [f"Obstacle {number}" for number in obstacles["obstacle_no"]]
+    # Some readers pass over the holes of a boundary: an obstacle is a polygon of its own.
+    for name, shape, lonlat in zip(names, shapes, placed, strict=True):
+        _add_polygon(part, PolygonType.OBSTACLE, name, shape.area, lonlat)
+    if version < 4:
+        return
+    if dataset.has("headland"):
+        rows = dataset.table("headland").explode(ignore_index=True)
+        shapes = np.asarray(rows.geometry.to_numpy(), dtype=object)
+        for number, (shape, lonlat) in enumerate(
+            zip(shapes, to_lonlat(shapes, dataset.crs), strict=True), start=1
+        ):
+            _add_polygon(part, PolygonType.HEADLAND, f"Headland {number}", shape.area, lonlat)
+    trees = obstacles["kind"].to_numpy() == "tree"
+    for name, shape in zip(np.array(names)[trees], placed[trees], strict=True):
+        centre = shape.centroid
+        _add_point(part, PointType.OBSTACLE, centre.x, centre.y, name=str(name))
+
+
+def _add_polygon(
+    part: ET.Element, kind: PolygonType, name: str, area_m2: float, lonlat: Any
+) -> None:
+    element = ET.SubElement(
+        part, "PLN", A=kind, B=cut_name(name, DESIGNATOR), C=str(round(area_m2))
+    )
+    rings = [(LineType.EXTERIOR, lonlat.exterior)]
+    rings += [(LineType.INTERIOR, ring) for ring in lonlat.interiors]
+    for role, ring in rings:
+        line = ET.SubElement(element, "LSG", A=role)
+        for lon, lat in ring.coords:
+            _add_point(line, PointType.OTHER, lon, lat)
+
+
+def _add_guidance_groups(part: ET.Element, dataset: Dataset) -> None:
+    """One group per line: some readers look at the first pattern of a group only."""
+    segments = dataset.table(schema.SEGMENTS.name)
+    width_mm = _width_mm(dataset)
+    number = 0
+    reference = _reference(dataset)
+    if reference is not None:
+        number += 1
+        line, left, right = reference
+        _add_group(
+            part,
+            number,
+            "Reference AB",
+            dataset,
+            line,
+            width_mm,
+            # The terminal may lay the same pattern itself from this one line.
+            {"E": REPEAT_BOTH, "N": str(left), "O": str(right)},
+        )
+    for name, line in zip(segment_names(segments), segments.geometry, strict=True):
+        number += 1
+        _add_group(
+            part, number, name, dataset, line, width_mm, {"E": REPEAT_NONE, "F": EXTEND_NONE}
+        )
+
+
+def _add_group(
+    part: ET.Element,
+    number: int,
+    name: str,
+    dataset: Dataset,
+    line: Any,
+    width_mm: int | None,
+    how: Mapping[str, str],
+) -> None:
+    lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
+    straight = len(lonlat.coords) == 2
+    group = ET.SubElement(part, "GGP", A=f"GGP{number}", B=cut_name(name, DESIGNATOR))
+    attributes = {
+        "A": f"GPN{number}",
+        "B": cut_name(name, DESIGNATOR),
+        "C": str(Guidance.AB if straight else Guidance.CURVE),
+    }
+    pattern = ET.SubElement(
+        group, "GPN", attributes | {key: how[key] for key in ("E", "F") if key in how}
+    )
+    if straight:
+        pattern.set("G", f"{_heading_deg(lonlat):.4f}")
+    pattern.set("I", DESKTOP)
+    for key in ("N", "O"):
+        if key in how:
+            pattern.set(key, how[key])
+    element = ET.SubElement(pattern, "LSG", A=LineType.GUIDANCE)
+    if width_mm is not None:
+        element.set("C", str(width_mm))
+    last = len(lonlat.coords) - 1
+    for index, (lon, lat) in enumerate(lonlat.coords):
+        kind = PointType.GUIDANCE_POINT
+        if index == 0:
+            kind = PointType.GUIDANCE_A
+        elif index == last:
+            kind = PointType.GUIDANCE_B
+        _add_point(element, kind, lon, lat)
+
+
+def _add_guidance_lines(part: ET.Element, dataset: Dataset) -> None:
+    segments = dataset.table(schema.SEGMENTS.name)
+    if not len(segments):
+        return
+    width_mm = _width_mm(dataset)
+    placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
+    for name, line in zip(segment_names(segments), placed, strict=True):
+        element = ET.SubElement(part, "LSG", A=LineType.GUIDANCE, B=cut_name(name, DESIGNATOR))
+        if width_mm is not None:
+            element.set("C", str(width_mm))
+        for lon, lat in line.coords:
+            _add_point(element, PointType.OTHER, lon, lat)
+
+
+def segment_names(segments: gpd.GeoDataFrame) -> list[str]:
+    """``Track 7`` for an unbroken track's first segment, ``Track 7-2`` for its second."""
+    return [
+        f"Track {track}" if segment == 1 else f"Track {track}-{segment}"
+        for track, segment in zip(segments["track_no"], segments["segment_no"], strict=True)
+    ]
+
+
+def _add_point(
+    parent: ET.Element, kind: PointType, lon: float, lat: float, *, name: str = ""
+) -> None:
+    point = ET.SubElement(parent, "PNT", A=kind)
+    if name:
+        point.set("B", cut_name(name, DESIGNATOR))
+    point.set("C", f"{lat:.{DECIMALS}f}")
+    point.set("D", f"{lon:.{DECIMALS}f}")
+
+
+def _heading_deg(line: Any) -> float:
+    """True heading from A to B, degrees clockwise from north, 0 to 360."""
+    from pyproj import Geod
+
+    (lon0, lat0), (lon1, lat1) = line.coords
+    azimuth, _, _ = Geod(ellps="WGS84").inv(lon0, lat0, lon1, lat1)
+    return round(float(azimuth) % 360.0, 4) % 360.0
+
+
+def _offsets(dataset: Dataset) -> tuple[Any, Any] | None:
+    """The first track as a straight line, and how far right of it the others' middles lie."""
+    tracks = dataset.table(schema.TRACKS.name)
+    if not len(tracks):
+        return None
+    coordinates = [shapely.get_coordinates(shape) for shape in tracks.geometry]
+    start, end = coordinates[0][0], coordinates[0][-1]
+    direction = (end - start) / np.hypot(*(end - start))
+    middles = np.array([(line[0] + line[-1]) / 2 for line in coordinates])
+    right = np.array([direction[1], -direction[0]])
+    return shapely.LineString([start, end]), (middles - start) @ right
+
+
+def _reference(dataset: Dataset) -> tuple[Any, int, int] | None:
+    """The first track, and the numbers of tracks on its left and right."""
+    found = _offsets(dataset)
+    if found is None:
+        return None
+    line, offset = found
+    return line, int((offset < -0.01).sum()), int((offset > 0.01).sum())
+
+
+def _width_mm(dataset: Dataset) -> int | None:
+    """The distance of neighbouring tracks, whole millimetres; None for a single track."""
+    found = _offsets(dataset)
+    if found is None or len(found[1]) < 2:
+        return None
+    steps = np.diff(np.sort(found[1]))
+    steps = steps[steps > 0.01]
+    return round(float(np.median(steps)) * 1000) if len(steps) else None

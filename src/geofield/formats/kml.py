@@ -1,0 +1,144 @@
+"""KML: a folder per layer, a placemark per row, typed columns in a schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import pandas as pd
+import shapely
+
+from geofield import schema
+from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
+from geofield.formats.origin import lineage
+from geofield.formats.xml import write_xml
+from geofield.model import Dataset
+
+if TYPE_CHECKING:
+    from geofield.schema import Layer
+
+KML = "http://www.opengis.net/kml/2.2"
+#: 1e-9 degrees are a tenth of a millimetre.
+DECIMALS = 9
+LAYERS = (schema.FIELD, schema.OBSTACLES, schema.TRACKS, schema.GAPS)
+
+_TYPES = {"int": "int", "float": "double", "str": "string", "date": "string"}
+# Colours are aabbggrr.
+_STYLES = {
+    "field": ("ff0ad6ff", 3.0, "00000000"),
+    "obstacles": ("ff1c1ae2", 1.5, "601c1ae2"),
+    "tracks": ("ffffe500", 1.5, None),
+    "gaps": ("ff0078ff", 1.0, None),
+}
+#: What GDAL makes of a placemark besides its own columns.
+_DRIVER_COLUMNS = [
+    *("id", "Name", "description", "timestamp", "begin", "end", "altitudeMode", "tessellate"),
+    *("extrude", "visibility", "drawOrder", "icon", "snippet"),
+]
+
+
+def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
+    """Write ``{stem}.kml``."""
+    root = ET.Element("kml", xmlns=KML)
+    document = ET.SubElement(root, "Document")
+    ET.SubElement(document, "name").text = dataset.name
+    ET.SubElement(document, "description").text = lineage(dataset)
+    for layer in LAYERS:
+        _add_style(document, layer)
+    for layer in LAYERS:
+        columns = ET.SubElement(document, "Schema", name=layer.name, id=f"schema_{layer.name}")
+        for column in layer.columns:
+            field = ET.SubElement(
+                columns, "SimpleField", type=_TYPES[column.type], name=column.name
+            )
+            ET.SubElement(field, "displayName").text = column.title
+    for layer in LAYERS:
+        if dataset.has(layer.name):
+            _add_layer(document, layer, dataset)
+    path = folder / f"{stem}.kml"
+    write_xml(root, path)
+    return [path]
+
+
+def read(path: Path) -> Dataset:
+    """The dataset in a KML or KMZ file."""
+    layers = []
+    for name in layer_names(path):
+        frame = read_vector(path, name)
+        own = "Name" not in frame.columns or any(each.name == name for each in LAYERS)
+        if not own:
+            frame = frame.rename(columns={"Name": "name"})
+        layers.append(RawLayer(name, frame.drop(columns=_DRIVER_COLUMNS, errors="ignore")))
+    return read_foreign(layers, path)
+
+
+def _add_style(document: ET.Element, layer: Layer) -> None:
+    colour, width, fill = _STYLES[layer.name]
+    style = ET.SubElement(document, "Style", id=f"style_{layer.name}")
+    line = ET.SubElement(style, "LineStyle")
+    ET.SubElement(line, "color").text = colour
+    ET.SubElement(line, "width").text = f"{width:g}"
+    if fill is not None:
+        polygon = ET.SubElement(style, "PolyStyle")
+        ET.SubElement(polygon, "color").text = fill
+
+
+def _add_layer(document: ET.Element, layer: Layer, dataset: Dataset) -> None:
+    table = dataset.table(layer.name)
+    shapes = to_lonlat(exact_geometry(layer, table), dataset.crs)
+    folder = ET.SubElement(document, "Folder")
+    ET.SubElement(folder, "name").text = layer.name
+    for row, shape in zip(table.to_dict("records"), shapes, strict=True):
+        placemark = ET.SubElement(folder, "Placemark")
+        ET.SubElement(placemark, "name").text = row_name(layer, row)
+        ET.SubElement(placemark, "styleUrl").text = f"#style_{layer.name}"
+        data = ET.SubElement(
+            ET.SubElement(placemark, "ExtendedData"),
+            "SchemaData",
+            schemaUrl=f"#schema_{layer.name}",
+        )
+        for column in layer.columns:
+            value = row[column.name]
+            if not pd.isna(value):
+                text = repr(float(value)) if column.type == "float" else str(value)
+                ET.SubElement(data, "SimpleData", name=column.name).text = text
+        _add_geometry(placemark, shape)
+
+
+def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
+    """What a person calls a row: the field's name, ``Track 7``, ``Gap 2 of track 7``."""
+    if layer.name == schema.FIELD.name:
+        return str(row["name"])
+    if layer.name == schema.GAPS.name:
+        return f"Gap {row['gap_no']} of track {row['track_no']}"
+    if layer.name == schema.OBSTACLES.name:
+        return f"Obstacle {row['obstacle_no']}"
+    return f"Track {row['track_no']}"
+
+
+def _add_geometry(parent: ET.Element, shape: Any) -> None:
+    if shape.geom_type == "Polygon":
+        polygon = ET.SubElement(parent, "Polygon")
+        for tag, ring in (
+            ("outerBoundaryIs", shape.exterior),
+            *(("innerBoundaryIs", ring) for ring in shape.interiors),
+        ):
+            linear = ET.SubElement(ET.SubElement(polygon, tag), "LinearRing")
+            ET.SubElement(linear, "coordinates").text = _coordinates(ring)
+    elif shape.geom_type == "LineString":
+        line = ET.SubElement(parent, "LineString")
+        ET.SubElement(line, "tessellate").text = "1"
+        ET.SubElement(line, "coordinates").text = _coordinates(shape)
+    else:
+        many = ET.SubElement(parent, "MultiGeometry")
+        for part in shape.geoms:
+            _add_geometry(many, part)
+
+
+def _coordinates(line: Any) -> str:
+    return " ".join(
+        f"{lon:.{DECIMALS}f},{lat:.{DECIMALS}f},0" for lon, lat in shapely.get_coordinates(line)
+    )

@@ -1,0 +1,53 @@
+"""Writing and reading XML files of other people's standards."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from geofield.errors import FormatError
+
+# Control characters that XML 1.0 has no way to write.
+_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
+
+
+def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
+    """Write a document as UTF-8; characters that XML cannot carry are refused.
+
+    Raises
+    ------
+    FormatError
+        For such a character.
+    """
+    for element in root.iter():
+        for text in (element.text, *element.attrib.values()):
+            if text and (found := _FORBIDDEN.search(text)):
+                raise FormatError(
+                    f"{path.name}: {text!r} holds the character U+{ord(found.group()):04X}, which "
+                    "XML cannot carry.",
+                    hint="Remove it from the name.",
+                )
+    if indent:
+        ET.indent(root, " ")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tree = ET.ElementTree(root)
+    with path.open("wb") as file:
+        tree.write(file, encoding="UTF-8", xml_declaration=True, short_empty_elements=True)
+        file.write(b"\n")
+
+
+def read_xml(path: Path) -> ET.Element:
+    """The root element of a document.
+
+    Raises
+    ------
+    FormatError
+        When it is not well-formed.
+    """
+    try:
+        return ET.parse(path).getroot()  # noqa: S314  expat limits entity expansion
+    except (ET.ParseError, UnicodeDecodeError, LookupError) as error:
+        raise FormatError(
+            f"{path} is not well-formed XML: {error}.", hint="Is the file whole?"
+        ) from error
