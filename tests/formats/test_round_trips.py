@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import shapely
 from formats_compare import assert_same_table
 from formats_plan import NAME
 
@@ -10,11 +11,15 @@ from geofield.formats import FORMATS, read_dataset, write_dataset
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 
+ALL = ("field", "obstacles", "tracks", "segments", "gaps", "track_points")
 #: Format, what to read, and the layers that come back row by row.
 WHOLE = [
-    ("gpkg", "field.gpkg", ("field", "obstacles", "tracks", "segments", "gaps", "track_points")),
-    ("geojson", "geojson", ("field", "obstacles", "tracks", "segments", "gaps", "track_points")),
+    ("gpkg", "field.gpkg", ALL),
+    ("geojson", "geojson", ALL),
+    ("geoparquet", "geoparquet", ALL),
+    ("flatgeobuf", "flatgeobuf", ALL),
     ("shapefile", "shapefile", ("field", "obstacles", "segments")),
+    ("kml", "field.kml", ("field", "obstacles", "tracks", "gaps")),
 ]
 
 
@@ -29,13 +34,67 @@ def test_same_rows_and_shapes(dataset, tmp_path, name, product, layers):
             dataset.table(layer),
             back.table(layer),
             precision_m=FORMATS[name].precision_m,
-            number_tolerance=0.0 if name == "gpkg" else 1e-9,
+            number_tolerance=0.0 if FORMATS[name].precision_m == 0 else 1e-9,
         )
 
 
-def test_geopackage_keeps_the_origin(dataset, tmp_path):
-    write_dataset(dataset, tmp_path, ["gpkg"])
-    back = read_dataset(tmp_path / "field.gpkg")
+@pytest.mark.parametrize("name", ["isoxml", "isoxml-v3"])
+def test_terminals_get_what_they_drive_by(dataset, tmp_path, name):
+    write_dataset(dataset, tmp_path, [name])
+    back = read_dataset(tmp_path / name)
+    assert back.name == NAME
+    kept = dataset.table("obstacles")
+    kept = kept[kept["status"] != "rejected"].reset_index(drop=True)
+    precision = FORMATS[name].precision_m
+    numbers = ["obstacle_no", "kind"] if name == "isoxml" else ["obstacle_no"]
+    assert_same_table(
+        dataset.table("field"), back.table("field"), precision_m=precision, columns=["name"]
+    )
+    assert_same_table(kept, back.table("obstacles"), precision_m=precision, columns=numbers)
+    for layer, columns in (
+        ("segments", ["track_no", "segment_no"]),
+        ("tracks", ["track_no", "gap_count"]),
+    ):
+        assert_same_table(
+            dataset.table(layer), back.table(layer), precision_m=precision, columns=columns
+        )
+    assert set(back.table("obstacles")["status"]) == {"added"}
+
+
+def test_agopengps_keeps_rings_numbers_and_lines(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["agopengps"])
+    back = read_dataset(tmp_path / "agopengps" / "Fields")
+    assert back.name == NAME
+    precision = FORMATS["agopengps"].precision_m
+    assert_same_table(
+        dataset.table("field"),
+        back.table("field"),
+        precision_m=precision,
+        columns=["name"],
+        same_vertices=False,
+    )
+    kept = dataset.table("obstacles")
+    kept = kept[kept["status"] != "rejected"].reset_index(drop=True)
+    kept.geometry = [shapely.Polygon(shape.exterior) for shape in kept.geometry]
+    assert_same_table(
+        kept,
+        back.table("obstacles"),
+        precision_m=precision,
+        columns=["obstacle_no"],
+        same_vertices=False,
+    )
+    whole = dataset.table("tracks").copy()
+    whole.geometry = [
+        shapely.multilinestrings([shapely.get_coordinates(line)[[0, -1]]])
+        for line in whole.geometry
+    ]
+    assert_same_table(whole, back.table("tracks"), precision_m=precision, columns=["track_no"])
+
+
+@pytest.mark.parametrize("name", ["gpkg", "geoparquet"])
+def test_lossless_formats_keep_the_origin(dataset, tmp_path, name):
+    write_dataset(dataset, tmp_path, [name])
+    back = read_dataset(tmp_path / ("field.gpkg" if name == "gpkg" else name))
     assert back.provenance == dataset.provenance
     assert back.grid == dataset.grid
     assert back.crs == dataset.crs

@@ -14,7 +14,8 @@ import numpy as np
 import shapely
 
 from geofield import schema
-from geofield.formats.arrow import exact_geometry, write_layer
+from geofield.errors import FormatError
+from geofield.formats.arrow import exact_geometry
 from geofield.model import Dataset
 
 #: DXF layer by layer of the schema.
@@ -28,7 +29,9 @@ LAYERS = {
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``{stem}.dxf`` and ``{stem}.prj``."""
-    import pyarrow as pa
+    import geopandas as gpd
+    import pyogrio
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
     names: list[str] = []
     lines: list[Any] = []
@@ -42,21 +45,13 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
             shapes = np.array([shapely.LineString(ring.coords) for ring in shapes], dtype=object)
         names += [drawing_layer] * len(shapes)
         lines += list(shapes)
-    content = pa.table(
-        {
-            "Layer": pa.array(names, pa.string()),
-            "geom": pa.array(shapely.to_wkb(np.array(lines, dtype=object)), pa.binary()),
-        }
-    )
     path = folder / f"{stem}.dxf"
-    write_layer(
-        content,
-        path,
-        layer="entities",
-        driver="DXF",
-        geometry_type="LineString",
-        crs=dataset.crs,
-    )
+    # Arrow would create the column `Layer`, which the driver has already.
+    frame = gpd.GeoDataFrame({"Layer": names}, geometry=lines, crs=dataset.crs)
+    try:
+        pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
+    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
+        raise FormatError(f"{path.name} could not be written: {error}.") from error
     beside = path.with_suffix(".prj")
     beside.write_text(dataset.crs.to_wkt("WKT1_ESRI") + "\n", encoding="utf-8")
     return [path, beside]

@@ -75,7 +75,13 @@ def write_dataset(
             write = each.load_writer()
             own = {key: value for key, value in given.items() if key in each.options}
             for path in write(dataset, staging, stem=stem, options=own):
-                written.append(target / path.relative_to(staging))
+                place = target / path.relative_to(staging)
+                if place in written:
+                    raise FormatError(
+                        f"Two of the formats write {place.name}.",
+                        hint="Write them into different folders, one after the other.",
+                    )
+                written.append(place)
     for each in chosen if tell_drops else ():
         words = dropped(dataset, each)
         if words:

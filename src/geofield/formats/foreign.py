@@ -179,7 +179,8 @@ def _own_layer(layer: RawLayer) -> schema.Layer | None:
     """The layer of geofield's schema that a table is, judged by its name and columns."""
     columns = set(layer.frame.columns)
     for each in schema.LAYERS:
-        if layer.name == each.name and set(each.key) <= columns:
+        shared = len(columns & set(each.column_names))
+        if layer.name == each.name and set(each.key) <= columns and 2 * shared >= len(each.columns):
             return each
     for each in schema.LAYERS:
         if len(columns & set(each.column_names)) == len(each.columns):

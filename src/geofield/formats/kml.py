@@ -68,9 +68,10 @@ def read(path: Path) -> Dataset:
     layers = []
     for name in layer_names(path):
         frame = read_vector(path, name)
-        own = "Name" not in frame.columns or any(each.name == name for each in LAYERS)
-        if not own:
-            frame = frame.rename(columns={"Name": "name"})
+        # The driver calls a column `name` that stands beside the placemark's own `name2`.
+        named = "name2" if "name2" in frame.columns else "Name"
+        if named in frame.columns:
+            frame = frame.rename(columns={named: "name"})
         layers.append(RawLayer(name, frame.drop(columns=_DRIVER_COLUMNS, errors="ignore")))
     return read_foreign(layers, path)
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from geofield import schema
 from geofield.errors import FormatError
 from geofield.model import Dataset
 
@@ -115,7 +116,7 @@ def _load(reference: str) -> Any:
     return getattr(import_module(module), function)
 
 
-_ALL = ("field", "obstacles", "tracks", "segments", "gaps", "track_points")
+_ALL = tuple(layer.name for layer in schema.LAYERS)
 _RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name")
 
 _TERMINAL_DROPS = (
@@ -139,7 +140,7 @@ _FORMATS = (
     Format(
         "geojson",
         "GeoJSON (RFC 7946)",
-        tuple(f"geojson/{name}.geojson" for name in _ALL),
+        ("geojson/<layer>.geojson",),
         _ALL,
         "geofield.formats.geojson:write",
         "geofield.formats.geojson:read",
@@ -164,7 +165,7 @@ _FORMATS = (
     Format(
         "geoparquet",
         "GeoParquet 1.1",
-        tuple(f"geoparquet/{name}.parquet" for name in _ALL),
+        ("geoparquet/<layer>.parquet",),
         _ALL,
         "geofield.formats.geoparquet:write",
         "geofield.formats.geoparquet:read",
@@ -175,7 +176,7 @@ _FORMATS = (
     Format(
         "flatgeobuf",
         "FlatGeobuf",
-        tuple(f"flatgeobuf/{name}.fgb" for name in _ALL),
+        ("flatgeobuf/<layer>.fgb",),
         _ALL,
         "geofield.formats.flatgeobuf:write",
         "geofield.formats.flatgeobuf:read",
@@ -397,7 +398,7 @@ def _detect_folder(folder: Path) -> Format:
     names = {path.name.upper() for path in folder.iterdir()}
     if "TASKDATA.XML" in names or "TASKDATA" in names:
         return format_named("isoxml")
-    if {"FIELD.TXT", "BOUNDARY.TXT"} & names:
+    if {"FIELD.TXT", "BOUNDARY.TXT"} & names or any(folder.glob("*/Field.txt")):
         return format_named("agopengps")
     suffixes = {Path(name).suffix.lower() for name in names}
     for each in FORMATS.values():

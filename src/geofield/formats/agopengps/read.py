@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,14 @@ from geofield.model import Dataset
 #: Vertices that lie so near the line between their neighbours came from densifying, metres.
 COLLINEAR_M = 0.002
 _CURVE = 4
+_FLAG = re.compile(r"Obstacle (\d+)")
 
 
 def read(path: Path) -> Dataset:
     """The field in a folder of AgOpenGPS, or in the folder of one of its files.
 
-    The first ring is the field, rings in it are obstacles: the program has no other word for
-    them.
+    The first ring is the field. Rings in it are obstacles, the program having no other word
+    for them; where some carry our flags, the others are holes of the field.
 
     Raises
     ------
@@ -32,20 +34,22 @@ def read(path: Path) -> Dataset:
         When a file is missing or does not follow the format.
     """
     folder = field_folder(path)
-    plane = _plane(folder)
+    name, plane = _field(folder)
     layers = []
     rings = [_lonlat_polygon(ring, plane) for ring in _rings(folder)]
     if rings:
-        layers.append(_layer("boundary", [{"name": folder.name, "geometry": rings[0]}]))
-    if rings[1:]:
-        layers.append(_layer("obstacles", [{"geometry": ring} for ring in rings[1:]]))
+        holes, obstacles = _sorted_rings(rings[1:], _flags(folder))
+        outline = shapely.Polygon(rings[0].exterior, [hole.exterior for hole in holes])
+        layers.append(_layer("boundary", [{"name": name, "geometry": outline}]))
+        if obstacles:
+            layers.append(_layer("obstacles", obstacles))
     lines = [
         {"name": name, "geometry": shapely.LineString(plane.to_lonlat(*points.T))}
         for name, points in _lines(folder)
     ]
     if lines:
         layers.append(_layer("guidance", lines))
-    return read_foreign(layers, folder, name=folder.name)
+    return read_foreign(layers, folder, name=name)
 
 
 def field_folder(path: Path) -> Path:
@@ -69,13 +73,46 @@ def field_folder(path: Path) -> Path:
     return found[0]
 
 
-def _plane(folder: Path) -> LocalPlane:
+def _field(folder: Path) -> tuple[str, LocalPlane]:
     lines = _text(folder / "Field.txt")
     try:
         lat, lon = _numbers(lines[lines.index("StartFix") + 1])[:2]
     except (ValueError, IndexError) as error:
         raise FormatError(f"{folder / 'Field.txt'} has no StartFix.") from error
-    return LocalPlane(lat, lon)
+    after = lines.index("$FieldDir") + 1 if "$FieldDir" in lines else len(lines)
+    name = lines[after] if after < len(lines) and lines[after] else folder.name
+    return name, LocalPlane(lat, lon)
+
+
+def _flags(folder: Path) -> list[tuple[Any, int]]:
+    """The places of our obstacle flags, longitude and latitude, and their numbers."""
+    path = folder / "Flags.txt"
+    found = []
+    for line in _text(path)[2:] if path.exists() else []:
+        parts = line.split(",", 7)
+        match = _FLAG.match(parts[-1]) if len(parts) == 8 else None
+        if match is not None:
+            lat, lon = float(parts[0]), float(parts[1])
+            found.append((shapely.Point(lon, lat), int(match.group(1))))
+    return found
+
+
+def _sorted_rings(
+    rings: list[Any], flags: list[tuple[Any, int]]
+) -> tuple[list[Any], list[dict[str, Any]]]:
+    """Holes of the field, and obstacles with their numbers."""
+    numbered = {
+        index: number
+        for index, ring in enumerate(rings)
+        for point, number in flags
+        if ring.covers(point)
+    }
+    if not numbered:
+        return [], [{"geometry": ring} for ring in rings]
+    holes = [ring for index, ring in enumerate(rings) if index not in numbered]
+    return holes, [
+        {"obstacle_no": number, "geometry": rings[index]} for index, number in numbered.items()
+    ]
 
 
 def _rings(folder: Path) -> list[np.ndarray]:

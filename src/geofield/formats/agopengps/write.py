@@ -37,7 +37,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     name = safe_name(dataset.name, length=_NAME_CHARACTERS)
     out = folder / "agopengps" / "Fields" / name
     files = {
-        "Field.txt": _field(name, plane, timestamp(dataset)),
+        "Field.txt": _field(dataset.name, plane, timestamp(dataset)),
         "Boundary.txt": _boundary(dataset, polygon, plane),
         "TrackLines.txt": _track_lines(dataset, plane),
         "Flags.txt": _flags(dataset, plane),
