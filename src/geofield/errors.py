@@ -59,6 +59,14 @@ class ImageryError(GeofieldError):
     """A picture cannot be found, read or used."""
 
 
+class TermsError(ImageryError):
+    """The terms of an imagery source forbid this."""
+
+
+class NetworkError(ImageryError):
+    """A server cannot be reached, or does not give what it should."""
+
+
 class FieldError(GeofieldError):
     """No field can be taken from the scene at the point."""
 
@@ -81,6 +89,10 @@ class OutputExistsError(FormatError):
 
 class GeofieldWarning(UserWarning):
     """Base of every warning that geofield gives."""
+
+
+class ImageryWarning(GeofieldWarning):
+    """Imagery is incomplete, or a cache file had to be rebuilt."""
 
 
 class FieldWarning(GeofieldWarning):

@@ -12,10 +12,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    JsonValue,
+    PositiveFloat,
+    SecretStr,
+    ValidationError,
+)
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from geofield.errors import SettingsError
+
+#: Settings for the file and the environment that are not options of every command.
+_NO_OPTION: dict[str, JsonValue] = {"no_option": True}
 
 NonNegative = Annotated[float, Field(ge=0)]
 
@@ -24,6 +35,30 @@ class Section(BaseModel):
     """Base of the sections: unknown names are refused, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SourceSettings(Section):
+    """An imagery source of the user's own."""
+
+    url: str = Field(description="Tile address with {z} {x} {y}, WMS or WMTS address, or path.")
+    kind: Literal["xyz", "wmts", "wms", "mbtiles", "picture"] = Field(
+        "xyz", description="What the address is."
+    )
+    attribution: str = Field("", description="To be named with every product.")
+    licence: str = Field("", description="Of the imagery.")
+    terms_url: str = Field("", description="Where the terms can be read.")
+    may_cache: bool = Field(False, description="Whether the terms allow keeping tiles.")
+    may_derive: bool = Field(False, description="Whether the terms allow deriving geodata.")
+    min_zoom: int = Field(0, ge=0, le=30, description="Coarsest zoom.")
+    max_zoom: int = Field(22, ge=0, le=30, description="Finest zoom.")
+    tile_px: int | None = Field(None, ge=64, le=4096, description="Side of a tile, pixels.")
+    subdomains: tuple[str, ...] = Field(("a", "b", "c"), description="What {s} stands for.")
+    layer: str = Field("", description="Layer of a WMS or WMTS.")
+    key: SecretStr | None = Field(None, description="Key; better kept in the environment.")
+    key_parameter: str = Field("", description="Query name of the key (WMS, WMTS).")
+    rate_per_s: PositiveFloat | None = Field(None, description="Requests per second at most.")
+    date: str | None = Field(None, description="When the imagery was taken.")
+    headers: dict[str, str] = Field({}, description="Sent with each request.")
 
 
 class ImagerySettings(Section):
@@ -36,6 +71,27 @@ class ImagerySettings(Section):
     bands: tuple[str, ...] | None = Field(
         None,
         description="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
+    )
+    threads: int = Field(
+        16, ge=1, le=64, description="Tiles fetched at once.", json_schema_extra=_NO_OPTION
+    )
+    cache_dir: str | None = Field(
+        None,
+        description="Folder of the tile caches; the user's cache folder by default.",
+        json_schema_extra=_NO_OPTION,
+    )
+    cache_max_mb: PositiveFloat = Field(
+        2048.0,
+        description="Tiles kept per source at most, megabytes.",
+        json_schema_extra=_NO_OPTION,
+    )
+    cache_max_days: PositiveFloat = Field(
+        90.0, description="Tiles are fetched anew after, days.", json_schema_extra=_NO_OPTION
+    )
+    sources: dict[str, SourceSettings] = Field(
+        {},
+        description="Sources of your own, by name: [imagery.sources.NAME] in the settings file.",
+        json_schema_extra=_NO_OPTION,
     )
 
 

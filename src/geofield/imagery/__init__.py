@@ -1,7 +1,20 @@
 """Stage 1: from a GPS point to a georeferenced picture."""
 
+from geofield.imagery.acquire import Acquired, FetchOptions, Where, acquire
+from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.scene import read_scene
+from geofield.imagery.sources import find_source
 from geofield.imagery.write import write_scene
 
-__all__ = ["SceneReader", "read_scene", "write_scene"]
+__all__ = [
+    "Acquired",
+    "FetchOptions",
+    "SceneReader",
+    "Where",
+    "acquire",
+    "find_source",
+    "open_reader",
+    "read_scene",
+    "write_scene",
+]

@@ -37,12 +37,14 @@ _REMOTE = re.compile(r"^(https?://|/vsicurl/|/vsis3/|s3://|gs://)", re.IGNORECAS
 
 def is_remote(path: str) -> bool:
     """Whether GDAL would read a path over the network."""
-    return bool(_REMOTE.match(path))
+    return bool(_REMOTE.match(path)) or "/vsicurl/" in path
 
 
 def display_name(path: str | Path) -> str:
     """A path for people and products: no folders, no query (keys live there), no password."""
     text = str(path)
+    if text.startswith("<"):  # a VRT as text
+        return "stacked bands"
     if is_remote(text):
         text = re.sub(r"[?#].*$", "", text).rstrip("/")
     return re.split(r"[\\/]", text)[-1] or "picture"
@@ -96,7 +98,7 @@ def open_picture(path: str) -> Any:
         No such file, not a picture, truncated, or the server does not answer.
     """
     name = display_name(path)
-    if not is_remote(path) and not path.startswith("/vsi") and "://" not in path:
+    if not is_remote(path) and not path.startswith(("/vsi", "<")) and "://" not in path:
         file = Path(path)
         if not file.exists():
             raise ImageryError(

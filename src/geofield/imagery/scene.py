@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.errors import ImageryError
+from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import MAX_SIDE_PX, SceneReader
 from geofield.model.scene import ImagerySource, Scene
 
@@ -75,7 +76,7 @@ def read_scene(
         )
     if size_m is not None and size_px is not None:
         raise ImageryError("The size is given twice.", hint="Give size_m or size_px, not both.")
-    reader = SceneReader.open(
+    reader = open_reader(
         str(path), lat=lat, lon=lon, bands=bands, crs=crs, scaling=scaling, source=source
     )
     if lat is None or lon is None:

@@ -1,0 +1,348 @@
+"""From a source and a place to a picture on disk: stage 1 as one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import Literal
+
+from shapely.geometry.base import BaseGeometry
+
+from geofield.errors import ImageryError
+from geofield.grid import Grid
+from geofield.imagery.cache import TileCache, cache_file
+from geofield.imagery.client import Client
+from geofield.imagery.fetch import FetchReport, Missing, Progress, TileFetcher, absence_error
+from geofield.imagery.mosaic import Staging, stage_to_cog
+from geofield.imagery.scene import read_scene
+from geofield.imagery.sources.base import FrameSource, LocalTiles, PictureSource, Source, TileSource
+from geofield.imagery.tags import source_tags
+from geofield.imagery.terms import check_terms
+from geofield.imagery.tiling import Block
+from geofield.imagery.write import replacing, write_scene
+from geofield.model.scene import ImagerySource
+
+Zoom = int | Literal["max", "fit"] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """What part of the earth is wanted: a square around a point, or an area.
+
+    Attributes
+    ----------
+    lat, lon : float, optional
+        The centre, degrees, WGS 84.
+    size_px, size_m : optional
+        Side of the square, pixels (640 by default) or ground metres.
+    area : shapely geometry, optional
+        In lon/lat degrees; instead of the square, or with a point to look around in it.
+    zoom : int, "max", "fit" or None
+        The source's zoom; its finest; the largest at which the area (or `size_m`) still fits
+        a frame of `frame_px`; None takes `resolution_m`.
+    resolution_m : float
+        Ground resolution wanted when no zoom is given.
+    whole_tiles : bool
+        Keep the touched tiles whole.
+    """
+
+    lat: float | None = None
+    lon: float | None = None
+    size_px: int | None = None
+    size_m: float | None = None
+    area: BaseGeometry | None = None
+    zoom: Zoom = None
+    resolution_m: float = 0.6
+    frame_px: int = 640
+    whole_tiles: bool = False
+
+    def __post_init__(self) -> None:
+        if self.area is None and (self.lat is None or self.lon is None):
+            raise ImageryError(
+                "A place needs a point (lat and lon) or an area.", hint="Give --lat and --lon."
+            )
+        if self.size_px is not None and self.size_m is not None:
+            raise ImageryError("The size is given twice.", hint="Give metres or pixels, not both.")
+
+    @property
+    def point(self) -> tuple[float, float]:
+        """Latitude and longitude of the point, or of the area's middle."""
+        if self.lat is not None and self.lon is not None:
+            return self.lat, self.lon
+        assert self.area is not None  # noqa: S101  (made sure above)
+        west, south, east, north = self.area.bounds
+        return (south + north) / 2, (west + east) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Acquired:
+    """What `acquire` made.
+
+    Attributes
+    ----------
+    path : Path
+    grid : Grid
+    source : ImagerySource
+    report : FetchReport
+    """
+
+    path: Path
+    grid: Grid
+    source: ImagerySource
+    report: FetchReport
+
+
+@dataclass(frozen=True, slots=True)
+class FetchOptions:
+    """How tiles are fetched and kept.
+
+    Attributes
+    ----------
+    cache_dir : Path or None
+        Where tile caches live; None keeps nothing.
+    offline : bool
+        Work from the cache alone.
+    missing : "error" or "mask"
+        What happens to tiles that cannot be had: stop, or leave no-data.
+    threads : int
+        Requests at once.
+    attempts, timeout_s, backoff_s
+        See `geofield.imagery.client.Client`.
+    cache_max_bytes, cache_max_age_s
+        Limits of each cache file.
+    acknowledged : bool
+        The user answers for terms that forbid deriving geodata.
+    proxy : str or None
+    """
+
+    cache_dir: Path | None = None
+    offline: bool = False
+    missing: Missing = "error"
+    threads: int = 16
+    attempts: int = 6
+    timeout_s: float = 20.0
+    backoff_s: float = 0.25
+    cache_max_bytes: int | None = 2 * 2**30
+    cache_max_age_s: float | None = 90 * 86400.0
+    acknowledged: bool = False
+    proxy: str | None = None
+
+
+def acquire(
+    source: Source,
+    place: Where,
+    path: str | Path,
+    *,
+    options: FetchOptions | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Acquired:
+    """Get the picture of a place from a source and write it as a COG.
+
+    Parameters
+    ----------
+    source : Source
+        From `geofield.imagery.sources.find_source`.
+    place : Place
+    path : path
+        The GeoTIFF to write.
+    options : FetchOptions, optional
+    overwrite : bool
+    progress : callable (done, total, what), optional
+
+    Raises
+    ------
+    TermsError
+        The source forbids deriving geodata and that was not acknowledged.
+    NetworkError
+        A server cannot be reached.
+    ImageryError
+        Tiles are missing (unless masked), zoom or place are not the source's.
+    """
+    options = options or FetchOptions()
+    check_terms(source.name, source.terms, acknowledged=options.acknowledged)
+    if isinstance(source, PictureSource):
+        return _picture(source, place, path, overwrite=overwrite)
+    source, block = plan(source, place)
+    with ExitStack() as stack:
+        temporary = stack.enter_context(replacing(path, overwrite=overwrite))
+        fetcher = _fetcher(source, options, stack)
+        staging = Staging(temporary.with_suffix(".rows.tif"), block)
+        stack.callback(_remove_siblings, temporary)
+        staging.fill(fetcher.rows(block, progress))
+        report = fetcher.report
+        if report.absent and (options.missing == "error" or report.absent == report.wanted):
+            raise absence_error(source.name, report)
+        provenance = _provenance(source, block, report)
+        if progress is not None:
+            progress(block.count, block.count, "writing")
+        stage_to_cog(staging.path, temporary, source_tags(provenance))
+    return Acquired(Path(path), block.grid, provenance, report)
+
+
+def plan(source: TileSource | LocalTiles, place: Where) -> tuple[TileSource | LocalTiles, Block]:
+    """The tiles that a place needs, and the source to ask for them."""
+    pyramid = source.pyramid
+    lat, lon = place.point
+    zoom = choose_zoom(source, place)
+    if isinstance(source, FrameSource):
+        size = place.size_px or place.frame_px
+        if place.size_m is not None:
+            size = round(place.size_m / pyramid.ground_resolution_m(zoom, lat=lat, lon=lon))
+        return source.framed(zoom, lat=lat, lon=lon, size_px=size)
+    if place.area is not None and place.size_px is None and place.size_m is None:
+        return source, pyramid.block_over(zoom, place.area, whole_tiles=place.whole_tiles)
+    return source, pyramid.block_around(
+        zoom,
+        lat=lat,
+        lon=lon,
+        size_px=place.size_px,
+        size_m=place.size_m,
+        whole_tiles=place.whole_tiles,
+    )
+
+
+def choose_zoom(source: TileSource | LocalTiles, place: Where) -> int:
+    """The zoom that a place asks for."""
+    pyramid = source.pyramid
+    lat, lon = place.point
+    if place.zoom == "max":
+        return pyramid.zooms[1]
+    if place.zoom == "fit":
+        if place.area is not None:
+            return pyramid.zoom_to_fit(place.area, place.frame_px)
+        if place.size_m is None:
+            raise ImageryError(
+                "Fitting the zoom needs a size in metres or an area.", hint="Add --size-m 400."
+            )
+        return next(
+            (
+                level.zoom
+                for level in reversed(pyramid.levels)
+                if place.size_m / pyramid.ground_resolution_m(level.zoom, lat=lat, lon=lon)
+                <= place.frame_px
+            ),
+            pyramid.zooms[0],
+        )
+    if place.zoom is None:
+        return pyramid.zoom_for(place.resolution_m, lat=lat, lon=lon)
+    pyramid.level(place.zoom)
+    return place.zoom
+
+
+def _fetcher(
+    source: TileSource | LocalTiles, options: FetchOptions, stack: ExitStack
+) -> TileFetcher:
+    if not isinstance(source, TileSource):
+        return TileFetcher(source, client=None, threads=options.threads)
+    cache = None
+    if options.cache_dir is not None and source.terms.cacheable:
+        cache = stack.enter_context(
+            TileCache(
+                cache_file(options.cache_dir, source.name, source.identity),
+                name=source.name,
+                terms=source.terms,
+                level=source.pyramid.level,
+                max_bytes=options.cache_max_bytes,
+                max_age_s=options.cache_max_age_s,
+                metadata=_cache_metadata(source),
+            )
+        )
+        stack.callback(cache.trim)
+    if options.offline and cache is None:
+        why = (
+            f"the terms of {source.name} do not allow one"
+            if not source.terms.cacheable
+            else "no cache folder is set"
+        )
+        raise ImageryError(
+            f"Offline work needs a cache, and {why}.", hint="Work without --offline."
+        )
+    client = None
+    if not options.offline:
+        client = Client(
+            threads=options.threads,
+            attempts=options.attempts,
+            timeout_s=options.timeout_s,
+            backoff_s=options.backoff_s,
+            rate_per_s=source.rate_per_s,
+            secrets=source.secrets,
+            proxy=options.proxy,
+        )
+        stack.callback(client.close)
+    return TileFetcher(source, client=client, cache=cache, threads=options.threads)
+
+
+def _cache_metadata(source: TileSource) -> Mapping[str, str]:
+    low, high = source.pyramid.zooms
+    words = {
+        "minzoom": str(source.pyramid.level(low).scheme_zoom),
+        "maxzoom": str(source.pyramid.level(high).scheme_zoom),
+    }
+    if not source.pyramid.levels[0].wraps:
+        words["crs"] = source.pyramid.crs.to_wkt()
+    return words
+
+
+def _provenance(
+    source: TileSource | LocalTiles, block: Block, report: FetchReport
+) -> ImagerySource:
+    newest = report.newest
+    if report.downloaded or newest is None:
+        newest = max(filter(None, (newest, _today())))
+    details = [("fetched", newest.isoformat())] if isinstance(source, TileSource) else []
+    if report.absent:
+        details.append(("tiles_masked", str(report.absent)))
+    if source.terms.url:
+        details.append(("terms", source.terms.url))
+    return ImagerySource(
+        name=source.name,
+        date=source.date,
+        attribution=source.terms.attribution,
+        licence=source.terms.licence,
+        may_derive=source.terms.may_derive,
+        may_cache=source.terms.cacheable,
+        zoom=block.level.zoom,
+        details=tuple(details),
+    )
+
+
+def _today() -> date:
+    return datetime.now(UTC).date()
+
+
+def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite: bool) -> Acquired:
+    """A window of the user's own picture."""
+    if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
+        raise ImageryError(f"{path} is the picture itself.", hint="Give the output another name.")
+    lat, lon = place.point
+    scene = read_scene(
+        source.path,
+        lat=lat,
+        lon=lon,
+        size_m=place.size_m,
+        size_px=place.size_px if place.size_m is None else None,
+        bands=source.bands,
+    )
+    terms = source.terms
+    known = scene.source
+    provenance = replace(
+        known,
+        date=source.date or known.date,
+        attribution=terms.attribution or known.attribution,
+        licence=terms.licence or known.licence,
+        may_derive=terms.may_derive and known.may_derive,
+        may_cache=terms.may_cache and known.may_cache,
+    )
+    write_scene(replace(scene, source=provenance), path, overwrite=overwrite)
+    return Acquired(Path(path), scene.grid, provenance, FetchReport())
+
+
+def _remove_siblings(temporary: Path) -> None:
+    """The rows, and what GDAL may have left beside a COG it could not finish."""
+    for leftover in temporary.parent.glob(temporary.name.removesuffix(".tif") + "*"):
+        if leftover != temporary:
+            leftover.unlink(missing_ok=True)

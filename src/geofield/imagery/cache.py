@@ -1,0 +1,346 @@
+"""The tile cache: one MBTiles file per source, which QGIS and GDAL open as a layer.
+
+Several processes may use one file at once (SQLite's locks, short transactions). A damaged
+file is set aside and a new one begun.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sqlite3
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from geofield.errors import ImageryError, ImageryWarning
+from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import TileLevel
+
+T = TypeVar("T")
+
+_SCHEMA = """
+PRAGMA auto_vacuum = INCREMENTAL;
+CREATE TABLE IF NOT EXISTS metadata (name TEXT PRIMARY KEY, value TEXT);
+CREATE TABLE IF NOT EXISTS tiles (
+    zoom_level INTEGER NOT NULL, tile_column INTEGER NOT NULL, tile_row INTEGER NOT NULL,
+    tile_data BLOB NOT NULL, PRIMARY KEY (zoom_level, tile_column, tile_row));
+CREATE TABLE IF NOT EXISTS fetched (
+    zoom_level INTEGER NOT NULL, tile_column INTEGER NOT NULL, tile_row INTEGER NOT NULL,
+    time_s INTEGER NOT NULL, bytes INTEGER NOT NULL,
+    PRIMARY KEY (zoom_level, tile_column, tile_row)) WITHOUT ROWID;
+"""
+_BUSY_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class CachedTile:
+    """A tile's bytes and when they were fetched, seconds since 1970."""
+
+    body: bytes
+    time_s: int
+
+
+@dataclass(frozen=True, slots=True)
+class CacheInfo:
+    """What a cache file holds."""
+
+    path: Path
+    source: str
+    attribution: str
+    tiles: int
+    bytes: int
+    zooms: tuple[int, int] | None
+    oldest_s: int | None
+    newest_s: int | None
+
+
+def cache_file(folder: Path, name: str, identity: str) -> Path:
+    """The cache file of a source.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        For people.
+    identity : str
+        Address template, layer and style, without any key: what makes two sources differ.
+    """
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "source"
+    return folder / f"{slug}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.mbtiles"
+
+
+class TileCache:
+    """Tiles of one source on disk.
+
+    Parameters
+    ----------
+    path : Path
+        The MBTiles file; made when missing.
+    name : str
+        Of the source.
+    terms : Terms
+    max_bytes : int, optional
+        The oldest tiles go when there are more bytes of tiles.
+    max_age_s : float, optional
+        Older tiles are fetched again.
+    level : callable
+        From a zoom to its `TileLevel`: MBTiles counts rows from the south, and zooms as the
+        ``z/x/y`` scheme does.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        name: str,
+        terms: Terms,
+        level: Callable[[int], TileLevel],
+        max_bytes: int | None = None,
+        max_age_s: float | None = None,
+        metadata: Mapping[str, str] | None = None,
+    ) -> None:
+        self.path = path
+        self._level = level
+        self._max_bytes = max_bytes
+        self._max_age_s = max_age_s
+        self._metadata = {
+            "name": name,
+            "type": "baselayer",
+            "version": "1.3",
+            "description": f"Tiles of {name}, kept by geofield",
+            "attribution": terms.attribution,
+            "licence": terms.licence,
+            **(metadata or {}),
+        }
+        self._connection = self._opened()
+
+    def __enter__(self) -> TileCache:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def get_row(
+        self, zoom: int, row: int, columns: Iterable[int], *, stale: bool = False
+    ) -> dict[int, CachedTile]:
+        """The tiles of one row that are kept and fresh, by column.
+
+        Parameters
+        ----------
+        stale : bool
+            Take tiles of any age (offline).
+        """
+        wanted = sorted(set(columns))
+        if not wanted:
+            return {}
+        since = 0.0
+        if self._max_age_s is not None and not stale:
+            since = time.time() - self._max_age_s
+
+        def query(connection: sqlite3.Connection) -> list[tuple[int, bytes, int]]:
+            return connection.execute(
+                "SELECT t.tile_column, t.tile_data, COALESCE(f.time_s, 0) FROM tiles t "
+                "LEFT JOIN fetched f USING (zoom_level, tile_column, tile_row) "
+                "WHERE t.zoom_level = ? AND t.tile_row = ? AND t.tile_column BETWEEN ? AND ? "
+                "AND COALESCE(f.time_s, 0) >= ?",
+                (*self._place(zoom, row), wanted[0], wanted[-1], since),
+            ).fetchall()
+
+        return {
+            column: CachedTile(bytes(body), time_s)
+            for column, body, time_s in self._guarded(query)
+            if column in set(wanted)
+        }
+
+    def put(self, tiles: Iterable[tuple[int, int, int, bytes]]) -> None:
+        """Keep tiles (zoom, column, row, bytes) in one transaction."""
+        now = int(time.time())
+        kept = []
+        for zoom, column, row, body in tiles:
+            kept_zoom, kept_row = self._place(zoom, row)
+            kept.append((kept_zoom, column, kept_row, body))
+        if not kept:
+            return
+
+        def insert(connection: sqlite3.Connection) -> None:
+            connection.execute("BEGIN IMMEDIATE")
+            try:
+                connection.executemany("INSERT OR REPLACE INTO tiles VALUES (?, ?, ?, ?)", kept)
+                connection.executemany(
+                    "INSERT OR REPLACE INTO fetched VALUES (?, ?, ?, ?, ?)",
+                    [(z, c, r, now, len(body)) for z, c, r, body in kept],
+                )
+                connection.execute(
+                    "INSERT OR IGNORE INTO metadata VALUES ('format', ?)", (_format(kept[0][3]),)
+                )
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:
+                    connection.execute("ROLLBACK")
+                raise
+
+        self._guarded(insert)
+
+    def trim(self) -> int:
+        """Remove the oldest tiles until the size limit holds; how many went."""
+        if self._max_bytes is None:
+            return 0
+        limit = self._max_bytes
+
+        def shrink(connection: sqlite3.Connection) -> int:
+            (total,) = connection.execute("SELECT COALESCE(SUM(bytes), 0) FROM fetched").fetchone()
+            gone = []
+            if total <= limit:
+                return 0
+            for zoom, column, row, size in connection.execute(
+                "SELECT zoom_level, tile_column, tile_row, bytes FROM fetched ORDER BY time_s"
+            ):
+                gone.append((zoom, column, row))
+                total -= size
+                if total <= limit:
+                    break
+            where = "WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?"
+            connection.execute("BEGIN IMMEDIATE")
+            connection.executemany(f"DELETE FROM tiles {where}", gone)  # noqa: S608
+            connection.executemany(f"DELETE FROM fetched {where}", gone)  # noqa: S608
+            connection.execute("COMMIT")
+            connection.execute("PRAGMA incremental_vacuum").fetchall()
+            return len(gone)
+
+        return self._guarded(shrink)
+
+    # -- inside ----------------------------------------------------------------------------
+
+    def _place(self, zoom: int, row: int) -> tuple[int, int]:
+        """Zoom and row as MBTiles counts them."""
+        level = self._level(zoom)
+        return level.scheme_zoom, level.rows - 1 - row
+
+    def _opened(self) -> sqlite3.Connection:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ImageryError(
+                f"The cache folder {self.path.parent} cannot be made: {error.strerror}.",
+                hint="Choose another with --cache-dir, or use --no-cache.",
+            ) from None
+        try:
+            return self._connected()
+        except sqlite3.DatabaseError as error:
+            if not _is_damage(error):
+                raise _unusable(self.path, error) from None
+            self._set_aside()
+            return self._connected()
+
+    def _connected(self) -> sqlite3.Connection:
+        connection = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None)
+        try:
+            connection.execute("PRAGMA synchronous = NORMAL")
+            connection.executescript(_SCHEMA)
+            connection.executemany(
+                "INSERT OR IGNORE INTO metadata VALUES (?, ?)", self._metadata.items()
+            )
+        except sqlite3.Error:
+            connection.close()
+            raise
+        return connection
+
+    def _guarded(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        try:
+            return work(self._connection)
+        except sqlite3.DatabaseError as error:
+            if not _is_damage(error):
+                raise _unusable(self.path, error) from None
+            self._connection.close()
+            self._set_aside()
+            self._connection = self._connected()
+            return work(self._connection)
+
+    def _set_aside(self) -> None:
+        number = 1
+        while (aside := self.path.with_suffix(f".damaged-{number}")).exists():
+            number += 1
+        if self.path.exists():
+            self.path.replace(aside)
+        for ending in ("-journal", "-wal", "-shm"):
+            Path(f"{self.path}{ending}").unlink(missing_ok=True)
+        warnings.warn(
+            f"The tile cache {self.path.name} was damaged. It is set aside as {aside.name} and a "
+            "new one begun; you may delete the old one.",
+            ImageryWarning,
+            stacklevel=2,
+        )
+
+
+def cache_infos(folder: Path) -> list[CacheInfo]:
+    """What each cache file of a folder holds."""
+    return [_info(path) for path in sorted(folder.glob("*.mbtiles"))] if folder.is_dir() else []
+
+
+def clear_cache(folder: Path, source: str | None = None) -> list[Path]:
+    """Delete the cache files of a source, or all of them; which ones went."""
+    gone = []
+    for info in cache_infos(folder):
+        if source is None or source in (info.source, info.path.stem, info.path.name):
+            info.path.unlink(missing_ok=True)
+            gone.append(info.path)
+    if source is None and folder.is_dir():
+        for path in folder.glob("*.damaged-*"):
+            path.unlink(missing_ok=True)
+            gone.append(path)
+    return gone
+
+
+def _info(path: Path) -> CacheInfo:
+    try:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        with closing(sqlite3.connect(uri, uri=True, timeout=_BUSY_S)) as db:
+            words = dict(db.execute("SELECT name, value FROM metadata").fetchall())
+            count, size, oldest, newest, low, high = db.execute(
+                "SELECT COUNT(*), COALESCE(SUM(bytes), 0), MIN(time_s), MAX(time_s), "
+                "MIN(zoom_level), MAX(zoom_level) FROM fetched"
+            ).fetchone()
+    except sqlite3.Error:
+        return CacheInfo(
+            path, "(damaged or not a tile cache)", "", 0, path.stat().st_size, None, None, None
+        )
+    zooms = None if low is None else (int(low), int(high))
+    return CacheInfo(
+        path,
+        words.get("name", ""),
+        words.get("attribution", ""),
+        count,
+        size,
+        zooms,
+        oldest,
+        newest,
+    )
+
+
+def _format(body: bytes) -> str:
+    if body.startswith(b"\x89PNG"):
+        return "png"
+    if body[8:12] == b"WEBP":
+        return "webp"
+    return "jpg"
+
+
+def _is_damage(error: sqlite3.DatabaseError) -> bool:
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    return code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) or "no such table" in str(error)
+
+
+def _unusable(path: Path, error: sqlite3.Error) -> ImageryError:
+    return ImageryError(
+        f"The tile cache {path} cannot be used: {error}.",
+        hint="Check free space and rights there, choose another with --cache-dir, or --no-cache.",
+    )

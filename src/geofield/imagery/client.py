@@ -1,0 +1,299 @@
+"""The HTTP client: polite, patient, and silent about keys.
+
+A request is repeated with growing pauses on time-outs, broken connections, 429, 5xx and on
+bodies that the caller finds broken; ``Retry-After`` pauses the whole host. Keys are removed
+from every message.
+"""
+
+from __future__ import annotations
+
+import email.utils
+import random
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeVar
+from urllib.parse import urlsplit
+
+import urllib3
+from urllib3.exceptions import HTTPError, LocationParseError, NewConnectionError
+
+from geofield.errors import NetworkError
+from geofield.imagery.gdal import USER_AGENT
+
+T = TypeVar("T")
+
+#: Statuses after which the same request may succeed.
+_AGAIN = frozenset({408, 425, 429, 500, 502, 503, 504, 520, 521, 522, 523, 524})
+#: There is nothing at this address.
+_NOTHING = frozenset({204, 404, 410})
+_MAX_BODY = 128 * 2**20
+#: A server that asks for a longer pause has said no.
+_MAX_PAUSE_S = 120.0
+
+
+class NotThereError(Exception):
+    """The server says that there is nothing: a hole in the coverage."""
+
+
+class BrokenBodyError(Exception):
+    """The answer is not what it should be; asking again may help."""
+
+
+class GaveUpError(Exception):
+    """The server answered, but never with what was asked for."""
+
+
+class Redactor:
+    """Removes keys from text."""
+
+    def __init__(self, secrets: Iterable[str] = ()) -> None:
+        self._secrets = tuple(sorted({s for s in secrets if s}, key=len, reverse=True))
+
+    def __call__(self, text: str) -> str:
+        """The text with every key replaced by ``***``."""
+        for secret in self._secrets:
+            text = text.replace(secret, "***")
+        return text
+
+
+class Client:
+    """A pool of connections to tile servers, shared by threads.
+
+    Parameters
+    ----------
+    threads : int
+        Connections per host.
+    attempts : int
+        Requests at most for one answer.
+    timeout_s : float
+        For connecting, for each pause within a body, and three times that for the whole.
+    rate_per_s : float, optional
+        Requests per second at most.
+    secrets : iterable of str
+        Keys that must not show in messages.
+    backoff_s : float
+        The first pause; doubled each time.
+    proxy : str, optional
+        Address of an HTTP proxy.
+    """
+
+    def __init__(
+        self,
+        *,
+        threads: int = 16,
+        attempts: int = 6,
+        timeout_s: float = 20.0,
+        rate_per_s: float | None = None,
+        secrets: Iterable[str] = (),
+        backoff_s: float = 0.25,
+        proxy: str | None = None,
+    ) -> None:
+        self.attempts = attempts
+        self.redact = Redactor(secrets)
+        #: How often each kind of trouble was met and survived.
+        self.troubles: Counter[str] = Counter()
+        self._timeout_s = timeout_s
+        self._backoff_s = backoff_s
+        self._interval_s = 1.0 / rate_per_s if rate_per_s else 0.0
+        self._next_slot = 0.0
+        self._not_before: dict[str, float] = {}
+        self._lock = threading.Lock()
+        self._stopped = threading.Event()
+        options = {
+            "num_pools": 8,
+            "maxsize": threads,
+            "block": False,
+            "timeout": urllib3.Timeout(connect=timeout_s, read=timeout_s),
+            "headers": {"User-Agent": USER_AGENT, "Accept": "image/*,*/*;q=0.5"},
+        }
+        self._pool = (
+            urllib3.ProxyManager(proxy, **options)  # type: ignore[arg-type]
+            if proxy
+            else urllib3.PoolManager(**options)  # type: ignore[arg-type]
+        )
+        self._retries = urllib3.Retry(0, redirect=5, raise_on_redirect=False)
+
+    def stop(self) -> None:
+        """Make every pause and every further request end at once."""
+        self._stopped.set()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._pool.clear()
+
+    def get(
+        self,
+        url: str,
+        accept: Callable[[bytes, str], T],
+        headers: Mapping[str, str] | None = None,
+    ) -> T:
+        """Ask until the answer is accepted.
+
+        Parameters
+        ----------
+        url : str
+        accept : callable (body, content type) -> T
+            Raises `BrokenBodyError` for an answer that is not what it should be.
+        headers : mapping, optional
+            Beside User-Agent and Accept.
+
+        Raises
+        ------
+        NotThereError
+            Nothing at this address (404, 410, 204).
+        GaveUpError
+            The server refuses, or never gave a sound answer.
+        NetworkError
+            The server cannot be reached.
+        """
+        host = urlsplit(url).netloc.rpartition("@")[2]
+        last: Exception = GaveUpError("not tried")
+        for attempt in range(self.attempts):
+            self._wait_turn(host)
+            pause = self._backoff_s * 2**attempt * random.uniform(0.75, 1.25)  # noqa: S311
+            try:
+                status, kind, asked, body = self._once(url, headers)
+            except (HTTPError, OSError) as error:
+                if isinstance(error, LocationParseError):
+                    raise GaveUpError(self.redact(f"not an address: {error}")) from None
+                last = error
+                self._count(_kind_of(error))
+                self._pause(pause)
+                continue
+            if status in _NOTHING:
+                raise NotThereError(f"status {status}")
+            if status in _AGAIN:
+                last = GaveUpError(f"status {status}")
+                self._count(f"status {status}")
+                if asked is not None:
+                    if asked > _MAX_PAUSE_S:
+                        raise GaveUpError(f"status {status}, asks to wait {asked:.0f} s")
+                    with self._lock:  # the host as a whole asked for quiet
+                        until = time.monotonic() + asked
+                        self._not_before[host] = max(self._not_before.get(host, 0.0), until)
+                    pause = asked
+                self._pause(pause)
+                continue
+            if status != 200:
+                raise GaveUpError(f"status {status}{_meaning(status)}")
+            try:
+                return accept(body, kind)
+            except BrokenBodyError as error:
+                last = GaveUpError(str(error))
+                self._count(str(error))
+                self._pause(pause)
+        if isinstance(last, GaveUpError):
+            raise GaveUpError(f"{last} {self.attempts} times")
+        raise NetworkError(
+            f"No answer from {host}: {self.redact(_plain(last))} ({self.attempts} attempts).",
+            hint="Check the network and the address. What was fetched is kept in the cache: repeat "
+            "to go on, or use --offline to work from the cache alone.",
+        )
+
+    def text(self, url: str) -> bytes:
+        """A document (capabilities, STAC), with the same patience.
+
+        Raises
+        ------
+        NetworkError
+        """
+        try:
+            return self.get(url, lambda body, kind: body)
+        except NotThereError as error:
+            reason = str(error)
+        except GaveUpError as error:
+            reason = str(error)
+        host = urlsplit(url).netloc.rpartition("@")[2]
+        raise NetworkError(
+            f"{host} does not give the document {urlsplit(url).path}: {reason}.",
+            hint="Check the address.",
+        )
+
+    def _once(
+        self, url: str, headers: Mapping[str, str] | None
+    ) -> tuple[int, str, float | None, bytes]:
+        """Status, content type, the pause asked for, body."""
+        merged = {**self._pool.headers, **headers} if headers else None
+        response = self._pool.request(
+            "GET", url, headers=merged, preload_content=False, retries=self._retries
+        )
+        deadline = time.monotonic() + 3 * self._timeout_s
+        parts, size = [], 0
+        try:
+            while part := response.read1(1 << 18):
+                parts.append(part)
+                size += len(part)
+                # A body that drips keeps the socket alive for ever.
+                if time.monotonic() > deadline:
+                    raise TimeoutError("the body came too slowly")
+                if size > _MAX_BODY:
+                    raise OSError("the body is too large")
+        except BaseException:
+            response.close()
+            raise
+        response.release_conn()
+        expected = response.headers.get("Content-Length", "")
+        encoded = "Content-Encoding" in response.headers
+        if expected.isdecimal() and not encoded and size != int(expected):
+            raise OSError(f"the body ended after {size} of {expected} bytes")
+        asked = _retry_after(response.headers.get("Retry-After"))
+        return response.status, response.headers.get("Content-Type", ""), asked, b"".join(parts)
+
+    def _wait_turn(self, host: str) -> None:
+        with self._lock:
+            now = time.monotonic()
+            slot = max(now, self._next_slot, self._not_before.get(host, 0.0))
+            if self._interval_s:
+                self._next_slot = slot + self._interval_s
+        self._pause(slot - now)
+
+    def _pause(self, seconds: float) -> None:
+        if (seconds > 0 and self._stopped.wait(seconds)) or self._stopped.is_set():
+            raise NetworkError("The work was stopped.")
+
+    def _count(self, kind: str) -> None:
+        with self._lock:
+            self.troubles[kind] += 1
+
+
+def _retry_after(value: str | None) -> float | None:
+    """Seconds to wait: a number, or a date."""
+    if not value:
+        return None
+    if value.strip().isdecimal():
+        return float(value)
+    try:
+        moment = email.utils.parsedate_to_datetime(value)
+    except (TypeError, ValueError):
+        return None
+    return max(0.0, moment.timestamp() - time.time())
+
+
+def _kind_of(error: Exception) -> str:
+    text = f"{type(error).__name__} {error}".lower()
+    if "timeout" in text or "timed out" in text or "too slowly" in text:
+        return "time-out"
+    if isinstance(error, NewConnectionError):
+        return "no connection"
+    if "incomplete" in text or "ended after" in text:
+        return "body cut off"
+    return "connection broken"
+
+
+def _plain(error: Exception) -> str:
+    """The reason alone: urllib3's messages carry the whole address."""
+    kind = _kind_of(error)
+    cause = error.__cause__ or error.__context__
+    if isinstance(cause, OSError) and cause.strerror:
+        return f"{kind}, {cause.strerror.lower()}"
+    return kind
+
+
+def _meaning(status: int) -> str:
+    return {
+        401: " (not authorised: check the key)",
+        403: " (forbidden: check the key and the terms)",
+        400: " (bad request)",
+    }.get(status, "")

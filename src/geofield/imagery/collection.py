@@ -1,0 +1,275 @@
+"""Many pictures read as one: a folder of drone tiles, a set of orthophoto sheets.
+
+The picture that holds the point gives the grid (its CRS, its pixels); the others are put on
+it, pixel for pixel where they lie on the same lattice, reprojected where they do not, as with
+sheets in another UTM zone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.windows import Window
+
+from geofield.errors import GeofieldError, ImageryError, PointOutsideError
+from geofield.grid import Grid
+from geofield.imagery.gdal import display_name
+from geofield.imagery.placing import REACH_M, WarpOrigin
+from geofield.imagery.reader import SceneReader
+from geofield.model.scene import ImagerySource
+
+#: Lattices this near to each other (px) are the same.
+_SAME_PX = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One picture on the common grid.
+
+    Attributes
+    ----------
+    reader : SceneReader
+        Read as it is when `offset` is given, else already reprojected to the common grid.
+    offset : (column, row) or None
+        Of its first pixel on the common grid.
+    bounds : (left, top, right, bottom)
+        Common pixels that it may touch.
+    """
+
+    reader: SceneReader
+    offset: tuple[int, int] | None
+    bounds: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class CollectionReader(SceneReader):
+    """A reader over several pictures; see `SceneReader`.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        In the order of precedence: the first picture with data at a pixel shows there.
+    """
+
+    parts: tuple[Part, ...] = ()
+
+    def _pixels(
+        self, window: Window, shape: tuple[int, int]
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        count = 3 if self.palette else len(self.roles.shown)
+        dtype = np.uint8 if self.palette else np.dtype(self.dtype)
+        values = np.zeros((count, *shape), dtype)
+        valid = np.zeros(shape, bool)
+        left, top = int(window.col_off), int(window.row_off)
+        right, bottom = left + int(window.width), top + int(window.height)
+        full = shape == (bottom - top, right - left)
+        for part in self.parts:
+            c0, r0 = max(left, part.bounds[0]), max(top, part.bounds[1])
+            c1, r1 = min(right, part.bounds[2]), min(bottom, part.bounds[3])
+            if c1 <= c0 or r1 <= r0 or valid.all():
+                continue
+            if full:
+                dc, dr = part.offset or (0, 0)
+                inner = Window(c0 - dc, r0 - dr, c1 - c0, r1 - r0)
+                got, there = part.reader._pixels(inner, (r1 - r0, c1 - c0))
+                place = (slice(r0 - top, r1 - top), slice(c0 - left, c1 - left))
+            else:
+                reader = part.reader
+                if part.offset is not None:
+                    reader = on_grid(reader, self.grid)
+                got, there = reader._pixels(window, shape)
+                place = (slice(0, shape[0]), slice(0, shape[1]))
+            new = there & ~valid[place]
+            for band in range(count):
+                values[band][place][new] = got[band][new]
+            valid[place] |= new
+        return values, valid
+
+
+def open_collection(
+    paths: Sequence[str],
+    *,
+    lat: float | None = None,
+    lon: float | None = None,
+    bands: Sequence[str] | None = None,
+    crs: Any = None,
+    scaling: tuple[float, float] | None = None,
+    source: ImagerySource | None = None,
+    name: str = "",
+) -> SceneReader:
+    """A reader over several pictures.
+
+    Parameters
+    ----------
+    paths : sequence of str
+        Files or addresses; earlier ones win where several are as fine at the point.
+    lat, lon : float, optional
+        The point; pictures farther than 10 km from it are left out.
+    name : str
+        Of the whole, for people.
+
+    Raises
+    ------
+    ImageryError
+        None of them can be read.
+    PointOutsideError
+        None of them holds the point.
+    """
+    readers: list[SceneReader] = []
+    notes: list[str] = []
+    for path in paths:
+        try:
+            readers.append(SceneReader.open(path, bands=bands, crs=crs, scaling=scaling))
+        except GeofieldError as error:
+            notes.append(f"{display_name(path)} was left out: {error.message}")
+    if not readers:
+        raise ImageryError(
+            f"{name or 'The collection'} holds no picture that can be read.",
+            hint=notes[0] if notes else "Give a folder with GeoTIFF files.",
+        )
+    reference = _reference(readers, lat, lon, name)
+    usable = [each for each in readers if _fits(each, reference)]
+    if len(usable) < len(readers):
+        notes.append(f"{len(readers) - len(usable)} pictures with other bands were left out.")
+    usable.sort(key=lambda each: each is not reference)  # stable: the reference first
+    grid, boxes = _common_grid(reference, usable, lat, lon)
+    parts = []
+    for reader, box in zip(usable, boxes, strict=True):
+        if box is None:
+            continue
+        offset = _offset(reader.grid, grid) if reader.warped_from is None else None
+        if offset is not None:
+            w, h = reader.grid.width_px, reader.grid.height_px
+            bounds = (offset[0], offset[1], offset[0] + w, offset[1] + h)
+            parts.append(Part(reader, offset, bounds))
+        else:
+            parts.append(Part(on_grid(reader, grid), None, box))
+    if len(parts) > 1:
+        moved = sum(part.offset is None for part in parts)
+        notes.append(
+            f"Joined from {len(parts)} pictures"
+            + (f"; {moved} of them reprojected to {grid.crs.name}." if moved else ".")
+        )
+    known = source or replace(reference.source, name=name or reference.source.name)
+    return CollectionReader(
+        path=reference.path,
+        grid=grid,
+        roles=reference.roles,
+        dtype=reference.dtype,
+        source=known,
+        scaling=scaling if scaling is not None else reference.scaling,
+        notes=(*reference.notes, *notes),
+        palette=reference.palette,
+        parts=tuple(parts),
+    )
+
+
+def on_grid(reader: SceneReader, grid: Grid) -> SceneReader:
+    """The same picture read through a reprojection to another grid."""
+    origin = reader.warped_from or WarpOrigin(reader.grid.crs, reader.grid.transform)
+    return replace(reader, grid=grid, warped_from=origin)
+
+
+def _reference(
+    readers: list[SceneReader], lat: float | None, lon: float | None, name: str
+) -> SceneReader:
+    """The finest picture at the point; the first of equals."""
+    here = readers
+    if lat is not None and lon is not None:
+        here = [each for each in readers if each.grid.contains_px(*each.grid.from_lonlat(lon, lat))]
+        if not here:
+            raise PointOutsideError(_outside(readers, lat, lon, name))
+    return min(here, key=lambda each: round(each.grid.ground_resolution_m, 4))
+
+
+def _outside(readers: list[SceneReader], lat: float, lon: float, name: str) -> str:
+    corners = [corner for each in readers for corner in each.grid.corners_lonlat()]
+    lons, lats = [c[0] for c in corners], [c[1] for c in corners]
+    message = (
+        f"The point lat {lat}, lon {lon} lies outside all {len(readers)} pictures of "
+        f"{name or 'the collection'}, which cover parts of lat {min(lats):.6f} to {max(lats):.6f}, "
+        f"lon {min(lons):.6f} to {max(lons):.6f}."
+    )
+    if abs(lon) <= 90 and any(
+        each.grid.contains_px(*each.grid.from_lonlat(lat, lon)) for each in readers
+    ):
+        message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+    return message
+
+
+def _fits(reader: SceneReader, reference: SceneReader) -> bool:
+    shown = [reader.roles.roles[i] for i in reader.roles.shown]
+    wanted = [reference.roles.roles[i] for i in reference.roles.shown]
+    placed = reader.warped_from is None or reader.warped_from.transform is not None
+    return (
+        (shown == wanted and reader.dtype == reference.dtype)
+        and bool(reader.palette) == bool(reference.palette)
+        and (placed or reader is reference)
+    )
+
+
+_Box = tuple[int, int, int, int]
+
+
+def _common_grid(
+    reference: SceneReader, readers: list[SceneReader], lat: float | None, lon: float | None
+) -> tuple[Grid, list[_Box | None]]:
+    """The reference's lattice over all pictures near the point, and each one's place on it."""
+    base = reference.grid
+    reach = math.inf
+    x0, y0 = base.width_px / 2, base.height_px / 2
+    if lat is not None and lon is not None:
+        x0, y0 = base.from_lonlat(lon, lat)
+        reach = REACH_M / base.ground_resolution_m
+    boxes: list[tuple[float, float, float, float] | None] = []
+    for reader in readers:
+        w, h = reader.grid.width_px, reader.grid.height_px
+        edge = np.linspace(0.0, 1.0, 9)
+        xs = np.concatenate([edge * w, np.full(9, w), edge * w, np.zeros(9)])
+        ys = np.concatenate([np.zeros(9), edge * h, np.full(9, h), edge * h])
+        px, py = base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs)
+        if not (np.isfinite(px).all() and np.isfinite(py).all()):
+            boxes.append(None)
+            continue
+        box = (
+            max(px.min(), x0 - reach),
+            max(py.min(), y0 - reach),
+            min(px.max(), x0 + reach),
+            min(py.max(), y0 + reach),
+        )
+        boxes.append(box if box[2] > box[0] and box[3] > box[1] else None)
+    there = [box for box in boxes if box is not None]
+    left = math.floor(min(box[0] for box in there) + _SAME_PX)
+    top = math.floor(min(box[1] for box in there) + _SAME_PX)
+    right = math.ceil(max(box[2] for box in there) - _SAME_PX)
+    bottom = math.ceil(max(box[3] for box in there) - _SAME_PX)
+    grid = base.crop(left, top, right - left, bottom - top)
+    places: list[_Box | None] = [
+        None
+        if box is None
+        else (
+            max(math.floor(box[0]) - left - 1, 0),
+            max(math.floor(box[1]) - top - 1, 0),
+            min(math.ceil(box[2]) - left + 1, right - left),
+            min(math.ceil(box[3]) - top + 1, bottom - top),
+        )
+        for box in boxes
+    ]
+    return grid, places
+
+
+def _offset(grid: Grid, common: Grid) -> tuple[int, int] | None:
+    """Whole pixels from the common grid's corner, when both lie on one lattice."""
+    if grid.crs != common.crs:
+        return None
+    w, h = grid.width_px, grid.height_px
+    x, y = common.from_native(*grid.to_native(np.array([0, w, 0]), np.array([0, 0, h])))
+    column, row = round(x[0]), round(y[0])
+    expected_x, expected_y = np.array([column, column + w, column]), np.array([row, row, row + h])
+    near = np.abs(x - expected_x).max() < _SAME_PX and np.abs(y - expected_y).max() < _SAME_PX
+    return (column, row) if near else None

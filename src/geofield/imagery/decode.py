@@ -1,0 +1,62 @@
+"""Tiles from bytes to pixels, with every check that keeps broken ones out."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from geofield.errors import ImageryError
+from geofield.imagery.client import BrokenBodyError
+
+#: Red, green, blue (rows, columns, 3) and whether each pixel is there (None: all are).
+Pixels = tuple[NDArray[np.uint8], NDArray[np.bool_] | None]
+
+
+class WrongSizeError(ImageryError):
+    """The tiles are sound, but not of the size the source is said to have."""
+
+
+def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
+    """The pixels of a PNG, JPEG or WebP tile.
+
+    Parameters
+    ----------
+    body : bytes
+    kind : str
+        The content type, for the message.
+    size_px : (width, height)
+        What the tile must measure.
+
+    Raises
+    ------
+    BrokenBodyError
+        Not a picture, or one that ends too early.
+    WrongSizeError
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image: Image.Image = Image.open(io.BytesIO(body))
+            if image.size != size_px:
+                raise WrongSizeError(
+                    f"The source sends tiles of {image.width} x {image.height} px, not "
+                    f"{size_px[0]} x {size_px[1]} px.",
+                    hint=f"Set its tile_px to {image.width}.",
+                )
+            image.load()
+    except UnidentifiedImageError:
+        said = kind.partition(";")[0].strip() or "no type"
+        raise BrokenBodyError(f"not a picture ({said})") from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombWarning):
+        raise BrokenBodyError("broken picture") from None
+    if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+        rgba = np.asarray(image.convert("RGBA"))
+        valid = rgba[..., 3] >= 128
+        return np.ascontiguousarray(rgba[..., :3]), None if valid.all() else valid
+    if image.mode.startswith("I;16"):
+        image = image.point(lambda value: value / 257).convert("L")
+    return np.asarray(image.convert("RGB")), None

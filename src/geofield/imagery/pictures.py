@@ -1,0 +1,96 @@
+"""Opening whatever the user names as picture: file, address, folder, index or STAC file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from geofield.errors import ImageryError
+from geofield.imagery.collection import open_collection
+from geofield.imagery.gdal import display_name, is_remote
+from geofield.imagery.reader import SceneReader
+from geofield.imagery.stac import is_stac, open_stac
+from geofield.model.scene import ImagerySource
+
+_PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
+_INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
+
+
+def open_reader(
+    path: str,
+    *,
+    lat: float | None = None,
+    lon: float | None = None,
+    bands: Sequence[str] | None = None,
+    crs: Any = None,
+    scaling: tuple[float, float] | None = None,
+    source: ImagerySource | None = None,
+) -> SceneReader:
+    """A reader of any picture or set of pictures; parameters as `SceneReader.open`.
+
+    Raises
+    ------
+    ImageryError
+    """
+    options: dict[str, Any] = {
+        "lat": lat,
+        "lon": lon,
+        "bands": bands,
+        "crs": crs,
+        "scaling": scaling,
+        "source": source,
+    }
+    if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):
+        return SceneReader.open(path, **options)
+    file = Path(path)
+    if file.is_dir():
+        return open_collection(pictures_in(file), name=file.name, **options)
+    if file.suffix.lower() in (".json", ".geojson") and file.is_file() and is_stac(file):
+        return open_stac(file, **options)
+    if file.suffix.lower() in _INDEXES and file.is_file():
+        located = pictures_of_index(file)
+        if located:
+            return open_collection(located, name=file.name, **options)
+    return SceneReader.open(path, **options)
+
+
+def pictures_in(folder: Path) -> list[str]:
+    """The pictures of a folder and its sub-folders, in the order of their names.
+
+    Raises
+    ------
+    ImageryError
+        There are none.
+    """
+    found = sorted(
+        str(file)
+        for file in folder.rglob("*")
+        if file.suffix.lower() in _PICTURES and file.is_file() and not file.name.startswith(".")
+    )
+    if not found:
+        raise ImageryError(
+            f"The folder {folder} holds no picture.",
+            hint="Give a folder with GeoTIFF, VRT or JPEG 2000 files.",
+        )
+    return found
+
+
+def pictures_of_index(index: Path) -> list[str]:
+    """The pictures that a tile index (`gdaltindex`) lists; empty for other vector files."""
+    import fiona
+    from fiona.errors import FionaError
+
+    try:
+        with fiona.open(index) as table:
+            names = {name.lower(): name for name in table.schema["properties"]}
+            column = names.get("location") or names.get("path")
+            if column is None:
+                return []
+            rows = [str(row["properties"][column]) for row in table]
+    except FionaError as error:
+        raise ImageryError(f"The index {display_name(index)} cannot be read: {error}.") from None
+    return [
+        row if is_remote(row) or Path(row).is_absolute() else str(index.parent / row)
+        for row in rows
+    ]

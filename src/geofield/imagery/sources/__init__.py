@@ -1,0 +1,16 @@
+"""Imagery sources behind one small protocol: servers, files, folders."""
+
+from geofield.imagery.sources.base import LocalTiles, PictureSource, Source, TileSource
+from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
+from geofield.imagery.sources.registry import find_source, merged_catalogue
+
+__all__ = [
+    "BUILTIN",
+    "LocalTiles",
+    "PictureSource",
+    "Source",
+    "SourceEntry",
+    "TileSource",
+    "find_source",
+    "merged_catalogue",
+]

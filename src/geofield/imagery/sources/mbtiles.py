@@ -1,0 +1,85 @@
+"""MBTiles: a whole pyramid of tiles in one SQLite file."""
+
+from __future__ import annotations
+
+import io
+import sqlite3
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image, UnidentifiedImageError
+
+from geofield.errors import ImageryError
+from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import Tile, TilePyramid
+
+
+@dataclass(frozen=True, slots=True)
+class MBTilesSource:
+    """Tiles of a file here; a picklable value, the file is opened for each tile."""
+
+    name: str
+    path: str
+    terms: Terms
+    pyramid: TilePyramid
+    date: str | None = None
+
+    @classmethod
+    def open(cls, path: str | Path, terms: Terms | None = None) -> MBTilesSource:
+        """Look at an MBTiles file.
+
+        Raises
+        ------
+        ImageryError
+            Not an MBTiles file, empty, or of vector tiles.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise ImageryError(f"There is no file {path}.", hint="Check the path.")
+        try:
+            with closing(_connected(file)) as db:
+                words = dict(db.execute("SELECT name, value FROM metadata").fetchall())
+                low, high = db.execute(
+                    "SELECT MIN(zoom_level), MAX(zoom_level) FROM tiles"
+                ).fetchone()
+                sample = db.execute("SELECT tile_data FROM tiles LIMIT 1").fetchone()
+        except sqlite3.DatabaseError as error:
+            raise ImageryError(
+                f"{file.name} is not an MBTiles file: {error}.", hint="Give raster MBTiles."
+            ) from None
+        if low is None or sample is None:
+            raise ImageryError(f"The MBTiles file {file.name} holds no tiles.")
+        if words.get("format") in ("pbf", "mvt"):
+            raise ImageryError(f"{file.name} holds vector tiles.", hint="Give MBTiles of pictures.")
+        try:
+            with Image.open(io.BytesIO(sample[0])) as image:
+                tile_px = image.width
+        except UnidentifiedImageError:
+            raise ImageryError(f"The tiles in {file.name} are not pictures.") from None
+        return cls(
+            name=words.get("name") or file.name,
+            path=str(file),
+            terms=terms
+            or Terms(
+                attribution=words.get("attribution", ""),
+                licence=words.get("licence", ""),
+                may_cache=True,
+            ),
+            pyramid=TilePyramid.web_mercator(int(low), int(high), tile_px),
+        )
+
+    def read(self, tile: Tile) -> bytes | None:
+        """The bytes of a tile, or None."""
+        row = 2**tile.zoom - 1 - tile.row
+        with closing(_connected(Path(self.path))) as db:
+            found = db.execute(
+                "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? "
+                "AND tile_row = ?",
+                (tile.zoom, tile.column, row),
+            ).fetchone()
+        return None if found is None else bytes(found[0])
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=30)

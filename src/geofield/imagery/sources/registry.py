@@ -1,0 +1,201 @@
+"""From what the user names (a source, an address, a path) to the source itself."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from geofield.errors import ImageryError
+from geofield.imagery.client import Client
+from geofield.imagery.gdal import display_name
+from geofield.imagery.sources.base import PictureSource, Source
+from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
+from geofield.imagery.sources.google import GoogleStaticSource
+from geofield.imagery.sources.mbtiles import MBTilesSource
+from geofield.imagery.sources.ows import query_value
+from geofield.imagery.sources.wms import open_wms
+from geofield.imagery.sources.wmts import open_wmts
+from geofield.imagery.sources.xyz import XYZSource
+from geofield.imagery.terms import Terms
+
+#: The user's own pictures, and addresses whose owner's terms we do not know: the user answers
+#: for those. Their tiles are kept, so that a restart goes on where it stopped.
+_OWN = Terms(may_cache=True, may_derive=True)
+#: Owners whose terms are known to forbid deriving geodata from their pictures, by host.
+_FORBIDDING = {
+    "google.com": "Google",
+    "googleapis.com": "Google",
+    "gstatic.com": "Google",
+    "bing.com": "Microsoft Bing Maps",
+    "virtualearth.net": "Microsoft Bing Maps",
+    "arcgisonline.com": "Esri",
+    "mapbox.com": "Mapbox",
+    "apple.com": "Apple",
+    "yandex.net": "Yandex",
+}
+
+
+def merged_catalogue(own: Mapping[str, SourceEntry] | None = None) -> dict[str, SourceEntry]:
+    """The sources known by name: the built-in ones and the user's, which win."""
+    return {**BUILTIN, **(own or {})}
+
+
+def find_source(
+    what: str,
+    *,
+    catalogue: Mapping[str, SourceEntry] | None = None,
+    keys: Mapping[str, str] | None = None,
+    client: Client | None = None,
+    layer: str = "",
+    point: tuple[float, float] | None = None,
+) -> Source:
+    """The source that a name, address or path means.
+
+    Parameters
+    ----------
+    what : str
+        A name of the catalogue; a tile address with ``{z}``, ``{x}``, ``{y}``; the address of
+        a WMS, WMTS or GeoTIFF (``wms:`` or ``wmts:`` in front settles doubt); a file or folder.
+    catalogue : mapping, optional
+        Sources by name; the built-in ones by default.
+    keys : mapping of source name to key, optional
+    client : Client, optional
+        For capabilities documents.
+    layer : str
+        Of a WMS or WMTS.
+    point : (lon, lat), optional
+        Where the picture will be; a WMS without Web Mercator is asked in its UTM zone.
+
+    Raises
+    ------
+    ImageryError
+        Nothing of that name; the nearest one is suggested.
+    """
+    catalogue = BUILTIN if catalogue is None else catalogue
+    if what in catalogue:
+        entry = catalogue[what]
+        return open_entry(
+            what, entry, key=(keys or {}).get(what, ""), client=client, layer=layer, point=point
+        )
+    kind, address = kind_of(what)
+    if not kind:
+        raise _unknown(what, catalogue)
+    entry = SourceEntry(kind=kind, address=address, terms=terms_of_host(address))
+    name = urlsplit(address).hostname or display_name(address)
+    return open_entry(name, entry, key="", client=client, layer=layer, point=point)
+
+
+def open_entry(
+    name: str,
+    entry: SourceEntry,
+    *,
+    key: str,
+    client: Client | None,
+    layer: str = "",
+    point: tuple[float, float] | None = None,
+) -> Source:
+    """The source of a catalogue entry."""
+    kind = entry.kind.removesuffix("-file")
+    if kind == "xyz":
+        return XYZSource(
+            name,
+            entry.address,
+            entry.terms,
+            entry.min_zoom,
+            entry.max_zoom,
+            entry.tile_px,
+            entry.subdomains,
+            key,
+            entry.rate_per_s,
+            entry.date,
+            entry.headers,
+        )
+    if kind == "google":
+        return GoogleStaticSource(key=key, address=entry.address, name=name, terms=entry.terms)
+    if kind == "mbtiles":
+        known = entry.terms if entry.terms.attribution else None
+        return MBTilesSource.open(entry.address, known)
+    given = entry.terms if entry.terms != _OWN else None
+    if kind == "wmts":
+        return open_wmts(
+            entry.address,
+            client,
+            name=name,
+            layer=layer or entry.layer,
+            terms=given,
+            key=key,
+            key_parameter=entry.key_parameter,
+        )
+    if kind == "wms":
+        return open_wms(
+            entry.address,
+            client,
+            name=name,
+            layer=layer or entry.layer,
+            terms=given,
+            key=key,
+            key_parameter=entry.key_parameter,
+            point=point,
+        )
+    return PictureSource(name, entry.terms, entry.address, entry.bands, entry.date)
+
+
+def terms_of_host(address: str) -> Terms:
+    """The terms of an address given by hand: open, unless its owner is known to forbid."""
+    host = urlsplit(address).hostname or ""
+    for ending, owner in _FORBIDDING.items():
+        if host == ending or host.endswith("." + ending):
+            return Terms(f"Imagery © {owner} and its providers", f"terms of {owner}", False, False)
+    return _OWN
+
+
+def kind_of(what: str) -> tuple[str, str]:
+    """The kind of a path or address, and the address itself; ('', ...) when it is neither."""
+    for prefix in ("wmts:", "wms:", "xyz:"):
+        if what.lower().startswith(prefix) and not what.lower().startswith(prefix + "//"):
+            return prefix[:-1], what[len(prefix) :]
+    if urlsplit(what).scheme in ("http", "https"):
+        if "{" in what:
+            return "xyz", what
+        service = query_value(what, "service").lower()
+        path = urlsplit(what).path.lower()
+        if service in ("wms", "wmts"):
+            return service, what
+        if path.endswith("wmtscapabilities.xml") or "/wmts" in path:
+            return "wmts", what
+        if "wms" in path.rpartition("/")[2] or path.endswith("/wmsserver"):
+            return "wms", what
+        return "picture", what
+    if what.startswith(("/vsi", "s3://", "gs://")):
+        return "picture", what
+    if "{" in what and "}" in what:
+        return "xyz", what
+    file = Path(what)
+    if not file.exists():
+        return "", what
+    if file.suffix.lower() == ".mbtiles":
+        return "mbtiles-file", what
+    if file.suffix.lower() == ".xml":
+        head = file.read_bytes()[:2000]
+        if b"wmts" in head.lower():
+            return "wmts-file", what
+        if b"WMS_Capabilities" in head or b"WMT_MS_Capabilities" in head:
+            return "wms-file", what
+    return "picture-file", what
+
+
+def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
+    close = difflib.get_close_matches(what.lower(), catalogue, n=1, cutoff=0.5)
+    looks_like_path = "/" in what or "\\" in what or Path(what).suffix != ""
+    if looks_like_path and not close:
+        return ImageryError(
+            f"There is no picture {what}.",
+            hint="Check the path. `geofield sources` lists the sources known by name.",
+        )
+    return ImageryError(
+        f"There is no imagery source or file {what!r}.",
+        hint=(f"Did you mean {close[0]!r}? " if close else "")
+        + "`geofield sources` lists them; an address or a path will do too.",
+    )

@@ -1,0 +1,278 @@
+"""WMTS: the pyramid, the tile addresses and the terms from a capabilities document."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from urllib.parse import quote
+from xml.etree import ElementTree as ET
+
+from pyproj import CRS
+
+from geofield.crs import WEB_MERCATOR, is_metric
+from geofield.errors import ImageryError
+from geofield.imagery.client import Client
+from geofield.imagery.sources.base import Request
+from geofield.imagery.sources.ows import (
+    children,
+    choose_layer,
+    link,
+    north_first,
+    parse_ogc_crs,
+    plain_address,
+    query_value,
+    read_document,
+    text,
+    with_query,
+)
+from geofield.imagery.sources.xyz import secrets_of
+from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import Tile, TileLevel, TilePyramid
+
+#: Metres per pixel at scale 1:1 in the standard (0.28 mm pixels).
+_PIXEL_M = 0.00028
+_METRES_PER_DEGREE = 111319.49079327358
+_FORMATS = ("image/png", "image/webp", "image/jpeg", "image/jpg", "image/png8")
+
+
+@dataclass(frozen=True, slots=True)
+class WMTSSource:
+    """One layer of a WMTS in one tile matrix set."""
+
+    name: str
+    layer: str
+    pyramid: TilePyramid
+    template: str = field(repr=False)
+    terms: Terms
+    key: str = field(default="", repr=False)
+    key_parameter: str = ""
+    rate_per_s: float | None = None
+    date: str | None = None
+
+    @property
+    def identity(self) -> str:
+        """Template and layer, without any key."""
+        return f"wmts {self.layer} {_without_secret(self.template, self.key)}"
+
+    @property
+    def secrets(self) -> tuple[str, ...]:
+        """The key."""
+        return secrets_of(self.key)
+
+    def request(self, tile: Tile) -> Request:
+        """The address of a tile."""
+        level = self.pyramid.level(tile.zoom)
+        address = (
+            self.template.replace("{TileMatrix}", quote(level.identifier, safe=":"))
+            .replace("{TileRow}", str(tile.row))
+            .replace("{TileCol}", str(tile.column))
+        )
+        if self.key and self.key_parameter:
+            address += f"{'&' if '?' in address else '?'}{self.key_parameter}="
+            address += quote(self.key, safe="")
+        return Request(address)
+
+
+def open_wmts(
+    address: str,
+    client: Client | None,
+    *,
+    name: str = "",
+    layer: str = "",
+    terms: Terms | None = None,
+    key: str = "",
+    key_parameter: str = "",
+) -> WMTSSource:
+    """A WMTS source from the address or path of its capabilities.
+
+    Parameters
+    ----------
+    address : str
+        Of the capabilities document, or of a key-value service.
+    client : Client or None
+    name, layer : str
+        The layer may also stand in the address as ``layer=NAME``.
+    terms : Terms, optional
+        Better known than the document's own words.
+    key, key_parameter : str
+        Added to each request as ``key_parameter=key``.
+
+    Raises
+    ------
+    ImageryError
+        No such layer; no tile matrix set in a CRS of use.
+    """
+    wanted = layer or query_value(address, "layer")
+    document = address
+    if address.startswith(("http://", "https://")):
+        if not address.partition("?")[0].lower().endswith(".xml"):
+            document = with_query(address, SERVICE="WMTS", REQUEST="GetCapabilities")
+        if key and key_parameter:
+            document = with_query(document, **{key_parameter: key})
+    root = read_document(document, client)
+    layers = {text(each, "Identifier"): each for each in children(root, "Contents", "Layer")}
+    chosen = choose_layer(sorted(layers), wanted, address)
+    element = layers[chosen]
+    sets = {text(each, "Identifier"): each for each in children(root, "Contents", "TileMatrixSet")}
+    links = [text(each, "TileMatrixSet") for each in children(element, "TileMatrixSetLink")]
+    set_id, pyramid = _best_set([(i, sets[i]) for i in links if i in sets], address)
+    return WMTSSource(
+        name=name or chosen,
+        layer=chosen,
+        pyramid=pyramid,
+        template=_template(root, element, set_id, address),
+        terms=terms or _terms(root),
+        key=key,
+        key_parameter=key_parameter,
+    )
+
+
+def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[str, TilePyramid]:
+    """Web Mercator first (every cache and viewer knows it), then a metric CRS, then degrees."""
+    found = []
+    for identifier, element in candidates:
+        crs = parse_ogc_crs(text(element, "SupportedCRS"))
+        if crs is None:
+            continue
+        levels = _levels(element, crs)
+        if levels:
+            rank = 0 if crs == WEB_MERCATOR else 1 if is_metric(crs) else 2
+            found.append((rank, -len(levels), identifier, TilePyramid(crs, levels)))
+    if not found:
+        raise ImageryError(
+            f"{plain_address(address)} offers the layer in no known coordinate reference system."
+        )
+    _, _, identifier, pyramid = min(found, key=lambda each: each[:3])
+    return identifier, pyramid
+
+
+def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
+    unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
+    # The corner follows the authority's axis order when the CRS is named as a URN.
+    swapped = north_first(crs) and "urn:" in text(element, "SupportedCRS")
+    rough = []
+    for matrix in children(element, "TileMatrix"):
+        scale = float(text(matrix, "ScaleDenominator"))
+        corner = [float(part) for part in text(matrix, "TopLeftCorner").split()]
+        left, top = reversed(corner) if swapped else corner
+        rough.append(
+            (
+                scale * _PIXEL_M / unit_m,
+                left,
+                top,
+                int(text(matrix, "MatrixWidth")),
+                int(text(matrix, "MatrixHeight")),
+                (int(text(matrix, "TileWidth")), int(text(matrix, "TileHeight"))),
+                text(matrix, "Identifier"),
+            )
+        )
+    rough.sort(key=lambda each: -each[0])
+    if crs == WEB_MERCATOR:
+        return _web_mercator_levels(rough)
+    return tuple(TileLevel(zoom, *values) for zoom, values in enumerate(rough))
+
+
+_Rough = tuple[float, float, float, int, int, tuple[int, int], str]
+
+
+def _web_mercator_levels(rough: list[_Rough]) -> tuple[TileLevel, ...]:
+    """Levels with the zooms of the ``z/x/y`` scheme, and its exact numbers where they agree.
+
+    Documents print few digits: over a million columns they add up to metres.
+    """
+    exact = {
+        (level.zoom, tile_px): level
+        for tile_px in {each[5][0] for each in rough}
+        for level in TilePyramid.web_mercator(0, 24, tile_px).levels
+    }
+    levels = []
+    for n, values in enumerate(rough):
+        resolution, left, top, columns, rows, tile_px, identifier = values
+        match = next(
+            (
+                level
+                for (_, size), level in exact.items()
+                if size == tile_px[0] == tile_px[1]
+                and abs(level.resolution / resolution - 1) < 1e-4
+                and abs(left - level.left) < 2 * resolution + 1.0
+                and abs(top - level.top) < 2 * resolution + 1.0
+            ),
+            None,
+        )
+        if match is None:
+            levels.append(TileLevel(n, *values))
+        else:
+            levels.append(
+                TileLevel(
+                    match.zoom,
+                    match.resolution,
+                    match.left,
+                    match.top,
+                    columns,
+                    rows,
+                    tile_px,
+                    identifier,
+                    wraps=columns == match.columns,
+                )
+            )
+    if len({level.zoom for level in levels}) != len(levels):
+        return tuple(TileLevel(n, *values) for n, values in enumerate(rough))
+    return tuple(levels)
+
+
+def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) -> str:
+    style = next(
+        (
+            text(each, "Identifier")
+            for each in children(layer, "Style")
+            if each.get("isDefault") == "true"
+        ),
+        next((text(each, "Identifier") for each in children(layer, "Style")), ""),
+    )
+    offered = [(each.text or "").strip() for each in children(layer, "Format")]
+    form = next((f for f in _FORMATS if f in offered), offered[0] if offered else "image/png")
+    resources = [
+        each
+        for each in children(layer, "ResourceURL")
+        if each.get("resourceType", "tile") == "tile"
+    ]
+    if resources:
+        best = next((each for each in resources if each.get("format") == form), resources[0])
+        template = best.get("template", "")
+        fixed = {"style": style, "tilematrixset": set_id, "layer": text(layer, "Identifier")}
+        for dimension in children(layer, "Dimension"):
+            fixed[text(dimension, "Identifier").lower()] = text(dimension, "Default")
+        return re.sub(r"\{(\w+)\}", lambda m: fixed.get(m.group(1).lower(), m.group(0)), template)
+    service = address.partition("?")[0]
+    for operation in children(root, "OperationsMetadata", "Operation"):
+        if operation.get("name") == "GetTile":
+            gets = children(operation, "DCP", "HTTP", "Get")
+            if gets and link(gets[0]):
+                service = link(gets[0])
+    values = {
+        "SERVICE": "WMTS",
+        "REQUEST": "GetTile",
+        "VERSION": "1.0.0",
+        "LAYER": text(layer, "Identifier"),
+        "STYLE": style,
+        "FORMAT": form,
+        "TILEMATRIXSET": set_id,
+    }
+    for dimension in children(layer, "Dimension"):
+        values[text(dimension, "Identifier").upper()] = text(dimension, "Default")
+    base = with_query(service, **values)
+    return base + "&TILEMATRIX={TileMatrix}&TILEROW={TileRow}&TILECOL={TileCol}"
+
+
+def _terms(root: ET.Element) -> Terms:
+    """The document's own words."""
+    provider = text(root, "ServiceProvider", "ProviderName")
+    constraints = text(root, "ServiceIdentification", "AccessConstraints")
+    plain = constraints if constraints.lower() not in ("none", "") else ""
+    return Terms(attribution=provider, licence=plain, may_cache=True)
+
+
+def _without_secret(address: str, key: str) -> str:
+    for secret in secrets_of(key):
+        address = address.replace(secret, "")
+    return address

@@ -1,0 +1,143 @@
+"""Tile addresses as templates: XYZ, TMS, quadkeys, sub-domains, @2x."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from urllib.parse import quote, urlsplit
+
+from geofield.errors import ImageryError
+from geofield.imagery.sources.base import Request
+from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import Tile, TilePyramid
+
+_PLACE = re.compile(r"\{([^{}]*)\}")
+_KEY_NAMES = ("key", "apikey", "api_key", "token", "access_token")
+
+
+@dataclass(frozen=True, slots=True)
+class XYZSource:
+    """Web Mercator tiles behind an address template.
+
+    Attributes
+    ----------
+    name : str
+    template : str
+        With ``{z}``, ``{x}``, ``{y}`` (from the north) or ``{-y}`` (TMS, from the south), or
+        ``{q}`` (quadkey); ``{s}`` or ``{switch:a,b,c}`` (sub-domain), ``{r}`` (@2x), ``{key}``.
+    subdomains : tuple of str
+        What ``{s}`` stands for.
+    key : str
+        What ``{key}`` stands for; never shown.
+    headers : tuple of (str, str)
+        Sent with each request, for instance a Referer.
+    """
+
+    name: str
+    template: str
+    terms: Terms = field(default_factory=Terms)
+    min_zoom: int = 0
+    max_zoom: int = 22
+    tile_px: int | None = None
+    subdomains: tuple[str, ...] = ("a", "b", "c")
+    key: str = field(default="", repr=False)
+    rate_per_s: float | None = None
+    date: str | None = None
+    headers: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        names = set(_PLACE.findall(self.template))
+        position = {"x", "y", "z"} <= names or {"x", "-y", "z"} <= names or "q" in names
+        if not position:
+            missing = [f"{{{n}}}" for n in ("x", "y", "z") if n not in names]
+            raise ImageryError(
+                f"The tile address {_shown(self.template)} lacks {', '.join(missing)}.",
+                hint="Write it like https://host/{z}/{x}/{y}.png ({-y} for TMS, {q} for quadkeys).",
+            )
+        if urlsplit(self.template).scheme not in ("http", "https"):
+            raise ImageryError(
+                f"The tile address {_shown(self.template)} does not begin with https://."
+            )
+        known = {"x", "y", "-y", "z", "q", "s", "r", *_KEY_NAMES}
+        for name in names - known:
+            if not name.startswith("switch:"):
+                raise ImageryError(
+                    f"The tile address {_shown(self.template)} holds an unknown part {{{name}}}.",
+                    hint=f"Known: {', '.join(sorted(known))}, switch:a,b,c.",
+                )
+        if names & set(_KEY_NAMES) and not self.key:
+            raise ImageryError(
+                f"The source {self.name} needs a key.",
+                hint=f"Put it into the environment as {key_variable(self.name)}, or into the "
+                "settings file.",
+            )
+        if not 0 <= self.min_zoom <= self.max_zoom <= 30:
+            raise ImageryError(f"Zooms {self.min_zoom} to {self.max_zoom} make no range.")
+
+    @property
+    def pyramid(self) -> TilePyramid:
+        """Web Mercator, 256 px, or 512 px for @2x."""
+        double = "{r}" in self.template or "@2x" in self.template
+        return TilePyramid.web_mercator(
+            self.min_zoom, self.max_zoom, self.tile_px or (512 if double else 256)
+        )
+
+    @property
+    def identity(self) -> str:
+        """The template: it holds ``{key}``, not the key."""
+        return f"xyz {self.template} {self.tile_px or ''}"
+
+    @property
+    def secrets(self) -> tuple[str, ...]:
+        """The key, as it is and as it stands in addresses."""
+        return secrets_of(self.key)
+
+    def request(self, tile: Tile) -> Request:
+        """The address of a tile."""
+        values = {
+            "z": str(tile.zoom),
+            "x": str(tile.column),
+            "y": str(tile.row),
+            "-y": str(2**tile.zoom - 1 - tile.row),
+            "q": quadkey(tile),
+            "r": "@2x",
+            "s": self.subdomains[(tile.column + tile.row) % len(self.subdomains)]
+            if self.subdomains
+            else "",
+            **dict.fromkeys(_KEY_NAMES, quote(self.key, safe="")),
+        }
+
+        def filled(match: re.Match[str]) -> str:
+            name = match.group(1)
+            if name.startswith("switch:"):
+                choices = name.removeprefix("switch:").split(",")
+                return choices[(tile.column + tile.row) % len(choices)].strip()
+            return values[name]
+
+        return Request(_PLACE.sub(filled, self.template), self.headers)
+
+
+def quadkey(tile: Tile) -> str:
+    """The quadkey of a tile: one digit 0..3 per zoom."""
+    digits = []
+    for bit in range(tile.zoom - 1, -1, -1):
+        digits.append(str((tile.column >> bit & 1) + 2 * (tile.row >> bit & 1)))
+    return "".join(digits)
+
+
+def key_variable(name: str) -> str:
+    """The environment variable that holds the key of a source."""
+    return "GEOFIELD_KEY_" + re.sub(r"[^A-Z0-9]+", "_", name.upper()).strip("_")
+
+
+def secrets_of(key: str) -> tuple[str, ...]:
+    """The spellings of a key that may stand in an address."""
+    return tuple({key, quote(key, safe=""), quote(key)} - {""})
+
+
+def _shown(template: str) -> str:
+    """A template for messages: without the values of its query, where keys are put by hand."""
+    base, mark, query = template.partition("?")
+    if not mark:
+        return base
+    return base + "?" + re.sub(r"=(?!\{)[^&]*", "=...", query)

@@ -1,0 +1,228 @@
+"""STAC items and item collections as files: which pictures, what they show, since when."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urljoin
+from xml.sax.saxutils import escape
+
+import rasterio
+import shapely
+from shapely.geometry import Point, shape
+
+from geofield.errors import ImageryError, PointOutsideError
+from geofield.imagery.bands import find_roles
+from geofield.imagery.collection import open_collection
+from geofield.imagery.gdal import gdal_env, is_remote, open_picture
+from geofield.imagery.reader import SceneReader
+from geofield.model.scene import ImagerySource
+
+_RASTER = ("image/tiff", "image/vnd.stac.geotiff", "image/jp2", "application/x-geotiff")
+_SINGLE = ("red", "green", "blue", "nir")
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One item: the picture to read and what is said of it."""
+
+    identifier: str
+    path: str
+    bands: tuple[str, ...] | None
+    date: str | None
+    licence: str
+    attribution: str
+
+
+def is_stac(path: Path) -> bool:
+    """Whether a file is a STAC item or a collection of items (and not plain GeoJSON)."""
+    document = _document(path)
+    if not isinstance(document, dict):
+        return False
+    features = document.get("features", [document])
+    return bool(features) and all(isinstance(f, dict) and "assets" in f for f in features)
+
+
+def open_stac(
+    path: Path,
+    *,
+    lat: float | None = None,
+    lon: float | None = None,
+    bands: Sequence[str] | None = None,
+    crs: Any = None,
+    scaling: tuple[float, float] | None = None,
+    source: ImagerySource | None = None,
+) -> SceneReader:
+    """A reader over the items of a file that hold the point, the newest first.
+
+    Raises
+    ------
+    PointOutsideError
+        No item holds the point.
+    ImageryError
+        No item has a picture.
+    """
+    document = _document(path)
+    features = document.get("features", [document])
+    if lat is not None and lon is not None:
+        here = [f for f in features if _holds(f, lat, lon)]
+        if not here:
+            raise PointOutsideError(
+                f"No item of {path.name} holds the point lat {lat}, lon {lon}."
+                + (
+                    f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+                    if any(_holds(f, lon, lat) for f in features)
+                    else ""
+                )
+            )
+        features = here
+    features = sorted(features, key=lambda f: _date(f) or "", reverse=True)
+    items = [item for item in (_item(f, path) for f in features) if item is not None]
+    if not items:
+        raise ImageryError(
+            f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
+            hint="Give items with assets of the role `data` or `visual`.",
+        )
+    first = items[0]
+    known = source or ImagerySource(
+        name=first.identifier,
+        date=first.date,
+        attribution=first.attribution,
+        licence=first.licence,
+    )
+    return open_collection(
+        [item.path for item in items],
+        lat=lat,
+        lon=lon,
+        bands=bands or first.bands,
+        crs=crs,
+        scaling=scaling,
+        source=known,
+        name=path.name,
+    )
+
+
+def _document(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _holds(feature: Mapping[str, Any], lat: float, lon: float) -> bool:
+    if feature.get("geometry"):
+        return bool(shapely.intersects(shape(feature["geometry"]), Point(lon, lat)))
+    box = feature.get("bbox")
+    if not box:
+        return True
+    half = len(box) // 2
+    return bool(box[0] <= lon <= box[half] and box[1] <= lat <= box[half + 1])
+
+
+def _date(feature: Mapping[str, Any]) -> str | None:
+    properties = feature.get("properties", {})
+    value = properties.get("datetime") or properties.get("start_datetime")
+    return str(value) if value else None
+
+
+def _item(feature: Mapping[str, Any], path: Path) -> Item | None:
+    rasters = {
+        name: asset
+        for name, asset in feature.get("assets", {}).items()
+        if str(asset.get("type", "")).lower().startswith(_RASTER)
+        or str(asset.get("href", "")).lower().partition("?")[0].endswith((".tif", ".tiff", ".jp2"))
+    }
+    rasters = {
+        name: asset
+        for name, asset in rasters.items()
+        if not {"thumbnail", "overview", "metadata"} & set(asset.get("roles", []))
+    }
+    if not rasters:
+        return None
+    chosen, roles = _chosen(rasters)
+    places = [_place(asset, feature, path) for asset in chosen]
+    properties = feature.get("properties", {})
+    providers = [p.get("name", "") for p in properties.get("providers", [])]
+    licence = str(properties.get("license", ""))
+    return Item(
+        str(feature.get("id", path.stem)),
+        places[0] if len(places) == 1 else stacked(places, roles or ()),
+        roles,
+        _date(feature),
+        "" if licence in ("proprietary", "various", "other") else licence,
+        ", ".join(filter(None, providers)),
+    )
+
+
+def _chosen(
+    rasters: Mapping[str, Mapping[str, Any]],
+) -> tuple[list[Mapping[str, Any]], tuple[str, ...] | None]:
+    """The assets to read: one with all colours, else one per colour."""
+    described = {name: _band_names(asset) for name, asset in rasters.items()}
+    for name, names in described.items():
+        if len(names) >= 3:
+            return [rasters[name]], _roles(names)
+    for name, asset in rasters.items():
+        if name == "visual" or "visual" in asset.get("roles", []):
+            return [asset], None
+    single = {names[0]: rasters[name] for name, names in described.items() if len(names) == 1}
+    single |= {name: rasters[name] for name in _SINGLE if name in rasters and name not in single}
+    if {"red", "green", "blue"} <= set(single):
+        roles = tuple(role for role in _SINGLE if role in single)
+        return [single[role] for role in roles], roles
+    data = [asset for asset in rasters.values() if "data" in asset.get("roles", [])]
+    return [(data or list(rasters.values()))[0]], None
+
+
+def _band_names(asset: Mapping[str, Any]) -> list[str]:
+    bands = asset.get("bands") or asset.get("eo:bands") or []
+    return [
+        str(band.get("common_name") or band.get("eo:common_name") or band.get("name") or "")
+        for band in bands
+    ]
+
+
+def _roles(names: Sequence[str]) -> tuple[str, ...] | None:
+    """Roles from band names, where they name the colours."""
+    roles = find_roles(names, ["undefined"] * len(names), [False] * len(names))
+    named = {"red", "green", "blue"} <= {name.lower() for name in names} and not roles.notes
+    return tuple(roles.roles) if named else None
+
+
+def _place(asset: Mapping[str, Any], feature: Mapping[str, Any], path: Path) -> str:
+    """An asset's path or address; relative ones start at the item."""
+    href = str(asset["href"])
+    if is_remote(href) or Path(href).is_absolute():
+        return href
+    own = next((k["href"] for k in feature.get("links", []) if k.get("rel") == "self"), "")
+    near = path.parent / href
+    return urljoin(own, href) if is_remote(own) and not near.exists() else str(near)
+
+
+def stacked(paths: Sequence[str], roles: Sequence[str]) -> str:
+    """One-band pictures of the same ground as the bands of one: a VRT as text."""
+    with gdal_env(paths[0]), open_picture(paths[0]) as first:
+        width, height, dtype = first.width, first.height, first.dtypes[0]
+        crs, transform, nodata = first.crs, first.transform, first.nodata
+    gdal_type = rasterio.dtypes._gdal_typename(dtype)
+    lines = [f'<VRTDataset rasterXSize="{width}" rasterYSize="{height}">']
+    if crs:
+        lines.append(f"<SRS>{escape(crs.to_wkt())}</SRS>")
+    lines.append(f"<GeoTransform>{', '.join(map(repr, transform.to_gdal()))}</GeoTransform>")
+    for n, (path, role) in enumerate(zip(paths, roles, strict=True), 1):
+        with gdal_env(path), open_picture(path) as each:
+            size = each.width, each.height
+        source = f"/vsicurl/{path}" if path.startswith("http") else str(Path(path).resolve())
+        lines.append(
+            f'<VRTRasterBand dataType="{gdal_type}" band="{n}">'
+            f"<Description>{escape(role)}</Description>"
+            + (f"<NoDataValue>{nodata!r}</NoDataValue>" if nodata is not None else "")
+            + f"<SimpleSource><SourceFilename>{escape(source)}</SourceFilename>"
+            f'<SourceBand>1</SourceBand><SrcRect xOff="0" yOff="0" xSize="{size[0]}" '
+            f'ySize="{size[1]}"/><DstRect xOff="0" yOff="0" xSize="{width}" ySize="{height}"/>'
+            "</SimpleSource></VRTRasterBand>"
+        )
+    return "".join([*lines, "</VRTDataset>"])
