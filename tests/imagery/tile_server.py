@@ -72,7 +72,8 @@ class Handler(BaseHTTPRequestHandler):
             return
         self.tile(tile)
 
-    do_HEAD = do_GET
+    def do_HEAD(self) -> None:
+        self.do_GET()
 
     def tile(self, tile: tuple[int, int, int]) -> None:
         server = self.server
