@@ -16,7 +16,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    JsonValue,
     PositiveFloat,
     SecretStr,
     ValidationError,
@@ -24,9 +23,6 @@ from pydantic import (
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from geofield.errors import SettingsError
-
-#: Settings for the file and the environment that are not options of every command.
-_NO_OPTION: dict[str, JsonValue] = {"no_option": True}
 
 NonNegative = Annotated[float, Field(ge=0)]
 
@@ -72,26 +68,24 @@ class ImagerySettings(Section):
         None,
         description="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
     )
-    threads: int = Field(
-        16, ge=1, le=64, description="Tiles fetched at once.", json_schema_extra=_NO_OPTION
-    )
+
+
+class FetchSettings(Section):
+    """Getting imagery from servers; it does not change the result, so products do not keep it."""
+
+    threads: int = Field(16, ge=1, le=64, description="Tiles fetched at once.")
     cache_dir: str | None = Field(
         None,
         description="Folder of the tile caches; the user's cache folder by default.",
-        json_schema_extra=_NO_OPTION,
     )
     cache_max_mb: PositiveFloat = Field(
         2048.0,
         description="Tiles kept per source at most, megabytes.",
-        json_schema_extra=_NO_OPTION,
     )
-    cache_max_days: PositiveFloat = Field(
-        90.0, description="Tiles are fetched anew after, days.", json_schema_extra=_NO_OPTION
-    )
+    cache_max_days: PositiveFloat = Field(90.0, description="Tiles are fetched anew after, days.")
     sources: dict[str, SourceSettings] = Field(
         {},
-        description="Sources of your own, by name: [imagery.sources.NAME] in the settings file.",
-        json_schema_extra=_NO_OPTION,
+        description="Sources of your own, by name: [fetch.sources.NAME] in the settings file.",
     )
 
 
@@ -143,6 +137,8 @@ class Settings(Section):
     obstacles: ObstacleSettings = ObstacleSettings()
     tracks: TrackSettings = TrackSettings()
     export: ExportSettings = ExportSettings()
+    # Keys live here: never written into a product.
+    fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
 
 
 class _Environment(BaseSettings):
@@ -155,10 +151,11 @@ class _Environment(BaseSettings):
     obstacles: ObstacleSettings = ObstacleSettings()
     tracks: TrackSettings = TrackSettings()
     export: ExportSettings = ExportSettings()
+    fetch: FetchSettings = FetchSettings()
 
 
-SECTIONS = ("imagery", "field", "obstacles", "tracks", "export")
-Stage = Literal["imagery", "field", "obstacles", "tracks", "export"]
+SECTIONS = ("imagery", "field", "obstacles", "tracks", "export", "fetch")
+Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
 
 
 def load_settings(
@@ -223,5 +220,7 @@ def _explain(error: ValidationError) -> str:
     lines = []
     for problem in error.errors():
         name = ".".join(str(part) for part in problem["loc"])
-        lines.append(f"{name}: {problem['msg'].lower()} (given: {problem.get('input')!r})")
+        # Sources hold keys; a message must not.
+        given = "" if "sources" in problem["loc"] else f" (given: {problem.get('input')!r})"
+        lines.append(f"{name}: {problem['msg'].lower()}{given}")
     return "Settings are not valid: " + "; ".join(lines) + "."

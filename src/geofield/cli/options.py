@@ -70,9 +70,6 @@ def section_options(section: Stage, *, only: tuple[str, ...] = ()) -> Callable[[
     def add(command: Command) -> Command:
         model = Settings.model_fields[section].annotation
         for name, field in reversed(model.model_fields.items()):  # type: ignore[union-attr]
-            extra = field.json_schema_extra
-            if isinstance(extra, dict) and extra.get("no_option"):
-                continue
             if not only or name in only:
                 command = _option(section, name, field)(command)
         return command

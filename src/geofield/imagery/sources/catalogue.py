@@ -1,7 +1,7 @@
 """The imagery known by name: open national imagery, and what its owners ask for.
 
 Terms change: the address of each is here, and the user answers for keeping to them. Users
-add sources of their own in the settings file, ``[imagery.sources.NAME]``.
+add sources of their own in the settings file, ``[fetch.sources.NAME]``.
 """
 
 from __future__ import annotations
