@@ -54,3 +54,14 @@ def test_wrong_settings_are_named(text: str, message: str) -> None:
 def test_settings_do_not_change() -> None:
     with pytest.raises(ValueError, match="frozen"):
         Settings().tracks.spacing_m = 3.0  # type: ignore[misc]
+
+
+def test_what_may_hold_keys_is_not_recorded() -> None:
+    Path("geofield.toml").write_text(
+        '[fetch.sources.mine]\nurl = "https://x/{z}/{x}/{y}"\nkey = "s3cret"\n'
+        '[fetch.sources.mine.headers]\nAuthorization = "s3cret"\n'
+    )
+    settings = load_settings()
+    assert settings.fetch.sources["mine"].headers == {"Authorization": "s3cret"}
+    assert "s3cret" not in settings.model_dump_json()
+    assert "s3cret" not in repr(settings.model_dump())
