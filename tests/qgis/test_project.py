@@ -1,0 +1,133 @@
+"""QGIS opens the project: layers, CRS, styles, value lists, labels, map tips as meant."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats_plan import NAME, X0, Y0
+from PIL import Image
+
+from geofield import schema
+
+STORED = Path(__file__).with_name("project.png")
+TOP_TO_BOTTOM = ["obstacles", "track_points", "gaps", "tracks", "segments", "field", "scene"]
+
+
+@pytest.fixture(scope="module", params=["qgz", "inside"])
+def opened(request, product, qgis, tmp_path_factory):
+    folder = Path(shutil.copytree(product, tmp_path_factory.mktemp("opened") / "copy"))
+    uri = (
+        str(folder / "field.qgz")
+        if request.param == "qgz"
+        else f"geopackage:{folder / 'field.gpkg'}?projectName=field"
+    )
+    return qgis("project", uri=uri)
+
+
+def test_nothing_is_missing(opened):
+    assert opened["bad"] == []
+    assert opened["title"] == NAME
+    assert opened["crs"] == "EPSG:32636"
+    assert opened["order"] == [f"geofield_{name}" for name in TOP_TO_BOTTOM]
+    assert "geofield_segments" not in opened["shown"]
+
+
+def test_layers_have_rows_style_and_tips(opened):
+    for layer in schema.LAYERS:
+        if layer.optional:
+            continue
+        facts = opened["layers"][f"geofield_{layer.name}"]
+        assert facts["valid"], facts["error"]
+        assert facts["crs"] == "EPSG:32636"
+        assert facts["rows"] > 0
+        assert facts["renderer"] == "RuleRenderer"
+        assert facts["name"] == layer.title
+        assert "openstreetmap.org" in facts["tip"]
+        assert facts["actions"] == ["Open this spot in a web map"]
+        assert facts["fields"] == ["fid", *layer.column_names]
+        for column in layer.columns:
+            assert facts["aliases"][column.name].startswith(column.title)
+    scene = opened["layers"]["geofield_scene"]
+    assert scene["size"] == [700, 400]
+    assert scene["renderer"] == "multibandcolor"
+
+
+def test_a_person_chooses_the_status_from_a_list(opened):
+    facts = opened["layers"]["geofield_obstacles"]
+    values = [next(iter(entry.values())) for entry in facts["status_values"]["map"]]
+    assert values == list(schema.STATUSES)
+    assert facts["status_default"] == "'added'"
+    assert facts["aliases"]["radius_m"] == "Radius (m)"
+    assert facts["rules"] == [
+        "Confirmed",
+        "Detected",
+        "Detected, doubtful",
+        "Added by a person",
+        "Rejected by a person",
+    ]
+
+
+def test_points_appear_from_a_readable_scale_on(opened):
+    limited, scale = opened["layers"]["geofield_track_points"]["scales"]
+    assert limited
+    assert scale == 500
+
+
+def test_styles_apply_without_the_project(copy, qgis):
+    for layer in schema.LAYERS:
+        if not layer.optional:
+            facts = qgis("vector", uri=f"{copy / 'field.gpkg'}|layername={layer.name}")
+            assert facts["renderer"] == "RuleRenderer"
+
+
+def shades(path, size=(90, 70)):
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BOX), float)
+
+
+def test_the_picture_is_the_stored_one(copy, qgis, tmp_path):
+    png = tmp_path / "project.png"
+    facts = qgis("render", uri=str(copy / "field.qgz"), png=str(png))
+    assert facts["errors"] == []
+    if os.environ.get("STORE_PICTURES"):
+        shutil.copy(png, STORED)
+    ours, stored = shades(png), shades(STORED)
+    # Fonts differ between machines, so not pixel by pixel.
+    assert np.abs(ours - stored).mean() < 3.0
+    assert np.corrcoef(ours.ravel(), stored.ravel())[0, 1] > 0.98
+
+
+def at(picture, x_m, y_m, extent):
+    west, south, east, north = extent
+    row = int((north - (Y0 + y_m)) / (north - south) * picture.shape[0])
+    column = int(((X0 + x_m) - west) / (east - west) * picture.shape[1])
+    return picture[row - 1 : row + 2, column - 1 : column + 2].reshape(-1, 3).astype(int)
+
+
+def test_colours_lie_where_the_things_are(copy, qgis, tmp_path):
+    extent = [X0 - 5, Y0 - 5, X0 + 125, Y0 + 65]
+    png = tmp_path / "colours.png"
+    qgis("render", uri=str(copy / "field.qgz"), png=str(png), width=1300, height=700, extent=extent)
+    with Image.open(png) as image:
+        picture = np.asarray(image.convert("RGB"))
+    r, g, b = at(picture, 69.5, 18.9, extent).mean(axis=0)
+    assert r > 1.5 * g  # the confirmed tree is red
+    assert r > 1.5 * b
+    outline = at(picture, 60, 0, extent)
+    assert any(p[0] > 200 and p[1] > 170 and p[2] < 90 for p in outline)  # yellow edge
+    track = at(picture, 33.3, 2.5, extent)
+    assert any(p[2] > 180 and p[1] > 150 and p[0] < 130 for p in track)  # cyan track
+
+
+@pytest.mark.parametrize("scale", [30_500, 250_000])
+def test_a_field_is_visible_at_region_scale(copy, qgis, tmp_path, scale):
+    png = tmp_path / "region.png"
+    qgis("render", uri=str(copy / "field.qgz"), png=str(png), scale=scale, width=400, height=300)
+    with Image.open(png) as image:
+        picture = np.asarray(image.convert("RGB")).astype(int)
+    yellow = (picture[..., 0] > 220) & (picture[..., 1] > 180) & (picture[..., 2] < 80)
+    assert yellow.sum() > 20
