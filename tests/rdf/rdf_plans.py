@@ -64,6 +64,7 @@ def small_plan(
             "segments": tracks.segments,
             "gaps": tracks.gaps,
             "track_points": tracks.points,
+            **_driving(field, tracks, crs),
         },
         crs,
         name,
@@ -84,6 +85,64 @@ def small_plan(
         ),
         grid,
     )
+
+
+def _driving(field: Field, tracks: Tracks, crs: CRS):
+    """Headland, route and turns: shaped like a planner's, not planned."""
+    ring = shapely.get_exterior_ring(field.polygon)
+    strip = field.polygon.difference(field.polygon.buffer(-3.0))
+    headland = shapely.MultiPolygon(list(shapely.get_parts(strip)))
+    segments = tracks.segments
+    first, second = segments.geometry.iloc[0], segments.geometry.iloc[1]
+    turn = shapely.LineString([first.coords[-1], second.coords[-1]])
+    lines = [first, turn, shapely.reverse(second), ring]
+    lengths = shapely.length(np.array(lines))
+    return {
+        "headland": schema.table(
+            schema.HEADLAND,
+            {"headland_no": [1], "width_m": [3.0], "area_ha": [headland.area / 1e4]},
+            [headland],
+            crs,
+        ),
+        "headland_tracks": schema.table(
+            schema.HEADLAND_TRACKS,
+            {"pass_no": [1], "segment_no": [1], "offset_m": [1.5], "length_m": [ring.length]},
+            [shapely.LineString(ring.coords)],
+            crs,
+        ),
+        "route": schema.table(
+            schema.ROUTE,
+            {
+                "sequence": [1, 2, 3, 4],
+                "kind": ["work", "turn", "work", "drive"],
+                "direction": ["forward", None, "backward", None],
+                "track_no": [1, None, 2, None],
+                "segment_no": [1, None, 1, None],
+                "length_m": lengths,
+                "start_m": np.r_[0.0, np.cumsum(lengths)[:-1]],
+            },
+            [*lines[:3], shapely.LineString(ring.coords)],
+            crs,
+        ),
+        "turns": schema.table(
+            schema.TURNS,
+            {
+                "turn_no": [1, 2],
+                "sequence": [2, 4],
+                "from_track": [1, 2],
+                "to_track": [2, None],
+                "kind": ["dubins", "drive"],
+                "direction": ["left", "straight"],
+                "radius_m": [5.5, np.nan],
+                "length_m": [turn.length, ring.length],
+                "reverse_m": [0.0, 0.0],
+                "outside_m": [0.0, 1.25],
+                "fits": ["yes", "no"],
+            },
+            [turn, shapely.LineString(ring.coords)],
+            crs,
+        ),
+    }
 
 
 def _obstacles(x0: float, y0: float, grid: Grid, crs: CRS):

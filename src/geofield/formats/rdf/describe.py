@@ -39,6 +39,7 @@ from geofield.formats.rdf.nodes import (
     joined,
     node,
     one,
+    strings,
 )
 from geofield.model.dataset import Dataset
 
@@ -140,13 +141,18 @@ class Description:
         if not self.dataset.has(name):
             return
         frame = keyed(layer, self.dataset.table(name))
-        if name == schema.TRACKS.name:
+        if name == self._first_in_plan():
             yield self._plan_node()
         extra = self._extra(name, frame)
         group = feature_group(layer, frame, self.names, extra=extra, accuracy_m=self.accuracy_m)
         yield group
         if name == schema.OBSTACLES.name:
             yield from self._detections(layer, frame)
+
+    def _first_in_plan(self) -> str:
+        """The first layer that belongs to the plan and has rows; points stand elsewhere."""
+        names = [each.layer.name for each in layer_maps() if each.in_plan and each.metric_geometry]
+        return next((name for name in names if self.dataset.has(name)), "")
 
     def _extra(self, name: str, frame: gpd.GeoDataFrame) -> list[Property]:
         count = len(frame)
@@ -155,8 +161,16 @@ class Description:
             result.append(Property(GF + "inField", IRI, (constant(self.names.field, count),)))
             result += self._within(frame)
         if name == schema.TRACKS.name:
-            plan = constant(self._plan_iri(), count)
-            result.append(Property(GF + "inPlan", IRI, (plan,)))
+            result.append(
+                Property(PROV + "wasDerivedFrom", IRI, (constant(self.names.field, count),))
+            )
+        layer = layer_map(name)
+        if layer.in_plan and layer.says_plan:
+            result.append(Property(GF + "inPlan", IRI, (constant(self._plan_iri(), count),)))
+        if name == schema.ROUTE.name:
+            steps = row_iris(layer, frame, self.names).to_pylist()
+            following = strings([*steps[1:], None])
+            result.append(Property(GF + "nextStep", IRI, (following,)))
         source = self.imagery if name in ("field", "obstacles") else ""
         if source:
             result.append(Property(PROV + "wasDerivedFrom", IRI, (constant(source, count),)))

@@ -20,6 +20,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import LayerMap, all_terms, layer_map, value_iri
 from geofield.formats.rdf.namespaces import (
+    BOOLEAN,
     CRS84,
     DATE,
     DOUBLE,
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
 
 #: Decimals of CRS84 coordinates beside an exact geometry in the metric CRS: 0.1 mm.
 LONLAT_DECIMALS = 9
+#: The values of columns that are truth values.
+YES_NO = ("yes", "no")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d")
 _OBSTACLES_IN_CAUSE = re.compile(r"obstacles?\s+([0-9][0-9,\s]*)")
 
@@ -165,6 +168,9 @@ def _column_texts(
     term = all_terms().get(name)
     if term is not None and term.is_object and all(t in column.values for t in texts if t):
         return strings(None if t is None else expand(value_iri(t)) for t in texts), IRI
+    if column.values == YES_NO:
+        words = {"yes": "true", "no": "false"}
+        return strings(None if t is None else words.get(t) for t in texts), BOOLEAN
     if column.type == "date" and all(_DATE.fullmatch(t) for t in texts if t is not None):
         return strings(texts), DATE
     return strings(texts), STRING
@@ -186,10 +192,14 @@ def _label(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Property]:
 
 
 def _links(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[Property]:
-    result = [
-        Property(expand(link.predicate), IRI, (row_iris(layer_map(link.target), frame, names),))
-        for link in layer.links
-    ]
+    result = []
+    for link in layer.links:
+        pointing = frame
+        if link.target_key != link.column:
+            pointing = frame.assign(**{link.target_key: frame[link.column]})
+        targets = row_iris(layer_map(link.target), pointing, names)
+        if targets.null_count < len(targets):
+            result.append(Property(expand(link.predicate), IRI, (targets,)))
     if layer.layer.name == "gaps" and len(frame):
         columns = _causes(frame["cause"], names)
         if columns:

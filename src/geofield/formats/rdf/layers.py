@@ -6,11 +6,12 @@ the default rules of :func:`layer_map`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from geofield import schema
-from geofield.formats.rdf.vocabulary import COLUMN_TERMS, Term, build_terms, camel, column_term
+from geofield.formats.rdf.terms import TERMS
+from geofield.formats.rdf.vocabulary import Term, camel, column_term, term_of_column
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +26,19 @@ class Link:
         Prefixed name.
     target : str
         The other layer; the link is made from its key columns.
+    key : str
+        The key column that the number is, where it has another name there.
     """
 
     column: str
     predicate: str
     target: str
+    key: str = ""
+
+    @property
+    def target_key(self) -> str:
+        """The key column of the other layer that the number is."""
+        return self.key or self.column
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +63,8 @@ class LayerMap:
         Columns whose property differs from the one of that name elsewhere.
     metric_geometry : bool
         Whether rows have a second geometry in the metric CRS (points have coordinates).
+    says_plan : bool
+        Whether rows link to their plan; parts of a track do so through the track.
     """
 
     layer: schema.Layer
@@ -65,6 +76,7 @@ class LayerMap:
     links: tuple[Link, ...] = ()
     terms: tuple[tuple[str, str], ...] = ()
     metric_geometry: bool = True
+    says_plan: bool = True
 
     def properties(self) -> list[tuple[schema.Column, str]]:
         """The columns that are properties, with prefixed names, in the layer's order."""
@@ -78,6 +90,7 @@ class LayerMap:
 
 
 _ON_TRACK = Link("track_no", "gf:onTrack", "tracks")
+_ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments")
 
 _MAPS: dict[str, dict[str, object]] = {
     "field": {"cls": "gf:Field", "path": "", "product": "field", "in_plan": False},
@@ -93,18 +106,45 @@ _MAPS: dict[str, dict[str, object]] = {
         "cls": "gf:Segment",
         "path": "track/{track_no}/segment/{segment_no}",
         "links": (_ON_TRACK,),
+        "says_plan": False,
     },
     "gaps": {
         "cls": "gf:Gap",
         "path": "track/{track_no}/gap/{gap_no}",
         "links": (_ON_TRACK,),
         "terms": (("obstacle_no", "gf:causingObstacleNo"),),
+        "says_plan": False,
     },
     "track_points": {
         "cls": "gf:TrackPoint",
         "path": "point/{point_no}",
-        "links": (_ON_TRACK, Link("segment_no", "gf:onSegment", "segments")),
+        "links": (_ON_TRACK, _ON_SEGMENT),
         "metric_geometry": False,
+        "says_plan": False,
+    },
+    "headland": {"cls": "gf:Headland", "path": "headland/{headland_no}"},
+    "headland_tracks": {
+        "cls": "gf:HeadlandTrack",
+        "path": "headland-track/{pass_no}/segment/{segment_no}",
+    },
+    "route": {
+        "cls": "gf:RouteStep",
+        "path": "route/{sequence}",
+        "links": (_ON_TRACK, _ON_SEGMENT),
+        "terms": (("kind", "gf:stepKind"), ("direction", "gf:drivingDirection")),
+    },
+    "turns": {
+        "cls": "gf:Turn",
+        "path": "turn/{turn_no}",
+        "links": (
+            Link("from_track", "gf:fromTrack", "tracks", "track_no"),
+            Link("to_track", "gf:toTrack", "tracks", "track_no"),
+        ),
+        "terms": (
+            ("kind", "gf:turnKind"),
+            ("direction", "gf:turnDirection"),
+            ("radius_m", "gf:turningRadiusInMetres"),
+        ),
     },
 }
 
@@ -131,16 +171,20 @@ def layer_maps() -> list[LayerMap]:
 
 @cache
 def all_terms() -> dict[str, Term]:
-    """All properties in use, by prefixed name."""
-    derived = [
-        (column, name, each.cls) for each in layer_maps() for column, name in each.properties()
-    ]
-    return build_terms(derived)
+    """All properties in use, by prefixed name; each column has one, and its class as domain."""
+    result = {term.name: term for term in TERMS}
+    for each in layer_maps():
+        for column, name in each.properties():
+            known = result.get(name)
+            if name.startswith("rdfs:"):
+                continue
+            if known is None:
+                result[name] = term_of_column(column, name, each.cls)
+            elif each.cls not in known.domain:
+                result[name] = replace(known, domain=(*known.domain, each.cls))
+    return result
 
 
 def value_iri(value: str) -> str:
     """A value of a code list (`kind`, `status`) as a prefixed name."""
     return "gf:" + camel("_" + value)
-
-
-__all__ = ["COLUMN_TERMS", "LayerMap", "Link", "all_terms", "layer_map", "layer_maps", "value_iri"]

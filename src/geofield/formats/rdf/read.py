@@ -16,6 +16,7 @@ from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf.complete import complete
+from geofield.formats.rdf.features import YES_NO
 from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps, value_iri
 from geofield.formats.rdf.namespaces import (
     GEO,
@@ -234,7 +235,9 @@ def _table(graph: Graph, layer: LayerMap, subjects: list[str], crs: CRS) -> gpd.
         texts = [_first(graph, iri, predicates) for iri in subjects]
         data[column.name] = _typed(column, texts, subjects)
     for link in layer.links:
-        own = [expand(n) for c, n in layer_map(link.target).properties() if c.name == link.column]
+        own = [
+            expand(n) for c, n in layer_map(link.target).properties() if c.name == link.target_key
+        ]
         own += [study[link.column][0]] if link.column in study else []
         texts = [_linked(graph, iri, expand(link.predicate), own) for iri in subjects]
         data[link.column] = _typed(layer.layer.column(link.column), texts, subjects)
@@ -277,6 +280,8 @@ def _typed(column: schema.Column, texts: list[str | None], subjects: list[str]) 
             for t, s in zip(texts, subjects, strict=True)
         ]
     values = {expand(value_iri(value)): value for value in column.values}
+    if column.values == YES_NO:
+        values = {"true": "yes", "false": "no", "1": "yes", "0": "no"}
     return [None if t is None else values.get(t, t) for t in texts]
 
 

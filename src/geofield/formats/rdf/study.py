@@ -12,7 +12,8 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
   `xsd:double` for positions and pixels. `gml:pos` stays a text, "lat, long".
 - The class *tree* is for trees; an obstacle of another kind has geofield's class alone.
 - What the study's vocabulary has no word for (status, safety margin, outlines, tracks) is
-  said in geofield's, so that the plan reads back whole.
+  said in geofield's, so that the plan reads back whole. Obstacles are complete in both: a
+  reader of either vocabulary understands them.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from geofield.formats.rdf.namespaces import (
     GF,
     GML,
     INT,
+    SOSA,
     STRING,
     STUDY_OBSTACLE,
     STUDY_POINT,
@@ -99,10 +101,11 @@ class StudyDescription(Description):
             return
         layer = layer_map(schema.OBSTACLES.name)
         frame = keyed(layer, self.dataset.table(schema.OBSTACLES.name))
+        own = (expand(layer.cls), SOSA + "FeatureOfInterest", GEO + "Feature")
         trees = (frame["kind"] == "tree").to_numpy()
         for rows, types in (
-            (trees, (STUDY_TREE + "tree", expand(layer.cls))),
-            (~trees, (expand(layer.cls),)),
+            (trees, (STUDY_TREE + "tree", *own)),
+            (~trees, own),
         ):
             part = frame[rows]
             if len(part):
@@ -112,22 +115,16 @@ class StudyDescription(Description):
         layer = layer_map(schema.OBSTACLES.name)
         inside = Property(GF + "inField", IRI, (constant(self.names.field, len(frame)),))
         whole = feature_group(layer, frame, self.names, extra=[inside], accuracy_m=self.accuracy_m)
-        study = {expand(name): column.name for column, name in layer.properties()}
-        kept = [
-            prop
-            for prop in whole[0].properties
-            if study.get(prop.predicate) not in STUDY_OBSTACLE_TERMS
-            and prop.predicate != GEO + "hasMetricArea"
-        ]
+        study = {predicate for predicate, _ in STUDY_OBSTACLE_TERMS.values()}
+        own = [prop for prop in whole[0].properties if prop.predicate not in study]
         image = Property(DC + "type", IRI, (constant(DCMI_IMAGE, len(frame)),))
         numbers = _study_properties(frame, STUDY_OBSTACLE_TERMS)
-        yield (Nodes(whole[0].iris, types, (image, *numbers, *kept), STUDY_OBSTACLE),)
+        yield (Nodes(whole[0].iris, types, (image, *numbers, *own), STUDY_OBSTACLE),)
         # Geometries are not members of the root.
         yield whole[1:]
 
     def _study_points(self) -> Iterator[Group]:
         layer = layer_map(schema.TRACK_POINTS.name)
-        types = (GML + "point", expand(layer.cls))
         for chunk in self.dataset.point_chunks():
             lat, lon = _texts(chunk, "lat"), _texts(chunk, "lon")
             properties = [
@@ -138,7 +135,7 @@ class StudyDescription(Description):
                 Property(GF + "northing", DOUBLE, (float_texts(chunk.geometry.y.to_numpy()),)),
             ]
             iris = row_iris(layer, chunk, self.names)
-            yield (Nodes(iris, types, tuple(properties), STUDY_TRAJECTORY),)
+            yield (Nodes(iris, (GML + "point",), tuple(properties), STUDY_TRAJECTORY),)
 
 
 def _study_properties(frame: gpd.GeoDataFrame, terms: dict[str, tuple[str, str]]) -> list[Property]:
