@@ -1,0 +1,199 @@
+"""Validate: an RDF file against syntax, shapes and checks, told in plain words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pyoxigraph as ox
+import rdflib
+from rdflib.namespace import RDF, SH
+
+from geofield.errors import FormatError
+from geofield.formats.problem import Problem
+from geofield.formats.rdf.checks import check_graph
+from geofield.formats.rdf.layers import all_terms, layer_maps
+from geofield.formats.rdf.namespaces import GML, SCHEMA_PREFIXES, STRING, STUDY_TREE, expand
+from geofield.formats.rdf.parse import Graph, parse
+from geofield.formats.rdf.publish import SHAPES, resource
+
+_BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
+
+
+def validate(path: Path) -> list[Problem]:
+    """Everything that is wrong with a file, in the order of its lines.
+
+    Parameters
+    ----------
+    path : Path
+        RDF/XML, Turtle, JSON-LD or N-Triples.
+
+    Returns
+    -------
+    list of Problem
+        Empty when the file is sound. A file that is hostile or not valid in its syntax has
+        one problem: nothing more can be said of it.
+    """
+    path = Path(path)
+    try:
+        quads = list(parse(path))
+    except FormatError as error:
+        line = re.search(r"line (\d+)", error.message)
+        message = error.message.split(": ", 1)[-1]
+        return [
+            Problem(
+                message[0].upper() + message[1:],
+                path.name,
+                int(line[1]) if line else None,
+                error.hint or "",
+                "syntax",
+            )
+        ]
+    graph = Graph()
+    graph.add(quads)
+    known = [expand(layer.cls) for layer in layer_maps()] + [STUDY_TREE + "tree", GML + "point"]
+    if not graph.of_type(*known):
+        return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
+    problems = [*_shape_problems(quads), *check_graph(graph)]
+    return _located(_distinct(problems), path)
+
+
+def _distinct(problems: list[Problem]) -> list[Problem]:
+    return list(dict.fromkeys(problems))
+
+
+# -- SHACL ----------------------------------------------------------------------------------------
+
+
+def _shape_problems(quads: list[ox.Quad]) -> Iterator[Problem]:
+    import pyshacl
+
+    data = rdflib.Graph()
+    for quad in quads:
+        data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
+    conforms, report, _ = pyshacl.validate(
+        data, shacl_graph=_shapes(), inference="none", meta_shacl=False, advanced=False
+    )
+    if conforms:
+        return
+    if not isinstance(report, rdflib.Graph):
+        raise FormatError(f"The shapes could not be run: {report!r}.")
+    for result in report.subjects(RDF.type, SH.ValidationResult):
+        yield _problem(report, result)
+
+
+@cache
+def _shapes() -> rdflib.Graph:
+    return rdflib.Graph().parse(data=resource(SHAPES), format="turtle")
+
+
+def _term(term: Any) -> Any:
+    if isinstance(term, ox.NamedNode):
+        return rdflib.URIRef(term.value)
+    if isinstance(term, ox.BlankNode):
+        return rdflib.BNode(term.value)
+    if term.language:
+        return rdflib.Literal(term.value, lang=term.language)
+    if term.datatype.value == STRING:
+        return rdflib.Literal(term.value)
+    # rdflib must not tidy the text: "01" and "1" are to be told apart.
+    return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
+
+
+def _problem(report: rdflib.Graph, result: Any) -> Problem:
+    focus = report.value(result, SH.focusNode)
+    path = report.value(result, SH.resultPath)
+    value = report.value(result, SH.value)
+    component = str(report.value(result, SH.sourceConstraintComponent)).rpartition("#")[2]
+    rule = str(report.value(result, SH.resultMessage) or "")
+    name = _short(path) if isinstance(path, rdflib.URIRef) else "its default geometry"
+    term = all_terms().get(name)
+    what = f"{term.label.lower()} ({name})" if term else name
+    found = "" if value is None else str(value)[:80]
+    words = {
+        "MinCountConstraintComponent": f"Has no {what}.",
+        "MaxCountConstraintComponent": f"Has more than one {what}.",
+        "DatatypeConstraintComponent": f"Its {what} is {_typed(value)}.",
+        "NodeKindConstraintComponent": f"Its {what} is {found!r}, which is no IRI.",
+        "InConstraintComponent": f"Its {what} is {_short(value)!r}, which is not allowed.",
+        "MinInclusiveConstraintComponent": f"Its {what} is {found}, out of bounds.",
+        "MaxInclusiveConstraintComponent": f"Its {what} is {found}, out of bounds.",
+        "PatternConstraintComponent": f"Its {what} reads {found!r}.",
+        "HasValueConstraintComponent": f"Its {what} is not the one expected.",
+        "OrConstraintComponent": f"Its {what} is {_typed(value)}.",
+    }
+    message = words.get(component, f"Its {what} is {found!r}.")
+    subject = f"<{focus}>" if isinstance(focus, rdflib.URIRef) else f"_:{focus}"
+    if path is None and component == "NodeKindConstraintComponent":
+        message, rule = "It has no IRI.", "Name it, or it cannot be merged with other data."
+    shape = f"{component.removesuffix('ConstraintComponent')} {name}"
+    return Problem(message, subject, hint=rule, rule=shape)
+
+
+def _typed(value: Any) -> str:
+    if isinstance(value, rdflib.Literal):
+        kind = "untyped" if value.datatype is None else _short(value.datatype)
+        if value.ill_typed:
+            return f"{str(value)[:80]!r}, which is no {kind}"
+        return f"{str(value)[:80]!r}, typed {kind}"
+    return f"the thing {value}"
+
+
+def _short(iri: Any) -> str:
+    text = str(iri)
+    for prefix, namespace in SCHEMA_PREFIXES.items():
+        if text.startswith(namespace):
+            return f"{prefix}:{text[len(namespace) :]}"
+    return text
+
+
+# -- where in the file ------------------------------------------------------------------------
+
+
+def _located(problems: list[Problem], path: Path) -> list[Problem]:
+    """The line at which each problem's subject is described first."""
+    if not problems:
+        return []
+    lines = _Lines(path.read_text(encoding="utf-8", errors="replace"))
+    placed = [
+        Problem(p.message, p.subject, p.line or lines.of(p.subject), p.hint, p.rule)
+        for p in problems
+    ]
+    return sorted(placed, key=lambda p: (p.line is None, p.line or 0, p.subject, p.rule))
+
+
+class _Lines:
+    """Finds the description of an IRI in a file's text, absolute or relative."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        match = _BASE.search(text[:20_000])
+        self.base = match[1] if match else ""
+        self.found: dict[str, int | None] = {}
+
+    def of(self, subject: str) -> int | None:
+        iri = subject.removeprefix("<").removesuffix(">")
+        if iri not in self.found:
+            self.found[iri] = self._search(iri)
+        return self.found[iri]
+
+    def _search(self, iri: str) -> int | None:
+        names = [iri]
+        if self.base and iri.startswith(self.base):
+            names.insert(0, iri[len(self.base) :])
+        names += [f"{p}:{iri[len(n) :]}" for p, n in self._prefixes() if iri.startswith(n)]
+        for name in names:
+            text = re.escape(name)
+            subject = rf'^\s*<{text}>|^\s*{text}\s|about="{text}"|^\s*\{{\s*"@id": *"{text}"'
+            for pattern in (subject, rf'[<"\s]{text}[>"\s]'):
+                match = re.search(pattern, self.text, re.MULTILINE)
+                if match:
+                    start = match.start() + len(match[0]) - len(match[0].lstrip())
+                    return self.text.count("\n", 0, start) + 1
+        return None
+
+    def _prefixes(self) -> list[tuple[str, str]]:
+        return re.findall(r"@?prefix\s+([\w-]*):\s*<([^>]*)>", self.text[:20_000], re.IGNORECASE)

@@ -1,0 +1,219 @@
+# ruff: noqa: E501 - tables of broken files read best as tables
+"""Sound files have no problems; broken ones are found, and the broken thing is named."""
+
+from __future__ import annotations
+
+import re
+import time
+
+import pytest
+from rdf_plans import small_plan
+
+from geofield.formats.rdf import write
+from geofield.formats.rdf.shapes import class_rules
+from geofield.formats.rdf.validate import validate
+
+WRITERS = {
+    "xml": write.write_rdfxml,
+    "turtle": write.write_turtle,
+    "json-ld": write.write_jsonld,
+    "nt": write.write_ntriples,
+}
+
+
+@pytest.mark.parametrize("profile", write.PROFILES)
+@pytest.mark.parametrize("syntax", WRITERS)
+def test_every_product_is_sound(plan, tmp_path, profile, syntax):
+    for path in WRITERS[syntax](plan, tmp_path, options={"rdf_profile": profile}):
+        assert [str(problem) for problem in validate(path)] == []
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """A small sound plan in both profiles, as Turtle."""
+    plan = small_plan(spacing_m=12, step_m=40)
+    texts = {}
+    for profile in write.PROFILES:
+        folder = tmp_path_factory.mktemp(profile)
+        (path,) = write.write_turtle(plan, folder, options={"rdf_profile": profile})
+        texts[profile] = path.read_text()
+    return texts
+
+
+F = "field/cy-1"
+# name: profile, subject that must be named, class, pattern in its block, replacement, words
+BROKEN = {
+    "field without id": (F, "gf:Field", r'dcterms:identifier "cy-1"', 'rdfs:comment "x"', "no ident"),
+    "area negative": (F, "gf:Field", r'areaInHectares "[^"]*"', 'areaInHectares "-1"', "out of b"),
+    "area untyped": (F, "gf:Field", r'areaInHectares "[^"]*"\^\^xsd:double', "areaInHectares 3", "3"),
+    "two headings": (F, "gf:Field", r'(gf:headingInDegrees) ("83"\S+)', r'\1 \2, "84"^^xsd:double',
+                     "more than one heading"),
+    "swapped axes of the outline": (F + "/geometry", "sf:Polygon", r"POLYGON .*?\"\^\^",
+                                    'POLYGON ((35 133, 36 133, 36 134, 35 133))"^^', "not longitudes"),
+    "unknown crs": (F + "/geometry", "sf:Polygon", r"OGC/1\.3/CRS84", "OGC/1.3/CRS85", "CRS"),
+    "no wkt": (F + "/geometry", "sf:Polygon", r"geo:asWKT .*\n", 'rdfs:comment "x" ;\n', "no as wkt"),
+    "broken wkt": (F + "/geometry", "sf:Polygon", r"\)\)\"", ')"', "not WKT"),
+    "outline as a line": (F + "/geometry", "sf:Polygon", r"POLYGON \(\(([^)]*)\).*?\"\^\^",
+                          r'LINESTRING (\1)"^^', "reads"),
+    "metric default geometry": (F, "gf:Field", r"(hasDefaultGeometry <field/cy-1/geometry)>",
+                                r"\1/EPSG-32636>", "default geometry"),
+    "no default geometry": (F, "gf:Field", r"geo:hasDefaultGeometry \S+ ;", "", "has default geom"),
+    "obstacle without number": (F + "/obstacle/1", "gf:Obstacle", r"gf:obstacleNo 1 ;", "", "number"),
+    "obstacle number twice": (F + "/obstacle/2", "gf:Obstacle", r"gf:obstacleNo 2", "gf:obstacleNo 1",
+                              "same obstacle number 1"),
+    "obstacle number a text": (F + "/obstacle/1", "gf:Obstacle", r"gf:obstacleNo 1", 'gf:obstacleNo "1"',
+                               "whole number"),
+    "unknown status": (F + "/obstacle/1", "gf:Obstacle", r"gf:Detected", "gf:Seen", "not allowed"),
+    "no kind": (F + "/obstacle/1", "gf:Obstacle", r"gf:kind gf:Tree ;", "", "no kind"),
+    "radius NaN": (F + "/obstacle/1", "gf:Obstacle", r'(radiusInMetres) "[^"]*"', r'\1 "NaN"', "NaN"),
+    "radius infinite": (F + "/obstacle/1", "gf:Obstacle", r'(radiusInMetres) "[^"]*"', r'\1 "INF"',
+                        "out of bounds"),
+    "radius a word": (F + "/obstacle/1", "gf:Obstacle", r'(radiusInMetres) "[^"]*"', r'\1 "big"',
+                      "no xsd:double"),
+    "confidence above one": (F + "/obstacle/1", "gf:Obstacle", r'(confidence) "[^"]*"', r'\1 "1.5"',
+                             "out of bounds"),
+    "latitude 95": (F + "/obstacle/1", "gf:Obstacle", r'(wgs84:lat) "[^"]*"', r'\1 "95.0"',
+                    "out of bounds"),
+    "swapped position": (F + "/obstacle/1", "gf:Obstacle",
+                         r'(wgs84:lat) ("[^"]*")(.*?wgs84:long) ("[^"]*")', r"\1 \4\3 \2", "swapped"),
+    "track number a decimal": (F + "/track/1", "gf:Track", r"gf:trackNo 1", "gf:trackNo 1.5", "1.5"),
+    "track number twice": (F + "/track/2", "gf:Track", r"gf:trackNo 2", "gf:trackNo 1", "same track"),
+    "track length negative": (F + "/track/1", "gf:Track", r'(hasMetricLength) "', r'\1 "-', "out of"),
+    "segment on no track": (F + "/track/1/segment/1", "gf:Segment", r"gf:onTrack \S+ ;", "", "on track"),
+    "segment on a track that is not there": (F + "/track/1/segment/1", "gf:Segment",
+                                             r"(gf:onTrack <\S+)1>", r"\g<1>99>", "no gf:Track"),
+    "gap without cause": (F + "/track/2/gap/1", "gf:Gap", r'gf:cause "[^"]*" ;', "", "no cause"),
+    "gap caused by a text": (F + "/track/2/gap/1", "gf:Gap", r"gf:causedBy \S+", 'gf:causedBy "3"',
+                             "no IRI"),
+    "point without number": (F + "/point/1", "gf:TrackPoint", r"gf:pointNo 1 ;", "", "point number"),
+    "point number twice": (F + "/point/2", "gf:TrackPoint", r"gf:pointNo 2", "gf:pointNo 1", "same"),
+    "point moved away": (F + "/point/1", "gf:TrackPoint", r'(wgs84:lat) "[^"]*"', r'\1 "35.2"',
+                         "not at its position"),
+    "headland width negative": (F + "/headland/1", "gf:Headland", r'(widthInMetres) "', r'\1 "-', "out"),
+    "headland pass missing": (F + "/headland-track/1/segment/1", "gf:HeadlandTrack",
+                              r"gf:passNo 1 ;", "", "no pass"),
+    "route step of unknown kind": (F + "/route/1", "gf:RouteStep", r'stepKind "work"', 'stepKind "fly"',
+                                   "not allowed"),
+    "sequence twice": (F + "/route/2", "gf:RouteStep", r"gf:sequence 2", "gf:sequence 1", "same sequence"),
+    "turn that fits perhaps": (F + "/turn/1", "gf:Turn", r'gf:fits "true"', 'gf:fits "perhaps"',
+                               "no xsd:boolean"),
+    "turn to a lost track": (F + "/turn/1", "gf:Turn", r"(gf:toTrack <\S+)2>", r"\g<1>77>", "no gf:Track"),
+    "plan of no field": (F + "/plan", "gf:TrackPlan", r"gf:inField \S+ ;", "", "no in field"),
+    "detection of nothing": (F + "/obstacle/1/detection", "gf:Detection",
+                             r"sosa:hasFeatureOfInterest \S+ ;", "", "hasFeatureOfInterest"),
+    "detection result above one": (F + "/obstacle/1/detection", "gf:Detection",
+                                   r'(sosa:hasSimpleResult) "[^"]*"', r'\1 "7.0"', "out of bounds"),
+    "dataset without title": (F + "/dataset", "dcat:Dataset", r'dcterms:title "North" ;', "", "title"),
+    "dataset in a crs of its own": (F + "/dataset", "dcat:Dataset", r"(gf:metricCrs) \S+",
+                                    r"\1 <http://my.example/crs>", "reads"),
+    "settings given twice": (F + "/run", "prov:Activity", r"(gf:settings) ", r'\1 "{}", ', "more than"),
+}  # fmt: skip
+STUDY_BROKEN = {
+    "tree without the study's number": (F + "/obstacle/1", "po:tree", r"obstacle:no \S+ ;", "", "no"),
+    "tree number a decimal": (F + "/obstacle/1", "po:tree", r'obstacle:no "1"\S+', "obstacle:no 1.0",
+                              "typed"),
+    "point beyond the pole": (F + "/point/1", "gml:point", r'(gml:lat) "[^"]*"', r'\1 "91.0"', "out"),
+    "point without track": (F + "/point/1", "gml:point", r"trajectory:track \S+ ;", "", "track"),
+    "study point number twice": (F + "/point/2", "gml:point", r'trajectory:no "2"', 'trajectory:no "1"',
+                                 "same point number"),
+}  # fmt: skip
+
+
+def broken_file(text, subject, cls, pattern, replacement):
+    """The text with one change in the block of a subject; where it starts."""
+    start = text.index(f"\n<{subject}>\n    a {cls}") + 1
+    end = text.index(" .\n\n", start)
+    block, count = re.subn(pattern, replacement, text[start:end], count=1, flags=re.DOTALL)
+    assert count == 1, "the change did not apply"
+    return text[:start] + block + text[end:], text.count("\n", 0, start) + 1
+
+
+@pytest.mark.parametrize(
+    ("profile", "name"),
+    [("geosparql", name) for name in BROKEN] + [("study", name) for name in STUDY_BROKEN],
+)
+def test_a_broken_file_is_found_and_the_thing_named(sound, tmp_path, profile, name):
+    subject, cls, pattern, replacement, words = {**BROKEN, **STUDY_BROKEN}[name]
+    text, line = broken_file(sound[profile], subject, cls, pattern, replacement)
+    path = tmp_path / "broken.ttl"
+    path.write_text(text)
+    problems = validate(path)
+    full = f"<https://example.org/geofield/{subject}>"
+    # A broken geometry is told of itself or of the feature that has it.
+    subjects = {full, full.replace("/geometry>", ">")}
+    named = [p for p in problems if p.subject in subjects and words.lower() in str(p).lower()]
+    assert named, [str(problem) for problem in problems]
+    assert line in {p.line for p in problems} or named[0].subject != full
+
+
+def test_each_shape_is_broken_at_least_once():
+    touched = {cls for _, cls, *_ in [*BROKEN.values(), *STUDY_BROKEN.values()]}
+    touched |= {"geo:Geometry" if "sf:Polygon" in touched else ""}
+    touched |= {"<http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#tree>"}
+    touched |= {"<http://www.opengis.net/gml/point>"}
+    assert set(class_rules()) <= touched
+    assert len(BROKEN) + len(STUDY_BROKEN) >= 25
+
+
+def test_a_blank_node_is_named(sound, tmp_path):
+    path = tmp_path / "blank.ttl"
+    path.write_text(sound["geosparql"] + "\n_:it a gf:Track ; gf:trackNo 99 .\n")
+    assert any("no IRI" in str(problem) for problem in validate(path))
+
+
+XML = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:e="http://e/">'
+BOMB = "".join(
+    f'<!ENTITY {name} "{f"&{inner};" * 10}">'
+    for inner, name in zip("abcdefghi", "bcdefghij", strict=True)
+)
+HOSTILE = {
+    "entities that grow": ("x.rdf", f'<!DOCTYPE r [<!ENTITY a "aaaaaaaa">{BOMB}]>{XML}<e:p>&j;</e:p>',
+                           "other entities"),
+    "long entities": ("x.rdf", f'<!DOCTYPE r [<!ENTITY a "{"a" * 999}">]>{XML}{"&a;" * 9999}', "long"),
+    "many entities": (
+        "x.rdf",
+        "<!DOCTYPE r [" + "".join(f'<!ENTITY a{i} "b">' for i in range(200)) + f"]>{XML}</rdf:RDF>",
+        "too many"),
+    "a local file": ("x.rdf", f'<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]>{XML}&a;',
+                     "external"),
+    "a parameter entity": ("x.rdf", f'<!DOCTYPE r [<!ENTITY % a SYSTEM "http://127.0.0.1:9/">%a;]>{XML}',
+                           "external or parameter"),
+    "an external doctype": ("x.rdf", f'<!DOCTYPE r SYSTEM "http://127.0.0.1:9/a.dtd">{XML}', "external"),
+    "huge nesting": ("x.rdf", XML + "<e:a><e:b>" * 200_000, "nested deeper"),
+    "nested arrays": ("x.jsonld", "[" * 300_000, "stack"),
+    "a context on the network": ("x.jsonld", '{"@context": "http://127.0.0.1:9/c", "@id": "http://e/"}',
+                                 "does not fetch"),
+    "contexts in a list": ("x.jsonld", '{"@context": [{}, "http://127.0.0.1:9/c"], "a": 1}', "context"),
+    "an iri with a space": ("x.ttl", "<http://e/a b> a <http://e/c> .", "line 1"),
+    "an iri with a space in xml": ("x.rdf", f'{XML}\n<e:a rdf:about="http://e/a b"/></rdf:RDF>', "line 2"),
+    "an iri with a space in json": ("x.jsonld", '{\n"@id": "http://e/a b", "http://e/p": 1}', "line 2"),
+    "not xml": ("x.rdf", "GIF89a", "well-formed"),
+    "cut off": ("x.nt", "<http://e/a> <http://e/p> \"x", "line 1"),
+    "binary": ("x.ttl", "\0\1\2", "line 1"),
+    "nothing of ours": ("x.ttl", "<http://e/a> <http://e/p> 1 .", "no field"),
+    "empty": ("x.ttl", "", "no field"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_and_broken_syntax_is_refused_quickly(tmp_path, name):
+    file, text, words = HOSTILE[name]
+    path = tmp_path / file
+    path.write_text(text)
+    start = time.perf_counter()
+    problems = validate(path)
+    assert time.perf_counter() - start < 2.0
+    assert len(problems) == 1
+    assert words in str(problems[0])
+
+
+def test_plain_entities_as_ontology_editors_write_them_are_fine(tmp_path):
+    path = tmp_path / "x.rdf"
+    path.write_text(
+        '<!DOCTYPE rdf:RDF [<!ENTITY gf "https://w3id.org/geofield#">]>'
+        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"'
+        ' xmlns:gf="https://w3id.org/geofield#">'
+        '<rdf:Description rdf:about="http://e/t"><rdf:type rdf:resource="&gf;Track"/>'
+        "</rdf:Description></rdf:RDF>"
+    )
+    assert any("no track number" in str(problem) for problem in validate(path))
