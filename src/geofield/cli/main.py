@@ -23,6 +23,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "obstacles": ("geofield.cli.obstacles:obstacles", "Stage 3: find the obstacles in it."),
     "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
+    "import": ("geofield.cli.import_:import_", "Read other programs' boundaries and lines."),
+    "validate": ("geofield.cli.validate:validate", "Check products against their formats."),
+    "info": ("geofield.cli.info:info", "Show what a file holds."),
+    "formats": ("geofield.cli.formats:formats", "List the formats and what each carries."),
     "doctor": ("geofield.cli.doctor:doctor", "Show versions and what looks wrong."),
     "simulate": ("geofield.cli.simulate:simulate", "Make synthetic fields with known truth."),
 }

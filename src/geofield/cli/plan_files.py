@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ def save_plan(
         Replace a file other than `read_from`.
     """
     from geofield.formats import write_dataset
+    from geofield.formats.gpkg_read import scene_beside
 
     if output.suffix.lower() != ".gpkg":
         raise FormatError(
@@ -34,6 +36,8 @@ def save_plan(
             hint="Stages write NAME.gpkg; use `geofield export` for other formats.",
         )
     same = read_from is not None and output.resolve() == read_from.resolve()
-    write_dataset(
-        plan.to_dataset(), output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite or same
-    )
+    dataset = plan.to_dataset()
+    if read_from is not None and output.resolve().parent == read_from.resolve().parent:
+        # The project goes on showing the picture that lies there.
+        dataset = replace(dataset, scene_path=scene_beside(read_from))
+    write_dataset(dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite or same)

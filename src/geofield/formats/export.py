@@ -100,6 +100,9 @@ def dropped(dataset: Dataset, into: Format) -> list[str]:
     carried = set(into.layers)
     if "segments" in carried:
         layers = [title for title in layers if title != "tracks"]
+    # And the tracks of a format with gaps are broken where they lie.
+    if {"tracks", "gaps"} <= carried:
+        layers = [title for title in layers if title != "segments"]
     return layers + [drop.words for drop in into.drops if _present(dataset, drop.when)]
 
 

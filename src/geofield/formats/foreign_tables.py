@@ -15,6 +15,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, grid_north_deg, transformer
 from geofield.errors import FormatError, FormatWarning
+from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     }
     data |= {
         "name": [path.stem if names is None else str(names.iloc[0])],
-        "field_id": [None if ids is None else str(ids.iloc[0])],
+        "field_id": [Field(polygon, crs).field_id if ids is None else str(ids.iloc[0])],
         "area_ha": [polygon.area / 10_000.0],
         "perimeter_m": [polygon.exterior.length],
     }

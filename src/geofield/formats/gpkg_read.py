@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sqlite3
 import warnings
+from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,8 @@ from geofield.model import Dataset
 if TYPE_CHECKING:
     import geopandas as gpd
 
+#: Track points that are read at a time.
+BATCH_ROWS = 200_000
 #: Tables that some readers list as layers without geometry.
 _NOT_LAYERS = ("layer_styles", "qgis_projects")
 
@@ -50,8 +54,10 @@ def read(path: Path) -> Dataset:
                 stacklevel=2,
             )
             continue
-        tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
+        if name != schema.TRACK_POINTS.name:
+            tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
     scene = None if record.scene is None else path.parent / record.scene
+    has_points = schema.TRACK_POINTS.name in layers
     return Dataset(
         tables,
         crs,
@@ -59,7 +65,44 @@ def read(path: Path) -> Dataset:
         record.provenance,
         record.grid,
         scene if scene is not None and scene.exists() else None,
+        PointsInFile(path, crs.to_wkt()) if has_points else None,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class PointsInFile:
+    """Track points that stay in their file until they are asked for, a batch at a time."""
+
+    path: Path
+    crs_wkt: str
+
+    def __call__(self) -> Iterator[gpd.GeoDataFrame]:
+        """The batches, as tables of layer `track_points`."""
+        import geopandas as gpd
+        import pyarrow as pa
+        import shapely
+        from pyogrio.raw import open_arrow
+
+        crs = CRS.from_wkt(self.crs_wkt)
+        layer = schema.TRACK_POINTS
+        with open_arrow(self.path, layer=layer.name, batch_size=BATCH_ROWS) as (meta, source):
+            geometry = meta["geometry_name"] or "wkb_geometry"
+            for batch in pa.RecordBatchReader.from_stream(source):
+                if not batch.num_rows:
+                    continue
+                table = pa.Table.from_batches([batch])
+                shapes = shapely.from_wkb(table[geometry].to_numpy())
+                frame = gpd.GeoDataFrame(
+                    table.drop_columns(geometry).to_pandas(), geometry=shapes, crs=crs
+                )
+                yield _own_table(layer, frame, crs, self.path)
+
+
+def scene_beside(path: Path) -> Path | None:
+    """The picture beside a GeoPackage of geofield that belongs to it, where it is there."""
+    record = _origin(path)
+    scene = None if record is None or record.scene is None else path.parent / record.scene
+    return scene if scene is not None and scene.exists() else None
 
 
 def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pyproj import CRS
 
+from geofield import schema
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
 from geofield.formats.registry import detect
@@ -35,3 +39,48 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
     if not found.asks_crs:
         raise FormatError(f"{found.title} files say their CRS themselves.", hint="Leave out --crs.")
     return reader(place, crs=parse_crs(crs))
+
+
+def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
+    """One dataset from several: each layer from the one that has it, in the first's CRS.
+
+    Parameters
+    ----------
+    datasets : sequence of Dataset
+        Of the same field; obstacles of all are put together and numbered again when their
+        numbers clash.
+    name : str, optional
+        The field's name.
+
+    Raises
+    ------
+    FormatError
+        When two of them have a field, or the same layer of tracks.
+    """
+    import pandas as pd
+
+    first = datasets[0]
+    tables: dict[str, Any] = {}
+    for dataset in datasets:
+        for layer, table in dataset.tables.items():
+            if not len(table):
+                continue
+            moved = table if dataset.crs == first.crs else table.to_crs(first.crs)
+            if layer not in tables:
+                tables[layer] = moved
+            elif layer == schema.OBSTACLES.name:
+                tables[layer] = pd.concat([tables[layer], moved], ignore_index=True)
+                if tables[layer]["obstacle_no"].duplicated().any():
+                    tables[layer]["obstacle_no"] = pd.array(range(1, len(tables[layer]) + 1))
+            else:
+                raise FormatError(
+                    f"Two of the files have a layer {layer!r}.", hint="Import one of them."
+                )
+    named = next((each for each in datasets if each.has(schema.FIELD.name)), first)
+    if schema.FIELD.name in tables and name is not None:
+        tables[schema.FIELD.name] = tables[schema.FIELD.name].assign(name=name)
+    if len(datasets) == 1 and name is None:
+        return first
+    return replace(
+        named, tables=tables, crs=first.crs, name=name or named.name, points=first.points
+    )

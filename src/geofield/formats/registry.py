@@ -6,7 +6,7 @@ The table is data only: nothing heavy is imported before a format is used.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +19,7 @@ from geofield.model import Dataset
 
 Writer = Callable[..., list[Path]]
 Reader = Callable[..., Dataset]
+Validator = Callable[[Path], Iterable[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +77,9 @@ class Format:
         The options its writer understands.
     asks_crs : bool
         Whether its reader takes a ``crs`` for files that do not say theirs.
+    validator : str or None
+        ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
+        of the format itself.
     """
 
     name: str
@@ -90,6 +94,7 @@ class Format:
     crs: str = "WGS 84"
     options: tuple[str, ...] = ()
     asks_crs: bool = False
+    validator: str | None = None
 
     def load_writer(self) -> Writer:
         """The writer, imported."""
@@ -109,6 +114,10 @@ class Format:
                 f"{self.title} can be written, not read.", hint=f"These can be read: {readable}."
             )
         return _load(self.reader)  # type: ignore[no-any-return]
+
+    def load_validator(self) -> Validator | None:
+        """The check of the format's own rules, imported; None where there is none."""
+        return None if self.validator is None else _load(self.validator)
 
 
 def _load(reference: str) -> Any:
@@ -136,6 +145,7 @@ _FORMATS = (
         precision_m=0.0,
         crs="metric",
         options=("points", "project"),
+        validator="geofield.formats.checks.gpkg:check",
     ),
     Format(
         "geojson",
@@ -148,6 +158,7 @@ _FORMATS = (
         drops=(Drop("settings and evidence", "provenance"),),
         precision_m=0.012,
         asks_crs=True,
+        validator="geofield.formats.checks.geojson:check",
     ),
     Format(
         "shapefile",
@@ -161,6 +172,7 @@ _FORMATS = (
         precision_m=1e-6,
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
+        validator="geofield.formats.checks.shapefile:check",
     ),
     Format(
         "geoparquet",
@@ -200,7 +212,7 @@ _FORMATS = (
         "gpx",
         "GPX 1.1",
         ("{stem}.gpx",),
-        ("tracks",),
+        ("tracks", "segments"),
         "geofield.formats.gpx:write",
         suffixes=(".gpx",),
         drops=(
@@ -247,6 +259,7 @@ _FORMATS = (
         drops=_TERMINAL_DROPS,
         precision_m=0.0002,
         options=("customer", "farm"),
+        validator="geofield.formats.checks.isoxml:check",
     ),
     Format(
         "isoxml-v3",
@@ -258,6 +271,7 @@ _FORMATS = (
         drops=_TERMINAL_DROPS,
         precision_m=0.0002,
         options=("customer", "farm"),
+        validator="geofield.formats.checks.isoxml:check",
     ),
     Format(
         "agopengps",
@@ -275,6 +289,7 @@ _FORMATS = (
             *_TERMINAL_DROPS,
         ),
         precision_m=0.005,
+        validator="geofield.formats.checks.agopengps:check",
     ),
     Format(
         "rdf",

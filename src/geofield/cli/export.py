@@ -1,0 +1,91 @@
+"""``geofield export``: a plan in other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geofield.cli.console import echo_json, say
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/
+  geofield export out/field.gpkg --format isoxml --format kml --out export/
+  geofield export out/field.gpkg -f shapefile --profile tracklead --out stick/
+`geofield formats` lists the formats and what each can carry.
+"""
+)
+@click.argument("plan_file", metavar="PLAN", type=click.Path(path_type=Path))
+@click.option(
+    "-f", "--format", "formats", multiple=True, required=True, help="Format; may be repeated."
+)
+@click.option(
+    "--out",
+    "folder",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the products.",
+)
+@click.option("--name", "stem", default="field", show_default=True, help="Name of single files.")
+@click.option("--crs", help="CRS of PLAN where the file does not say it, e.g. EPSG:32633.")
+@click.option("--customer", help="Customer's name, for terminals.")
+@click.option("--farm", help="Farm's name, for terminals.")
+@click.option(
+    "--profile",
+    type=click.Choice(["generic", "tracklead", "aggps"]),
+    help="Names and columns of Shapefiles.",
+)
+@click.option("--zip", "zipped", is_flag=True, help="Shapefiles in one archive.")
+@click.option("--points/--no-points", default=None, help="Track points in the GeoPackage.")
+@click.option(
+    "--option", "further", multiple=True, metavar="NAME=VALUE", help="Further option of a format."
+)
+@click.option("--overwrite", is_flag=True, help="Replace products that are there already.")
+@click.option("--json", "as_json", is_flag=True, help="Print the files as JSON on stdout.")
+def export(
+    plan_file: Path,
+    formats: tuple[str, ...],
+    folder: Path,
+    stem: str,
+    crs: str | None,
+    further: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Write other formats from a plan.
+
+    PLAN is a GeoPackage of geofield, or any file it can import. All products come into
+    place together or not at all; what a format cannot carry is said once.
+    """
+    from geofield.formats import read_dataset, write_dataset
+
+    given["zip"] = given.pop("zipped") or None
+    options = {key: value for key, value in given.items() if value is not None}
+    options |= dict(_named(text) for text in further)
+    dataset = read_dataset(plan_file, crs=crs)
+    written = write_dataset(
+        dataset,
+        folder,
+        [name for text in formats for name in text.split(",")],
+        stem=stem,
+        overwrite=overwrite,
+        options=options,
+        inputs=[plan_file],
+    )
+    if as_json:
+        echo_json({"files": [str(path) for path in written]})
+        return
+    for path in written:
+        say(str(path))
+
+
+def _named(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise click.BadParameter(f"{text!r} is not NAME=VALUE.", param_hint="--option")
+    return name, value

@@ -1,0 +1,64 @@
+"""``geofield import``: other people's boundaries, obstacles and lines as a GeoPackage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from geofield.cli.console import echo_json, say
+
+
+@click.command(
+    "import",
+    epilog="""\b
+Examples:
+  geofield import boundary.shp -o field.gpkg
+  geofield import boundary.shp trees.geojson -o field.gpkg --crs EPSG:32633
+  geofield import TASKDATA/ -o field.gpkg && geofield tracks field.gpkg --spacing 3 -o field.gpkg
+""",
+)
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="GeoPackage to write.",
+)
+@click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
+@click.option("--name", help="The field's name.")
+@click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
+def import_(
+    files: tuple[Path, ...],
+    output: Path,
+    crs: str | None,
+    name: str | None,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Read boundaries, obstacles and guidance lines from other programs' files.
+
+    FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or
+    AgOpenGPS field, in any CRS. Several files make one field: the boundary from one, the
+    obstacles from another.
+    """
+    from geofield.errors import FormatError
+    from geofield.formats import read_dataset, write_dataset
+    from geofield.formats.importing import merged
+
+    if output.suffix.lower() != ".gpkg":
+        raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
+    dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
+    written = write_dataset(
+        dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite, inputs=files
+    )
+    counts = {layer: len(table) for layer, table in dataset.tables.items() if len(table)}
+    if as_json:
+        echo_json({"files": [str(path) for path in written], "name": dataset.name, "rows": counts})
+        return
+    found = ", ".join(f"{count} {layer}" for layer, count in counts.items())
+    say(f"{dataset.name}: {found} in {output}")

@@ -1,0 +1,116 @@
+"""``geofield info``: what a file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geofield.cli.console import echo_json
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield info sample_data/field_1.tif
+  geofield info out/field.gpkg --json
+"""
+)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--crs", help="CRS of a file that does not say its own, e.g. EPSG:32633.")
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON on stdout.")
+def info(file: Path, crs: str | None, as_json: bool) -> None:
+    """Show what a file holds: layers, rows, place, CRS, origin."""
+    facts = _picture(file) if file.suffix.lower() in (".tif", ".tiff") else _vector(file, crs)
+    if as_json:
+        echo_json(facts)
+        return
+    for key, value in facts.items():
+        if isinstance(value, dict):
+            click.echo(f"{key}:")
+            for name, inner in value.items():
+                click.echo(f"  {name}: {inner}")
+        else:
+            click.echo(f"{key}: {value}")
+
+
+def _vector(file: Path, crs: str | None) -> dict[str, Any]:
+    from geofield.crs import authority_name
+    from geofield.formats import detect, read_dataset
+    from geofield.formats.arrow import to_lonlat
+
+    found = detect(file)
+    dataset = read_dataset(file, crs=crs)
+    field = dataset.table("field")
+    facts: dict[str, Any] = {
+        "file": str(file),
+        "format": found.title,
+        "name": dataset.name,
+        "metric CRS": f"{authority_name(dataset.crs)} ({dataset.crs.name})",
+        "rows": {
+            layer.name: len(dataset.table(layer.name))
+            for layer in dataset.layers()
+            if dataset.has(layer.name)
+        },
+    }
+    if len(field):
+        shape = field.geometry.iloc[0]
+        place = to_lonlat(field.geometry.to_numpy()[:1], dataset.crs)[0].representative_point()
+        facts["field"] = {
+            "area (ha)": round(shape.area / 10_000, 4),
+            "perimeter (m)": round(shape.exterior.length, 1),
+            "lat": round(place.y, 6),
+            "lon": round(place.x, 6),
+        }
+    statuses = dataset.table("obstacles")["status"].value_counts(dropna=False).sort_index()
+    if len(statuses):
+        facts["obstacles"] = {str(key): int(count) for key, count in statuses.items()}
+    provenance = dataset.provenance
+    source = provenance.source
+    facts["origin"] = {
+        key: value
+        for key, value in (
+            ("software", provenance.software),
+            ("imagery", source.name),
+            ("date", source.date),
+            ("licence", source.licence),
+            ("attribution", source.attribution),
+        )
+        if value
+    } or "not recorded"
+    return facts
+
+
+def _picture(file: Path) -> dict[str, Any]:
+    import rasterio
+    from rasterio.errors import RasterioIOError
+
+    from geofield.errors import ImageryError
+    from geofield.grid import Grid
+
+    try:
+        with rasterio.open(file) as picture:
+            facts: dict[str, Any] = {
+                "file": str(file),
+                "format": picture.driver,
+                "size": f"{picture.width} x {picture.height} px",
+                "bands": ", ".join(
+                    f"{role.name} {kind}"
+                    for role, kind in zip(picture.colorinterp, picture.dtypes, strict=True)
+                ),
+                "CRS": str(picture.crs) if picture.crs else "not recorded",
+            }
+            tags = {key: value for key, value in picture.tags().items() if key != "AREA_OR_POINT"}
+            if picture.crs:
+                grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())
+                lon, lat = grid.centre_lonlat
+                facts |= {
+                    "metres per pixel on the ground": round(grid.ground_resolution_m, 4),
+                    "centre": {"lat": round(lat, 6), "lon": round(lon, 6)},
+                }
+    except RasterioIOError as error:
+        raise ImageryError(f"{file} cannot be read: {error}.", hint="Is it whole?") from error
+    if tags:
+        facts["tags"] = tags
+    return facts

@@ -1,0 +1,42 @@
+"""``geofield validate``: whether a product keeps the rules of its format, and its own."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from geofield.cli.console import echo_json, say
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  geofield validate out/field.gpkg
+  geofield validate export/isoxml/TASKDATA/TASKDATA.XML --json
+"""
+)
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON on stdout.")
+@click.pass_context
+def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> None:
+    """Check products: the rules of the format, and whether the plan in it fits together.
+
+    Exit code 1 when there is an error; warnings alone leave it at 0.
+    """
+    from geofield.formats import validate_file
+
+    reports = {str(file): validate_file(file) for file in files}
+    failed = any(each.level == "error" for found in reports.values() for each in found)
+    if as_json:
+        echo_json({file: [asdict(each) for each in found] for file, found in reports.items()})
+    else:
+        for file, found in reports.items():
+            say(f"{file}: {'no fault found' if not found else f'{len(found)} findings'}")
+            for each in found:
+                say(f"  {each.level}: {each.where}: {each.message}")
+    if failed:
+        context.exit(1)

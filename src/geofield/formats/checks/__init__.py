@@ -1,0 +1,1 @@
+"""The rules of each format, as checks of a file: `geofield.formats.validation` runs them."""

@@ -1,0 +1,73 @@
+"""Rules of AgOpenGPS's field folder: counts, rings, headings, coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from geofield.errors import FormatError
+from geofield.formats.agopengps.plane import ring_headings
+from geofield.formats.agopengps.read import field_folder
+from geofield.formats.validation import Finding
+
+#: Headings are written with five decimals of vertices with three.
+HEADING_TOLERANCE = 0.01
+_EXPECTED = ("Field.txt", "Boundary.txt", "TrackLines.txt")
+
+
+def check(path: Path) -> Iterator[Finding]:
+    """Findings in the folder of a field."""
+    try:
+        folder = field_folder(path)
+    except FormatError as error:
+        yield Finding("error", path.name, str(error))
+        return
+    for name in _EXPECTED:
+        if not (folder / name).is_file():
+            yield Finding("warning", folder.name, f"{name} is missing")
+    boundary = folder / "Boundary.txt"
+    if boundary.is_file():
+        yield from _check_boundary(boundary)
+
+
+def _check_boundary(path: Path) -> Iterator[Finding]:
+    lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
+    if not lines or lines[0] != "$Boundary":
+        yield Finding("error", path.name, "the first line is not $Boundary")
+        return
+    position, number = 1, 0
+    outer = None
+    while position < len(lines) and lines[position]:
+        number += 1
+        where = f"{path.name}, ring {number}"
+        while position < len(lines) and lines[position] in ("True", "False"):
+            position += 1
+        try:
+            count = int(lines[position])
+            rows = lines[position + 1 : position + 1 + count]
+            vertices = np.array([[float(part) for part in row.split(",")] for row in rows])
+        except (ValueError, IndexError):
+            yield Finding("error", where, "it breaks off or is damaged")
+            return
+        position += 1 + count
+        if len(rows) != count or count < 3 or vertices.shape[1] != 3:
+            yield Finding("error", where, f"{len(rows)} vertices instead of {count}, or too few")
+            return
+        ring = vertices[:, :2]
+        if np.allclose(ring[0], ring[-1]):
+            yield Finding("error", where, "it is closed: the first vertex must not be repeated")
+        wrong = np.abs((vertices[:, 2] - ring_headings(ring) + np.pi) % (2 * np.pi) - np.pi)
+        if (wrong > HEADING_TOLERANCE).any():
+            yield Finding(
+                "error", where, f"{int((wrong > HEADING_TOLERANCE).sum())} headings do not fit"
+            )
+        polygon = shapely.Polygon(ring)
+        if not polygon.is_valid:
+            yield Finding("error", where, "it crosses itself")
+        elif outer is None:
+            outer = polygon
+        elif not outer.intersects(polygon):
+            yield Finding("error", where, "an inner ring lies outside the field")

@@ -1,0 +1,166 @@
+"""Checking products: the rules of their format, and whether the plan in them fits together."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import shapely
+
+from geofield import schema
+from geofield.errors import FormatWarning, GeofieldError
+from geofield.formats.importing import read_dataset
+from geofield.formats.registry import detect
+from geofield.model import Dataset
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: Sums and lengths may differ so much from what a column says, metres.
+LENGTH_TOLERANCE_M = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that is wrong (``error``) or worth a look (``warning``), and where."""
+
+    level: Literal["error", "warning"]
+    where: str
+    message: str
+
+
+def validate_file(path: Path | str) -> list[Finding]:
+    """All findings in a product.
+
+    Parameters
+    ----------
+    path : Path
+        A file or folder of any format.
+
+    Returns
+    -------
+    list of Finding
+        The format's own rules first; empty when there is no fault.
+
+    Raises
+    ------
+    FormatError
+        When there is no such file or its format is not known.
+    """
+    place = Path(path)
+    found = detect(place)
+    check = found.load_validator()
+    findings = list(check(place)) if check is not None else []
+    if found.reader is None:
+        return findings
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", FormatWarning)
+            dataset = read_dataset(place)
+    except GeofieldError as error:
+        return [*findings, Finding("error", place.name, str(error))]
+    findings += [
+        Finding("warning", place.name, str(each.message))
+        for each in caught
+        if issubclass(each.category, FormatWarning)
+    ]
+    return findings + list(check_dataset(dataset, with_segments="segments" in found.layers))
+
+
+def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[Finding]:
+    """Whether the tables of a plan fit together.
+
+    `with_segments` is false for formats that hold whole lines, which do cross obstacles.
+    """
+    for name, table in dataset.tables.items():
+        layer = schema.layer(name)
+        yield from _check_rows(layer, table)
+    if with_segments:
+        yield from _check_obstacles(dataset)
+        yield from _check_tracks(dataset)
+
+
+def _check_rows(layer: schema.Layer, table: gpd.GeoDataFrame) -> Iterator[Finding]:
+    shapes = np.asarray(table.geometry.to_numpy(), dtype=object)
+    bad = ~shapely.is_valid(shapes)
+    for row in np.flatnonzero(bad)[:5]:
+        yield Finding(
+            "error",
+            f"{layer.name}, row {row + 1}",
+            f"the shape is not valid: {shapely.is_valid_reason(shapes[row])}",
+        )
+    if len(shapes) and not np.isfinite(shapely.get_coordinates(shapes)).all():
+        yield Finding("error", layer.name, "a coordinate is not a number")
+    keys = table[list(layer.key)]
+    missing = keys.isna().any(axis=1)
+    if missing.any():
+        yield Finding(
+            "warning",
+            layer.name,
+            f"{int(missing.sum())} rows have no {', '.join(layer.key)}: drawn by a person?",
+        )
+    double = keys[~missing].duplicated()
+    if double.any():
+        first = keys[~missing][double].iloc[0].to_dict()
+        yield Finding("error", layer.name, f"two rows have the same key {first}")
+    for column in layer.columns:
+        if column.values:
+            values = set(table[column.name].dropna()) - set(column.values)
+            if values:
+                yield Finding(
+                    "error",
+                    f"{layer.name}.{column.name}",
+                    f"{sorted(values)[0]!r} is none of {', '.join(column.values)}",
+                )
+
+
+def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
+    obstacles = dataset.table("obstacles")
+    segments = dataset.table("segments")
+    if not len(obstacles) or not len(segments):
+        return
+    kept = obstacles[obstacles["status"] != "rejected"]
+    # A hair inside: segments end exactly on the border of a buffer.
+    inside = shapely.buffer(np.asarray(kept.geometry.to_numpy(), dtype=object), -0.05)
+    tree = shapely.STRtree(segments.geometry.to_numpy())
+    hit, where = tree.query(inside, predicate="intersects")
+    for obstacle, segment in list(zip(hit, where, strict=True))[:5]:
+        row = segments.iloc[int(segment)]
+        yield Finding(
+            "error",
+            f"segments, track {row['track_no']}, segment {row['segment_no']}",
+            f"runs through obstacle {kept['obstacle_no'].iloc[int(obstacle)]}: plan the tracks "
+            "again (geofield tracks)",
+        )
+
+
+def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
+    field, segments = dataset.table("field"), dataset.table("segments")
+    if len(field) == 1 and len(segments):
+        outline = shapely.buffer(field.geometry.iloc[0], 0.05)
+        outside = ~shapely.covered_by(segments.geometry.to_numpy(), outline)
+        if outside.any():
+            yield Finding(
+                "error",
+                "segments",
+                f"{int(outside.sum())} leave the field: plan the tracks again (geofield tracks)",
+            )
+    tracks = dataset.table("tracks")
+    if not len(tracks) or not len(segments):
+        return
+    sums = segments.assign(length=segments.length).groupby("track_no")["length"].sum()
+    told = tracks.set_index("track_no")["length_m"].astype("float64")
+    both = told.index.intersection(sums.index)
+    off = (told[both] - sums[both]).abs() > LENGTH_TOLERANCE_M
+    for number in both[off][:5]:
+        yield Finding(
+            "error",
+            f"tracks, track {number}",
+            f"length_m is {told[number]:.2f}, its segments measure {sums[number]:.2f}",
+        )
+    for number in sums.index.difference(told.index)[:5]:
+        yield Finding("error", "segments", f"track {number} is not in layer tracks")
