@@ -34,7 +34,7 @@ def read_source(path: Path) -> Any:
     return notebook
 
 
-def execute(notebook: Any, folder: Path, timeout_s: int = 240) -> Any:
+def execute(notebook: Any, folder: Path, timeout_s: int = 900) -> Any:
     """Run all cells of a notebook in a folder, in a kernel of this very Python."""
     from nbclient import NotebookClient
 
