@@ -116,10 +116,11 @@ def join_rows(parts: Sequence[Any]) -> Any:
 
 def join_values(columns: Sequence[Any], separator: str) -> Any:
     """Several columns of values as lists; null where there is not one value."""
-    if len(columns) == 1:
-        return columns[0]
-    lists = pc.binary_join_element_wise(*columns, separator, null_handling="skip")
-    return pc.if_else(pc.is_valid(columns[0]), lists, pa.scalar(None, pa.string()))
+    lists = columns[0]
+    for column in columns[1:]:
+        # Not `null_handling="skip"`: it loses the rows in which every column is null.
+        lists = pc.coalesce(joined(lists, separator, column), lists)
+    return lists
 
 
 def text_of(rows: Any) -> bytes:
