@@ -54,7 +54,7 @@ class SourceSettings(Section):
     key_parameter: str = Field("", description="Query name of the key (WMS, WMTS).")
     rate_per_s: PositiveFloat | None = Field(None, description="Requests per second at most.")
     date: str | None = Field(None, description="When the imagery was taken.")
-    headers: dict[str, str] = Field({}, description="Sent with each request.")
+    headers: dict[str, SecretStr] = Field({}, description="Sent with each request.")
 
 
 class ImagerySettings(Section):
@@ -83,6 +83,9 @@ class FetchSettings(Section):
         description="Tiles kept per source at most, megabytes.",
     )
     cache_max_days: PositiveFloat = Field(90.0, description="Tiles are fetched anew after, days.")
+    keys: dict[str, SecretStr] = Field(
+        {}, description="Keys by source name; GEOFIELD_KEY_NAME in the environment wins."
+    )
     sources: dict[str, SourceSettings] = Field(
         {},
         description="Sources of your own, by name: [fetch.sources.NAME] in the settings file.",
@@ -221,6 +224,10 @@ def _explain(error: ValidationError) -> str:
     for problem in error.errors():
         name = ".".join(str(part) for part in problem["loc"])
         # Sources hold keys; a message must not.
-        given = "" if "sources" in problem["loc"] else f" (given: {problem.get('input')!r})"
+        given = (
+            ""
+            if {"sources", "keys"} & set(problem["loc"])
+            else f" (given: {problem.get('input')!r})"
+        )
         lines.append(f"{name}: {problem['msg'].lower()}{given}")
     return "Settings are not valid: " + "; ".join(lines) + "."

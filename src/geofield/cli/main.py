@@ -27,6 +27,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("geofield.cli.validate:validate", "Check products against their formats."),
     "info": ("geofield.cli.info:info", "Show what a file holds."),
     "formats": ("geofield.cli.formats:formats", "List the formats and what each carries."),
+    "sources": ("geofield.cli.sources:sources", "List imagery sources and their terms."),
+    "cache": ("geofield.cli.cache:cache", "Look at the tile cache, or clear it."),
     "doctor": ("geofield.cli.doctor:doctor", "Show versions and what looks wrong."),
     "simulate": ("geofield.cli.simulate:simulate", "Make synthetic fields with known truth."),
 }

@@ -175,7 +175,7 @@ def acquire(
         staging.fill(fetcher.rows(block, progress))
         report = fetcher.report
         if report.absent and (options.missing == "error" or report.absent == report.wanted):
-            raise absence_error(source.name, report)
+            raise absence_error(source.name, report, offline=options.offline)
         provenance = _provenance(source, block, report)
         if progress is not None:
             progress(block.count, block.count, "writing")
@@ -277,14 +277,8 @@ def _fetcher(
 
 
 def _cache_metadata(source: TileSource) -> Mapping[str, str]:
-    low, high = source.pyramid.zooms
-    words = {
-        "minzoom": str(source.pyramid.level(low).scheme_zoom),
-        "maxzoom": str(source.pyramid.level(high).scheme_zoom),
-    }
-    if not source.pyramid.levels[0].wraps:
-        words["crs"] = source.pyramid.crs.to_wkt()
-    return words
+    """The CRS of tiles that are not Web Mercator's: only geofield reads those."""
+    return {} if source.pyramid.levels[0].wraps else {"crs": source.pyramid.crs.to_wkt()}
 
 
 def _provenance(

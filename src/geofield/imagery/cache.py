@@ -182,6 +182,13 @@ class TileCache:
                 connection.execute(
                     "INSERT OR IGNORE INTO metadata VALUES ('format', ?)", (_format(kept[0][3]),)
                 )
+                # Readers trust these: they must tell what is here, not what the source has.
+                connection.execute(
+                    "INSERT OR REPLACE INTO metadata SELECT 'minzoom', MIN(zoom_level) FROM tiles"
+                )
+                connection.execute(
+                    "INSERT OR REPLACE INTO metadata SELECT 'maxzoom', MAX(zoom_level) FROM tiles"
+                )
                 connection.execute("COMMIT")
             except BaseException:
                 if connection.in_transaction:

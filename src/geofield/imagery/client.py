@@ -8,6 +8,7 @@ from every message.
 from __future__ import annotations
 
 import email.utils
+import logging
 import random
 import threading
 import time
@@ -31,6 +32,7 @@ _NOTHING = frozenset({204, 404, 410})
 _MAX_BODY = 128 * 2**20
 #: A server that asks for a longer pause has said no.
 _MAX_PAUSE_S = 120.0
+_LOGGERS = ("urllib3.connectionpool", "urllib3.poolmanager", "urllib3.connection")
 
 
 class NotThereError(Exception):
@@ -56,6 +58,19 @@ class Redactor:
         for secret in self._secrets:
             text = text.replace(secret, "***")
         return text
+
+
+class _KeylessLog(logging.Filter):
+    """Keeps keys out of urllib3's debugging log, which prints every address."""
+
+    def __init__(self, redact: Redactor) -> None:
+        super().__init__()
+        self._redact = redact
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Rewrite the record; it is always kept."""
+        record.msg, record.args = self._redact(record.getMessage()), None
+        return True
 
 
 class Client:
@@ -113,6 +128,9 @@ class Client:
             if proxy
             else urllib3.PoolManager(**options)  # type: ignore[arg-type]
         )
+        self._log_filter = _KeylessLog(self.redact)
+        for name in _LOGGERS:
+            logging.getLogger(name).addFilter(self._log_filter)
         self._retries = urllib3.Retry(0, redirect=5, raise_on_redirect=False)
 
     def stop(self) -> None:
@@ -122,6 +140,8 @@ class Client:
     def close(self) -> None:
         """Close the connections."""
         self._pool.clear()
+        for name in _LOGGERS:
+            logging.getLogger(name).removeFilter(self._log_filter)
 
     def get(
         self,

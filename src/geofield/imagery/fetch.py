@@ -238,11 +238,12 @@ class TileFetcher:
         self._cache.put(keep)
 
 
-def absence_error(name: str, report: FetchReport) -> ImageryError:
+def absence_error(name: str, report: FetchReport, *, offline: bool) -> ImageryError:
     """The error for a product with holes."""
+    repeat = "Work without --offline" if offline else "Repeat"
     parts = [f"{count} x {reason}" for reason, count in report.reasons.most_common(4)]
     return ImageryError(
         f"{report.absent} of {report.wanted} tiles of {name} could not be had "
         f"({report.missing} are not there, {report.failed} failed): {'; '.join(parts)}.",
-        hint="Repeat to fetch only these again, or use --missing mask to leave them as no-data.",
+        hint=f"{repeat} to fetch only these, or use --missing mask to leave them as no-data.",
     )

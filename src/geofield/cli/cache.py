@@ -1,0 +1,113 @@
+"""``geofield cache``: what is kept of tiles, and clearing it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geofield.cli.console import echo_json, say
+from geofield.cli.options import settings_option
+
+_folder = click.option(
+    "--cache-dir",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of the tile caches.",
+)
+
+
+@click.group(
+    epilog="""\b
+Examples:
+  geofield cache info
+  geofield cache clear naip
+"""
+)
+def cache() -> None:
+    """Look at the tile cache, or clear it.
+
+    Each source has one MBTiles file, which QGIS opens as a layer.
+    """
+
+
+@cache.command(
+    epilog="""\b
+Example:
+  geofield cache info --json
+"""
+)
+@_folder
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON on stdout.")
+@settings_option
+def info(cache_dir: Path | None, as_json: bool, settings_file: str | None) -> None:
+    """Say what is kept: sources, tiles, megabytes, dates."""
+    from geofield.cli.imagery_tools import cache_dir_of
+    from geofield.imagery.cache import cache_infos
+    from geofield.settings import load_settings
+
+    folder = cache_dir_of(load_settings(settings_file), cache_dir)
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source,
+            "path": str(each.path),
+            "tiles": each.tiles,
+            "megabytes": round(each.bytes / 1e6, 3),
+            "zooms": each.zooms,
+            "oldest": _day(each.oldest_s),
+            "newest": _day(each.newest_s),
+            "attribution": each.attribution,
+        }
+        for each in cache_infos(folder)
+    ]
+    if as_json:
+        echo_json(rows)
+        return
+    if not rows:
+        say(f"The tile cache {folder} is empty.")
+        return
+    for row in rows:
+        zooms = f"zoom {row['zooms'][0]} to {row['zooms'][1]}, " if row["zooms"] else ""
+        days = f"{row['oldest']} to {row['newest']}" if row["oldest"] else ""
+        click.secho(row["source"], bold=True, nl=False)
+        click.echo(f"  {row['tiles']} tiles, {row['megabytes']:.1f} MB, {zooms}{days}")
+        click.echo(f"    {row['path']}")
+
+
+@cache.command(
+    epilog="""\b
+Example:
+  geofield cache clear --yes
+"""
+)
+@click.argument("source", required=False)
+@_folder
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@settings_option
+def clear(source: str | None, cache_dir: Path | None, yes: bool, settings_file: str | None) -> None:
+    """Delete the tiles of SOURCE, or of all sources."""
+    from geofield.cli.imagery_tools import cache_dir_of
+    from geofield.errors import ImageryError
+    from geofield.imagery.cache import cache_infos, clear_cache
+    from geofield.settings import load_settings
+
+    folder = cache_dir_of(load_settings(settings_file), cache_dir)
+    names = [each.source for each in cache_infos(folder)]
+    if source is not None and not any(
+        source in (each.source, each.path.stem, each.path.name) for each in cache_infos(folder)
+    ):
+        raise ImageryError(
+            f"The tile cache holds nothing of {source!r}.",
+            hint=f"It holds: {', '.join(names) or 'nothing'}.",
+        )
+    if source is None and names and not yes:
+        click.confirm(
+            f"Delete the tiles of {len(names)} sources in {folder}?", abort=True, err=True
+        )
+    gone = clear_cache(folder, source)
+    say(f"Deleted {len(gone)} file{'s' if len(gone) != 1 else ''} in {folder}.")
+
+
+def _day(seconds: int | None) -> str | None:
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC).date().isoformat()

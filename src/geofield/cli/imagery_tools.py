@@ -1,0 +1,245 @@
+"""What the commands around imagery share: the sources of the settings, keys, the cache folder.
+
+Keys come from the environment (``GEOFIELD_KEY_NAME``) or the settings file; they go from here
+into the requests and nowhere else.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import urllib.request
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from geofield.cli.console import Progress, say
+
+if TYPE_CHECKING:
+    from geofield.imagery import Acquired, FetchOptions, Where
+    from geofield.imagery.sources import Source, SourceEntry
+    from geofield.settings import Settings
+
+
+def default_cache_dir() -> Path:
+    """The user's cache folder, where the operating system wants it."""
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "geofield" / "tiles"
+
+
+def cache_dir_of(settings: Settings, given: Path | None = None) -> Path:
+    """Where tile caches are: as the option, the settings or the system says."""
+    if given is not None:
+        return given
+    return Path(settings.fetch.cache_dir or default_cache_dir()).expanduser()
+
+
+def catalogue_of(settings: Settings) -> dict[str, SourceEntry]:
+    """The sources known by name, with the user's own."""
+    from geofield.imagery.sources import SourceEntry, merged_catalogue
+    from geofield.imagery.terms import Terms
+
+    own = {
+        name: SourceEntry(
+            kind=each.kind,
+            address=each.url,
+            terms=Terms(
+                each.attribution, each.licence, each.may_cache, each.may_derive, each.terms_url
+            ),
+            title="your own",
+            min_zoom=each.min_zoom,
+            max_zoom=each.max_zoom,
+            tile_px=each.tile_px,
+            subdomains=each.subdomains,
+            layer=each.layer,
+            key_parameter=each.key_parameter,
+            needs_key=each.key is not None or bool(each.key_parameter),
+            rate_per_s=each.rate_per_s,
+            date=each.date,
+            headers=tuple((k, v.get_secret_value()) for k, v in each.headers.items()),
+        )
+        for name, each in settings.fetch.sources.items()
+    }
+    return merged_catalogue(own)
+
+
+def keys_of(settings: Settings, names: Mapping[str, SourceEntry]) -> dict[str, str]:
+    """The key of each source that has one; the environment wins."""
+    from geofield.imagery.sources.xyz import key_variable
+
+    keys = {}
+    for name in names:
+        own = settings.fetch.sources.get(name)
+        given = os.environ.get(key_variable(name), "")
+        kept = settings.fetch.keys.get(name) or (own.key if own is not None else None)
+        if not given and kept is not None:
+            given = kept.get_secret_value()
+        if given:
+            keys[name] = given
+    return keys
+
+
+def fetch_options(settings: Settings, cache_dir: Path | None) -> FetchOptions:
+    """How tiles are fetched, from the settings."""
+    from geofield.imagery import FetchOptions
+
+    proxies = urllib.request.getproxies()
+    return FetchOptions(
+        cache_dir=cache_dir,
+        threads=settings.fetch.threads,
+        cache_max_bytes=int(settings.fetch.cache_max_mb * 1e6),
+        cache_max_age_s=settings.fetch.cache_max_days * 86400.0,
+        proxy=proxies.get("https") or proxies.get("http"),
+    )
+
+
+def resolve(
+    what: str,
+    settings: Settings,
+    *,
+    point: tuple[float, float] | None = None,
+    layer: str = "",
+    offline: bool = False,
+    proxy: str | None = None,
+) -> Source:
+    """The source that the user names."""
+    from geofield.imagery.client import Client
+    from geofield.imagery.sources import find_source
+
+    catalogue = catalogue_of(settings)
+    keys = keys_of(settings, catalogue)
+    client = None if offline else Client(secrets=keys.values(), proxy=proxy)
+    try:
+        return find_source(
+            what, catalogue=catalogue, keys=keys, client=client, layer=layer, point=point
+        )
+    finally:
+        if client is not None:
+            client.close()
+
+
+@contextmanager
+def as_picture(
+    what: str,
+    settings: Settings,
+    *,
+    lat: float,
+    lon: float,
+    acknowledged: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[str]:
+    """A path that `read_scene` reads: the user's own picture, or one fetched for the moment."""
+    from geofield.imagery import Where, acquire
+    from geofield.imagery.sources import PictureSource
+
+    if "{" not in what and Path(what).exists() and Path(what).suffix.lower() != ".mbtiles":
+        yield what
+        return
+    options = fetch_options(settings, cache_dir_of(settings))
+    source = resolve(what, settings, point=(lon, lat), proxy=options.proxy)
+    if isinstance(source, PictureSource):
+        yield source.path
+        return
+    size_m = settings.imagery.size_m
+    where = Where(lat=lat, lon=lon, size_m=size_m, size_px=None if size_m else 1024)
+    with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
+        done = acquire(
+            source,
+            where,
+            Path(folder) / "scene.tif",
+            options=replace(options, acknowledged=acknowledged),
+            progress=progress,
+        )
+        yield str(done.path)
+
+
+def describe(done: Acquired) -> None:
+    """A short account of a picture for the person at the terminal."""
+    grid, report = done.grid, done.report
+    from geofield.crs import authority_name
+
+    resolution = grid.ground_resolution_m
+    zoom = "" if done.source.zoom is None else f", zoom {done.source.zoom}"
+    say(
+        f"Picture    {grid.width_px} x {grid.height_px} px, {resolution:.2f} m per pixel"
+        f" ({grid.width_px * resolution:.0f} x {grid.height_px * resolution:.0f} m)"
+        f"{zoom}, {authority_name(grid.crs)}"
+    )
+    if report.wanted:
+        parts = [f"{report.downloaded} fetched"] if report.downloaded else []
+        parts += [f"{report.cached} from the cache"] if report.cached else []
+        say(f"Tiles      {report.wanted}: {', '.join(parts) or 'from the file'}")
+        if report.troubles:
+            met = ", ".join(f"{count} x {what}" for what, count in report.troubles.most_common())
+            say(f"           faults met and survived: {met}")
+        if report.absent:
+            click.secho(
+                f"           {report.absent} could not be had and are no-data in the picture",
+                fg="yellow",
+                err=True,
+            )
+    terms = "; ".join(part for part in (done.source.attribution, done.source.licence) if part)
+    say(f"Source     {done.source.name}" + (f" ({terms})" if terms else ""))
+    if done.source.date:
+        say(f"Date       {done.source.date}")
+    say(f"File       {done.path}")
+
+
+def where_json(done: Acquired) -> dict[str, object]:
+    """A picture's facts for other programs."""
+    grid, report = done.grid, done.report
+    return {
+        "path": str(done.path),
+        "width_px": grid.width_px,
+        "height_px": grid.height_px,
+        "transform": list(grid.transform)[:6],
+        "crs": grid.crs.to_string(),
+        "ground_resolution_m": grid.ground_resolution_m,
+        "corners_lonlat": grid.corners_lonlat(),
+        "source": done.source.name,
+        "zoom": done.source.zoom,
+        "date": done.source.date,
+        "attribution": done.source.attribution,
+        "licence": done.source.licence,
+        "tiles": {
+            "wanted": report.wanted,
+            "downloaded": report.downloaded,
+            "cached": report.cached,
+            "missing": report.missing,
+            "failed": report.failed,
+            "faults_survived": dict(report.troubles),
+        },
+    }
+
+
+def area_of(path: Path) -> Where:
+    """The ground that a vector file covers."""
+    import geopandas as gpd
+    import shapely
+    from pyogrio.errors import DataSourceError
+
+    from geofield.errors import ImageryError
+    from geofield.imagery import Where
+
+    try:
+        table = gpd.read_file(path)
+    except (DataSourceError, OSError) as error:
+        raise ImageryError(
+            f"The area {path} cannot be read: {error}.", hint="Give GeoJSON, GeoPackage or Shape."
+        ) from None
+    if table.crs is None:
+        raise ImageryError(f"The area {path} does not name its coordinate reference system.")
+    shape = shapely.union_all(table.to_crs("EPSG:4326").geometry.to_numpy())
+    if shape.is_empty:
+        raise ImageryError(f"The file {path} holds no area.")
+    return Where(area=shape)

@@ -1,0 +1,725 @@
+"""Every kind of source, each against a real server or real files."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import pickle
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mercantile
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from geofield.errors import ImageryError, NetworkError, PointOutsideError, TermsError
+from geofield.grid import Grid
+from geofield.imagery import FetchOptions, Where, acquire, find_source, open_reader, read_scene
+from geofield.imagery.cache import cache_infos
+from geofield.imagery.client import Client
+from geofield.imagery.sources import BUILTIN, PictureSource
+from geofield.imagery.sources.google import GoogleStaticSource
+from geofield.imagery.sources.registry import kind_of
+from geofield.imagery.sources.xyz import XYZSource, quadkey
+from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import Tile
+
+from .pictures import EAST, NORTH, RESOLUTION, UTM, ground, write
+from .tile_server import Handler, TileServer, encode, serving, tile_pixels
+
+LAT, LON = 35.075373, 33.531142
+FAST = FetchOptions(backoff_s=0.01, timeout_s=2.0, attempts=2)
+WORLD = 20037508.342789244
+
+
+def pattern(grid: Grid) -> np.ndarray:
+    """The servers' picture on any grid: a function of place alone (rows, columns, 3)."""
+    x, y = grid.to_native(
+        np.arange(grid.width_px)[None, :] + 0.5, np.arange(grid.height_px)[:, None] + 0.5
+    )
+    red = np.floor(x / 3.0) % 251
+    green = np.floor(y / 5.0) % 241
+    return np.dstack([red, green, (red + green) % 233]).astype(np.uint8)
+
+
+# -- templates ----------------------------------------------------------------------------------
+
+
+@given(zoom=st.integers(1, 22), data=st.data())
+def test_templates_put_numbers_where_they_belong(zoom: int, data: Any) -> None:
+    column = data.draw(st.integers(0, 2**zoom - 1))
+    row = data.draw(st.integers(0, 2**zoom - 1))
+    tile = Tile(zoom, column, row)
+
+    def url(template: str) -> str:
+        return XYZSource("x", template).request(tile).url
+
+    flipped = 2**zoom - 1 - row
+    assert url("http://h/{z}/{x}/{y}.png") == f"http://h/{zoom}/{column}/{row}.png"
+    assert url("http://h/{z}/{x}/{-y}.png") == f"http://h/{zoom}/{column}/{flipped}.png"
+    key = mercantile.quadkey(column, row, zoom)
+    assert quadkey(tile) == key
+    assert url("http://h/{q}.jpg") == f"http://h/{key}.jpg"
+    assert url("http://{s}.h/{z}/{x}/{y}{r}.png")[7] in "abc"
+    assert url("http://{switch:m, n}.h/{z}/{x}/{y}")[7] in "mn"
+
+
+def test_double_tiles_are_512_px() -> None:
+    assert XYZSource("x", "http://h/{z}/{x}/{y}{r}.png").pyramid.levels[0].tile_px == (512, 512)
+    assert XYZSource("x", "http://h/{z}/{x}/{y}@2x.png").pyramid.levels[0].tile_px == (512, 512)
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        ("https://h/{z}/{x}.png", r"lacks \{y\}"),
+        ("https://h/tiles.png", r"lacks \{x\}, \{y\}, \{z\}"),
+        ("ftp://h/{z}/{x}/{y}", "does not begin with https"),
+        ("https://h/{z}/{x}/{y}/{what}", r"unknown part \{what\}"),
+        ("https://h/{z}/{x}/{y}?key={key}", "needs a key.*GEOFIELD_KEY_MY_MAP"),
+    ],
+)
+def test_bad_templates(template: str, message: str) -> None:
+    with pytest.raises(ImageryError, match=message):
+        XYZSource("my map", template)
+
+
+def test_a_key_written_into_a_template_is_not_repeated_in_messages() -> None:
+    with pytest.raises(ImageryError) as caught:
+        XYZSource("x", "https://h/{z}/{x}.png?token=secret123")
+    assert "secret123" not in str(caught.value)
+
+
+def test_unknown_names_get_the_nearest_one() -> None:
+    with pytest.raises(ImageryError, match="Did you mean 'switzerland'"):
+        find_source("swizerland")
+    with pytest.raises(ImageryError, match="There is no picture"):
+        find_source("folder/none.tif")
+
+
+@pytest.mark.parametrize(
+    ("what", "kind"),
+    [
+        ("https://h/{z}/{x}/{y}.png", "xyz"),
+        ("https://h/ows?service=WMS&layers=a", "wms"),
+        ("https://h/1.0.0/WMTSCapabilities.xml", "wmts"),
+        ("https://h/geoserver/wms", "wms"),
+        ("wmts:https://h/any", "wmts"),
+        ("https://h/ortho.tif", "picture"),
+        ("s3://bucket/ortho.tif", "picture"),
+        ("nothing-here", ""),
+    ],
+)
+def test_kinds(what: str, kind: str) -> None:
+    assert kind_of(what)[0] == kind
+
+
+def test_zoom_and_latitude_beyond_the_source(tmp_path: Path) -> None:
+    source = XYZSource("x", "http://127.0.0.1:9/{z}/{x}/{y}.png", max_zoom=19)
+    with pytest.raises(ImageryError, match=r"no zoom 20.*has 0 to 19"):
+        acquire(source, Where(lat=LAT, lon=LON, zoom=20), tmp_path / "a.tif", options=FAST)
+    with pytest.raises(ImageryError, match=r"Latitude 86.*85\.05"):
+        acquire(source, Where(lat=86, lon=LON, zoom=10), tmp_path / "a.tif", options=FAST)
+
+
+def test_every_built_in_source_has_its_terms() -> None:
+    for name, entry in BUILTIN.items():
+        assert entry.terms.attribution, name
+        assert entry.terms.licence, name
+        assert entry.terms.url.startswith("https://"), name
+        assert entry.address.startswith("https://"), name
+    assert not BUILTIN["google"].terms.may_derive
+    assert not BUILTIN["google"].terms.cacheable
+
+
+# -- terms and keys ------------------------------------------------------------------------------
+
+KEY = "AIza-very/secret+key"
+
+
+def google_server(server: TileServer) -> None:
+    def frame(handler: Handler, query: dict[str, str]) -> None:
+        if query.get("key") != KEY:
+            handler.reply(403, b"bad key " + query.get("key", "").encode(), "text/plain")
+            return
+        lat, lon = (float(part) for part in query["center"].split(","))
+        size = int(query["size"].partition("x")[0])
+        grid = Grid.web_mercator(
+            lat=lat, lon=lon, zoom=int(query["zoom"]), width_px=size, height_px=size
+        )
+        handler.reply(200, encode(pattern(grid)), "image/png")
+
+    server.routes["/staticmap"] = frame
+
+
+def test_google_needs_acknowledgement_and_is_never_cached(tmp_path: Path) -> None:
+    with serving() as server:
+        google_server(server)
+        source = GoogleStaticSource(key=KEY, address=server.address + "/staticmap")
+        options = replace(FAST, cache_dir=tmp_path / "cache")
+        where = Where(lat=LAT, lon=LON, zoom=18)
+        with pytest.raises(TermsError, match="--acknowledge-terms"):
+            acquire(source, where, tmp_path / "a.tif", options=options)
+        assert server.paths == []
+        options = replace(options, acknowledged=True)
+        done = acquire(source, where, tmp_path / "a.tif", options=options)
+        with pytest.raises(ImageryError, match="1 to 640 px"):
+            acquire(source, replace(where, size_px=641), tmp_path / "b.tif", options=options)
+        with pytest.raises(ImageryError, match="needs a cache"):
+            acquire(source, where, tmp_path / "b.tif", options=replace(options, offline=True))
+    assert not (tmp_path / "cache").exists()
+    # The point lies exactly at the centre, to the service's six decimals.
+    assert done.grid == Grid.web_mercator(lat=LAT, lon=LON, zoom=18)
+    scene = read_scene(done.path)
+    assert np.array_equal(scene.rgb, pattern(done.grid))
+    assert scene.source.may_derive is False
+    assert "Google" in scene.source.attribution
+
+
+def _everything_written(folder: Path) -> bytes:
+    parts = []
+    for path in sorted(folder.rglob("*")):
+        parts.append(str(path).encode())
+        if path.is_file():
+            parts.append(path.read_bytes())
+    return b"\n".join(parts)
+
+
+@pytest.mark.parametrize("trouble", ["", "wrong key", "dead", "404", "html"])
+def test_keys_show_nowhere(
+    tmp_path: Path,
+    trouble: str,
+    caplog: pytest.LogCaptureFixture,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    quoted = KEY.replace("/", "%2F").replace("+", "%2B")
+    shown = []
+    with serving() as server:
+
+        def keyed(handler: Handler, query: dict[str, str]) -> None:
+            if trouble == "wrong key":
+                handler.reply(401, f"bad key {query['key']}".encode(), "text/plain")
+            elif trouble == "dead":
+                handler.reset()
+            elif trouble == "404":
+                handler.reply(404, b"", "text/plain")
+            elif trouble == "html":
+                handler.reply(200, f"<html>{query['key']}</html>".encode(), "text/html")
+            else:
+                handler.reply(200, encode(tile_pixels(0, 0, 0)), "image/png")
+
+        server.routes["/keyed"] = keyed
+        source = XYZSource(
+            "paid", server.address + "/keyed/{z}/{x}/{y}?key={key}", Terms(may_cache=True), key=KEY
+        )
+        options = replace(FAST, cache_dir=tmp_path / "cache")
+        try:
+            done = acquire(
+                source, Where(lat=LAT, lon=LON, zoom=18), tmp_path / "a.tif", options=options
+            )
+            shown.append(repr(done))
+        except ImageryError as error:
+            shown.append(str(error))
+            assert trouble
+        assert any(quoted in path for path in server.paths)
+    shown += [repr(source), repr(source.request(Tile(1, 0, 0))), caplog.text, *capfd.readouterr()]
+    everything = "\n".join(shown).encode() + _everything_written(tmp_path)
+    assert KEY.encode() not in everything
+    assert quoted.encode() not in everything
+
+
+@pytest.mark.parametrize(
+    "template",
+    [
+        "https://mt1.google.com/vt/lyrs=s&x={x}&y={y}&z={z}",
+        "https://ecn.t0.tiles.virtualearth.net/tiles/a{q}.jpeg",
+        "https://services.arcgisonline.com/ArcGIS/rest/services/World_Imagery/MapServer/tile/{z}/{y}/{x}",
+    ],
+)
+def test_addresses_of_owners_who_forbid_it_are_known(tmp_path: Path, template: str) -> None:
+    source = find_source(template)
+    assert not isinstance(source, PictureSource)
+    assert not source.terms.cacheable
+    with pytest.raises(TermsError, match="forbid"):
+        acquire(source, Where(lat=LAT, lon=LON, zoom=18), tmp_path / "a.tif", options=FAST)
+
+
+# -- WMS and WMTS ------------------------------------------------------------------------------
+
+WMS = """<?xml version="1.0"?>
+<WMS_Capabilities version="1.3.0" xmlns="http://www.opengis.net/wms"
+  xmlns:xlink="http://www.w3.org/1999/xlink">
+ <Service><Name>WMS</Name><AccessConstraints>CC BY 4.0</AccessConstraints></Service>
+ <Capability>
+  <Request><GetMap><Format>image/jpeg</Format><Format>image/png</Format>
+   <DCPType><HTTP><Get><OnlineResource xlink:href="ADDRESS/wms?map=a"/></Get></HTTP></DCPType>
+  </GetMap></Request>
+  <Layer><Title>All</Title><CRS>EPSG:4326</CRS>
+   <Layer><Name>ortho</Name><CRS>CRSNAME</CRS>
+    <Attribution><Title>Land survey</Title></Attribution></Layer>
+   <Layer><Name>plan</Name></Layer>
+  </Layer>
+ </Capability>
+</WMS_Capabilities>"""
+
+
+def wms_server(server: TileServer, crs_name: str) -> None:
+    def answer(handler: Handler, query: dict[str, str]) -> None:
+        upper = {name.upper(): value for name, value in query.items()}
+        if upper["REQUEST"] == "GetCapabilities":
+            text = WMS.replace("ADDRESS", server.address).replace("CRSNAME", crs_name)
+            handler.reply(200, text.encode(), "text/xml")
+            return
+        assert upper["MAP"] == "a"
+        box = [float(part) for part in upper["BBOX"].split(",")]
+        if crs_name == "EPSG:31468":  # the authority lists northing first
+            box = [box[1], box[0], box[3], box[2]]
+        width, height = int(upper["WIDTH"]), int(upper["HEIGHT"])
+        transform = Affine(
+            (box[2] - box[0]) / width, 0, box[0], 0, (box[1] - box[3]) / height, box[3]
+        )
+        grid = Grid(width, height, transform, upper["CRS"])
+        handler.reply(200, encode(pattern(grid)), "image/png")
+
+    server.routes["/wms"] = answer
+
+
+@pytest.mark.parametrize(
+    ("crs_name", "lat", "lon", "zoom"),
+    [
+        ("EPSG:3857", LAT, LON, 18),
+        ("EPSG:32633", 47.1, 15.4, None),
+        ("EPSG:31468", 48.0, 12.1, None),
+    ],
+)
+def test_wms(tmp_path: Path, crs_name: str, lat: float, lon: float, zoom: int | None) -> None:
+    with serving() as server:
+        wms_server(server, crs_name)
+        client = Client(attempts=2)
+        address = server.address + "/wms?service=WMS"
+        with pytest.raises(ImageryError, match=r"2 layers.*--layer.*ortho, plan"):
+            find_source(address, client=client, point=(lon, lat))
+        with pytest.raises(ImageryError, match="Did you mean 'ortho'"):
+            find_source(address, client=client, layer="orto")
+        source = find_source(address, client=client, layer="ortho", point=(lon, lat))
+        client.close()
+        assert pickle.loads(pickle.dumps(source)) == source
+        assert source.terms.attribution == "Land survey"
+        where = Where(lat=lat, lon=lon, zoom=zoom, resolution_m=0.6, size_px=700)
+        options = replace(FAST, cache_dir=tmp_path / "cache")
+        done = acquire(source, where, tmp_path / "a.tif", options=options)
+        again = acquire(source, where, tmp_path / "b.tif", options=replace(options, offline=True))
+    assert done.grid.crs.to_epsg() == int(crs_name[5:])
+    assert done.grid.ground_resolution_m <= 0.61
+    with rasterio.open(done.path) as file:
+        got = np.moveaxis(file.read(), 0, -1)
+    assert np.array_equal(got, pattern(done.grid))
+    assert again.path.read_bytes() == done.path.read_bytes()
+    if zoom:
+        # MBTiles count zooms as web maps do: GDAL finds the same ground in the cache.
+        info = cache_infos(tmp_path / "cache")[0]
+        assert info.zooms == (17, 17)
+        with rasterio.open(info.path, driver="MBTILES") as file:
+            x, y = done.grid.to_native(0.5, 0.5)
+            row, column = file.index(x, y)
+            assert file.res[0] == pytest.approx(done.grid.transform.a, rel=1e-9)
+            pixel = file.read((1, 2, 3), window=rasterio.windows.Window(column, row, 1, 1))
+        assert np.array_equal(pixel[:, 0, 0], got[0, 0])
+
+
+WMTS = """<?xml version="1.0"?>
+<Capabilities xmlns="http://www.opengis.net/wmts/1.0" xmlns:ows="http://www.opengis.net/ows/1.1"
+  xmlns:xlink="http://www.w3.org/1999/xlink" version="1.0.0">
+ <ows:ServiceIdentification><ows:AccessConstraints>DL-DE-ZERO</ows:AccessConstraints>
+ </ows:ServiceIdentification>
+ <ows:ServiceProvider><ows:ProviderName>Land survey</ows:ProviderName></ows:ServiceProvider>
+ <ows:OperationsMetadata><ows:Operation name="GetTile"><ows:DCP><ows:HTTP>
+  <ows:Get xlink:href="ADDRESS/kvp?"/></ows:HTTP></ows:DCP></ows:Operation>
+ </ows:OperationsMetadata>
+ <Contents><Layer><ows:Identifier>dop</ows:Identifier>
+  <Style isDefault="true"><ows:Identifier>plain</ows:Identifier></Style>
+  <Format>image/png</Format>
+  <TileMatrixSetLink><TileMatrixSet>SET</TileMatrixSet></TileMatrixSetLink>
+  RESOURCE
+ </Layer>
+ <TileMatrixSet><ows:Identifier>SET</ows:Identifier>
+  <ows:SupportedCRS>urn:ogc:def:crs:EPSG::CODE</ows:SupportedCRS>
+  MATRICES
+ </TileMatrixSet></Contents>
+</Capabilities>"""
+MATRIX = (
+    "<TileMatrix><ows:Identifier>{0}</ows:Identifier><ScaleDenominator>{1}</ScaleDenominator>"
+    "<TopLeftCorner>{2}</TopLeftCorner><TileWidth>256</TileWidth><TileHeight>256</TileHeight>"
+    "<MatrixWidth>{3}</MatrixWidth><MatrixHeight>{3}</MatrixHeight></TileMatrix>"
+)
+
+
+def wmts_document(address: str, *, mercator: bool, rest: bool) -> str:
+    if mercator:  # as printed in many documents: too few digits to be exact
+        matrices = "".join(
+            MATRIX.format(
+                f"{z:02d}", f"{559082264.029 / 2**z:.4f}", "-20037508.34 20037508.34", 2**z
+            )
+            for z in range(5, 21)
+        )
+        code = "3857"
+    else:  # northing before easting, as the authority of EPSG:31468 has it
+        matrices = "".join(
+            MATRIX.format(f"L{n}", scale, "6000000 4000000", 10000)
+            for n, scale in enumerate([4000, 2000, 1000])
+        )
+        code = "31468"
+    resource = (
+        f'<ResourceURL format="image/png" resourceType="tile" template="{address}/rest/'
+        '{Style}/{TileMatrixSet}/{TileMatrix}/{TileCol}/{TileRow}.png"/>'
+        if rest
+        else ""
+    )
+    return (
+        WMTS.replace("ADDRESS", address)
+        .replace("MATRICES", matrices)
+        .replace("CODE", code)
+        .replace("RESOURCE", resource)
+    )
+
+
+def wmts_server(server: TileServer, *, mercator: bool, rest: bool) -> None:
+    def capabilities(handler: Handler, query: dict[str, str]) -> None:
+        text = wmts_document(server.address, mercator=mercator, rest=rest)
+        handler.reply(200, text.encode(), "text/xml")
+
+    def draw(handler: Handler, matrix: str, column: int, row: int) -> None:
+        if mercator:
+            handler.reply(200, encode(tile_pixels(int(matrix), column, row)), "image/png")
+            return
+        resolution = [4000, 2000, 1000][int(matrix[1:])] * 0.00028
+        left, top = 4_000_000 + column * 256 * resolution, 6_000_000 - row * 256 * resolution
+        grid = Grid(256, 256, Affine(resolution, 0, left, 0, -resolution, top), "EPSG:31468")
+        handler.reply(200, encode(pattern(grid)), "image/png")
+
+    def by_rest(handler: Handler, query: dict[str, str]) -> None:
+        style, name, matrix, column, last = handler.path.strip("/").split("/")[1:]
+        assert (style, name) == ("plain", "SET")
+        draw(handler, matrix, int(column), int(last.partition(".")[0]))
+
+    def by_query(handler: Handler, query: dict[str, str]) -> None:
+        assert query["LAYER"] == "dop"
+        assert query["STYLE"] == "plain"
+        draw(handler, query["TILEMATRIX"], int(query["TILECOL"]), int(query["TILEROW"]))
+
+    server.routes |= {"/WMTSCapabilities.xml": capabilities, "/rest": by_rest, "/kvp": by_query}
+
+
+@pytest.mark.parametrize("rest", [True, False])
+@pytest.mark.parametrize("mercator", [True, False])
+def test_wmts(tmp_path: Path, mercator: bool, rest: bool) -> None:
+    with serving() as server:
+        wmts_server(server, mercator=mercator, rest=rest)
+        client = Client(attempts=2)
+        source = find_source(server.address + "/WMTSCapabilities.xml", client=client)
+        client.close()
+        assert not isinstance(source, PictureSource)
+        assert source.terms.attribution == "Land survey"
+        if mercator:
+            assert source.pyramid.zooms == (5, 20)
+            where = Where(lat=LAT, lon=LON, zoom=18, size_px=600)
+        else:
+            where = Where(lat=48.0, lon=12.1, zoom="max", size_px=600)
+        done = acquire(source, where, tmp_path / "a.tif", options=FAST)
+    with rasterio.open(done.path) as file:
+        got = file.read()
+    if mercator:
+        from .test_fetch import expected
+
+        assert np.array_equal(got, expected(done.grid, 18))
+        column = (done.grid.transform.c + WORLD) / done.grid.transform.a
+        assert column == pytest.approx(round(column), abs=1e-6)
+    else:
+        assert done.grid.crs.to_epsg() == 31468
+        assert np.array_equal(np.moveaxis(got, 0, -1), pattern(done.grid))
+
+
+def test_capabilities_from_a_file_and_bad_ones(tmp_path: Path) -> None:
+    file = tmp_path / "caps.xml"
+    file.write_text(wmts_document("http://127.0.0.1:9", mercator=True, rest=True))
+    source = find_source(str(file))
+    assert not isinstance(source, PictureSource)
+    assert source.pyramid.zooms == (5, 20)
+    for text, message in [
+        ("<html>wmts<body>", "does not give XML"),
+        ("<ExceptionReport>wmts is down</ExceptionReport>", "answers: wmts is down"),
+        ('<!DOCTYPE a [<!ENTITY b "wmts">]><a>&b;</a>', "entities"),
+    ]:
+        file.write_text(text)
+        with pytest.raises(ImageryError, match=message):
+            find_source(str(file))
+
+
+def test_a_document_that_is_not_there_names_the_host() -> None:
+    with serving() as server, pytest.raises(NetworkError, match=r"127\.0\.0\.1.*status 404"):
+        find_source(server.address + "/a/WMTSCapabilities.xml", client=Client(attempts=1))
+
+
+# -- pictures over HTTP, folders, indexes, STAC -------------------------------------------------
+
+
+def test_a_cog_over_http_is_read_by_ranges(tmp_path: Path) -> None:
+    from geofield.imagery import write_scene
+
+    values = ground(1600, 1600)
+    picture = write(
+        tmp_path / "plain.tif", values, photometric="RGB", tiled=True, compress="deflate"
+    )
+    cog = write_scene(read_scene(picture), tmp_path / "cog.tif")
+    size = cog.stat().st_size
+    sent = []
+
+    with serving() as server:
+
+        def answer(handler: Handler, query: dict[str, str]) -> None:
+            assert query.get("sig") == "hush"
+            asked = handler.headers.get("Range", "")
+            first, _, last = asked.removeprefix("bytes=").partition("-")
+            if handler.command == "GET":
+                sent.append(int(last) - int(first) + 1 if last else size)
+            handler.file(cog)
+
+        server.routes["/cog.tif"] = answer
+        address = f"{server.address}/cog.tif?sig=hush"
+        grid = open_reader(str(cog)).grid
+        lon, lat = grid.to_lonlat(800.5, 800.5)
+        scene = read_scene(address, lat=lat, lon=lon, size_px=301)
+        assert np.array_equal(scene.bands, values[:, 650:951, 650:951])
+        assert scene.source.name == "cog.tif" or "hush" not in scene.source.name
+        assert sum(sent) < size / 2
+        with pytest.raises(ImageryError) as caught:
+            read_scene(f"{server.address}/gone.tif?sig=hush", lat=lat, lon=lon)
+        assert "hush" not in str(caught.value)
+
+
+def sheets(folder: Path) -> np.ndarray:
+    """Four sheets of one picture on one lattice, with a seam through its middle."""
+    values = ground(200, 240)
+    folder.mkdir()
+    for row in (0, 100):
+        for column in (0, 120):
+            place = Affine(
+                RESOLUTION, 0, EAST + column * RESOLUTION, 0, -RESOLUTION, NORTH - row * RESOLUTION
+            )
+            part = values[:, row : row + 100, column : column + 120]
+            write(folder / f"sheet_{row}_{column}.tif", part, transform=place, photometric="RGB")
+    return values
+
+
+def test_a_folder_of_sheets_is_one_picture(tmp_path: Path) -> None:
+    values = sheets(tmp_path / "sheets")
+    (tmp_path / "sheets" / "notes.txt").write_text("not a picture")
+    (tmp_path / "sheets" / "broken.tif").write_text("not a picture")
+    whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    lon, lat = whole.to_lonlat(120.5, 100.5)
+    scene = read_scene(tmp_path / "sheets", lat=lat, lon=lon, size_px=101)
+    assert np.array_equal(scene.bands, values[:, 50:151, 70:171])
+    assert scene.valid.all()
+    assert any("broken.tif was left out" in note for note in scene.notes)
+    assert any("Joined from 4 pictures" in note for note in scene.notes)
+    everything = read_scene(tmp_path / "sheets", lat=lat, lon=lon)
+    assert np.array_equal(everything.bands, values)
+    coarse = read_scene(tmp_path / "sheets", lat=lat, lon=lon, resolution_m=1.0)
+    assert coarse.valid.all()
+    mean = values.reshape(3, 100, 2, 120, 2).mean(axis=(2, 4))
+    assert np.abs(coarse.bands - mean).mean() < 4
+    with pytest.raises(PointOutsideError, match="outside all 4 pictures"):
+        read_scene(tmp_path / "sheets", lat=lat + 1, lon=lon)
+    reader = pickle.loads(pickle.dumps(open_reader(str(tmp_path / "sheets"), lat=lat, lon=lon)))
+    assert np.array_equal(reader.read().bands, values)
+
+
+def test_sheets_of_another_zone_fit_to_a_pixel(tmp_path: Path) -> None:
+    # Two neighbours on either side of 36 E, each in its own zone, showing the same ground.
+    folder = tmp_path / "zones"
+    folder.mkdir()
+    lon0, lat0 = 36.0, 35.0
+    for name, epsg, shift in [("west", 32636, -260), ("east", 32637, -140)]:
+        unit = Grid(1, 1, Affine.identity(), f"EPSG:{epsg}")
+        x, y = unit.from_lonlat(lon0, lat0)
+        place = Affine(0.5, 0, round(x) + 0.5 * shift, 0, -0.5, round(y) + 100)
+        grid = Grid(400, 400, place, f"EPSG:{epsg}")
+        px, py = np.meshgrid(np.arange(400) + 0.5, np.arange(400) + 0.5)
+        lons, lats = grid.to_lonlat(px, py)
+        # A smooth function of the place on earth.
+        wave = np.sin((lons - lon0) * 4e4) + np.cos((lats - lat0) * 3e4)
+        values = np.stack([120 + 55 * wave] * 3).astype(np.uint8)
+        write(folder / f"{name}.tif", values, crs=f"EPSG:{epsg}", transform=place)
+    west = open_reader(str(folder / "west.tif")).grid
+    lon, lat = west.to_lonlat(300, 200)
+    scene = read_scene(folder, lat=lat, lon=lon)
+    assert any("1 of them reprojected" in note for note in scene.notes)
+    assert scene.grid.width_px > 480
+    px, py = np.meshgrid(
+        np.arange(scene.grid.width_px) + 0.5, np.arange(scene.grid.height_px) + 0.5
+    )
+    lons, lats = scene.grid.to_lonlat(px, py)
+    wave = np.sin((lons - lon0) * 4e4) + np.cos((lats - lat0) * 3e4)
+    difference = np.abs(scene.bands[0].astype(float) - (120 + 55 * wave))[scene.valid]
+    assert np.percentile(difference, 99) < 3.0
+
+
+def test_an_index_and_a_vrt(tmp_path: Path) -> None:
+    import fiona
+
+    values = sheets(tmp_path / "sheets")
+    index = tmp_path / "index.gpkg"
+    schema = {"geometry": "Polygon", "properties": {"location": "str"}}
+    ring = [(0, 0), (1, 0), (1, 1), (0, 0)]
+    with fiona.open(index, "w", driver="GPKG", schema=schema, crs="EPSG:4326") as table:
+        for path in sorted((tmp_path / "sheets").glob("*.tif")):
+            table.write(
+                {
+                    "geometry": {"type": "Polygon", "coordinates": [ring]},
+                    "properties": {"location": f"sheets/{path.name}"},
+                }
+            )
+    whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    lon, lat = whole.to_lonlat(120.5, 100.5)
+    assert np.array_equal(read_scene(index, lat=lat, lon=lon).bands, values)
+    vrt = tmp_path / "one.vrt"
+    with rasterio.open(tmp_path / "sheets" / "sheet_0_0.tif") as file:
+        rasterio.shutil.copy(file, str(vrt), driver="VRT")
+    assert np.array_equal(read_scene(vrt).bands, values[:, :100, :120])
+
+
+def test_stac_items(tmp_path: Path) -> None:
+    values = ground(100, 100, 4)
+    write(tmp_path / "data.tif", values, photometric="MINISBLACK")
+    for n, name in enumerate(["red", "green", "blue"]):
+        write(tmp_path / f"{name}.tif", values[n : n + 1])
+    grid = Grid(100, 100, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    corners = grid.corners_lonlat()
+    lon, lat = grid.to_lonlat(50, 50)
+    item = {
+        "type": "Feature",
+        "stac_version": "1.0.0",
+        "id": "survey-7",
+        "geometry": {"type": "Polygon", "coordinates": [[*corners, corners[0]]]},
+        "properties": {
+            "datetime": "2024-05-01T10:00:00Z",
+            "license": "CC-BY-4.0",
+            "providers": [{"name": "Land survey"}],
+        },
+        "links": [],
+        "assets": {
+            "thumbnail": {"href": "t.png", "type": "image/png", "roles": ["thumbnail"]},
+            "image": {
+                "href": "./data.tif",
+                "type": "image/tiff; application=geotiff",
+                "roles": ["data"],
+                "eo:bands": [
+                    {"name": "B1", "common_name": "nir"},
+                    {"name": "B2", "common_name": "red"},
+                    {"name": "B3", "common_name": "green"},
+                    {"name": "B4", "common_name": "blue"},
+                ],
+            },
+        },
+    }
+    file = tmp_path / "item.json"
+    file.write_text(json.dumps(item))
+    scene = read_scene(file, lat=lat, lon=lon)
+    assert scene.roles == ("nir", "red", "green", "blue")
+    assert np.array_equal(scene.bands, values)
+    assert (scene.source.name, scene.source.date) == ("survey-7", "2024-05-01T10:00:00Z")
+    assert (scene.source.licence, scene.source.attribution) == ("CC-BY-4.0", "Land survey")
+    with pytest.raises(PointOutsideError, match="No item"):
+        read_scene(file, lat=lat + 1, lon=lon)
+    # One picture per colour, in a collection with a newer item elsewhere.
+    single = {
+        name: {"href": f"{name}.tif", "type": "image/tiff", "bands": [{"eo:common_name": name}]}
+        for name in ("blue", "green", "red")
+    }
+    far = {**item, "id": "far", "geometry": {"type": "Point", "coordinates": [0, 0]}}
+    several = {"type": "FeatureCollection", "features": [far, {**item, "assets": single}]}
+    file.write_text(json.dumps(several))
+    scene = read_scene(file, lat=lat, lon=lon)
+    assert scene.roles == ("red", "green", "blue")
+    assert np.array_equal(scene.bands, values[:3])
+
+
+def test_own_pictures_are_cut_as_they_are(tmp_path: Path) -> None:
+    path = write(tmp_path / "own.tif", ground(), photometric="RGB")
+    source = find_source(path)
+    grid = open_reader(path).grid
+    lon, lat = grid.to_lonlat(60.5, 40.5)
+    done = acquire(source, Where(lat=lat, lon=lon, size_px=21), tmp_path / "cut.tif")
+    with rasterio.open(done.path) as file:
+        assert np.array_equal(file.read(), ground()[:, 30:51, 50:71])
+    with pytest.raises(ImageryError, match="is the picture itself"):
+        acquire(source, Where(lat=lat, lon=lon), path, overwrite=True)
+
+
+def test_mbtiles_of_others(tmp_path: Path) -> None:
+    import sqlite3
+
+    file = tmp_path / "other.mbtiles"
+    with sqlite3.connect(file) as db:
+        db.execute("CREATE TABLE metadata (name TEXT, value TEXT)")
+        db.execute(
+            "CREATE TABLE tiles (zoom_level INT, tile_column INT, tile_row INT, tile_data BLOB)"
+        )
+        tile = mercantile.tile(LON, LAT, 16)
+        for dx in (-1, 0, 1):
+            for dy in (-1, 0, 1):
+                x, y = tile.x + dx, tile.y + dy
+                body = encode(tile_pixels(16, x, y))
+                db.execute("INSERT INTO tiles VALUES (16, ?, ?, ?)", (x, 2**16 - 1 - y, body))
+    db.close()
+    source = find_source(str(file))
+    where = Where(lat=LAT, lon=LON, zoom="max", size_px=256)
+    done = acquire(source, where, tmp_path / "a.tif")
+    from .test_fetch import expected
+
+    with rasterio.open(done.path) as opened:
+        assert np.array_equal(opened.read(), expected(done.grid, 16))
+    with pytest.raises(ImageryError, match="not in the file"):
+        acquire(source, replace(where, size_px=1500), tmp_path / "b.tif")
+    (tmp_path / "bad.mbtiles").write_text("nothing")
+    with pytest.raises(ImageryError, match="not an MBTiles file"):
+        find_source(str(tmp_path / "bad.mbtiles"))
+
+
+def test_jpeg_and_webp_tiles(tmp_path: Path) -> None:
+    for form in ("JPEG", "WEBP"):
+
+        class Other(TileServer):
+            def body(self, tile: tuple[int, int, int], form: str = form) -> bytes:
+                buffer = io.BytesIO()
+                Image.fromarray(np.full((256, 256, 3), 99, np.uint8)).save(buffer, form)
+                return buffer.getvalue()
+
+        with serving() as server:
+            server.__class__ = Other
+            source = XYZSource("x", server.template)
+            done = acquire(
+                source, Where(lat=LAT, lon=LON, zoom=18), tmp_path / f"{form}.tif", options=FAST
+            )
+        assert np.abs(read_scene(done.path).bands.astype(int) - 99).max() <= 2
+
+
+def test_real_chips_as_a_folder(shared: Path, tmp_path: Path) -> None:
+    # Different UTM zones and years in one folder: the chip that holds the point is shown.
+    for name in ("riverside_2018_89", "chico_2018_77", "claremont_2020_75"):
+        shutil.copy(shared / "data" / "trees" / f"{name}.tif", tmp_path)
+    for name in ("chico_2018_77", "riverside_2018_89"):
+        with rasterio.open(tmp_path / f"{name}.tif") as file:
+            values = file.read()
+        lon, lat = open_reader(str(tmp_path / f"{name}.tif")).grid.centre_lonlat
+        scene = read_scene(tmp_path, lat=lat, lon=lon, size_px=128)
+        assert np.array_equal(scene.bands, values[:, 64:192, 64:192])
