@@ -62,6 +62,7 @@ def test_what_may_hold_keys_is_not_recorded() -> None:
         '[fetch.sources.mine.headers]\nAuthorization = "s3cret"\n'
     )
     settings = load_settings()
-    assert settings.fetch.sources["mine"].headers == {"Authorization": "s3cret"}
+    assert settings.fetch.sources["mine"].headers["Authorization"].get_secret_value() == "s3cret"
+    assert "s3cret" not in repr(settings.fetch)
     assert "s3cret" not in settings.model_dump_json()
     assert "s3cret" not in repr(settings.model_dump())
