@@ -71,18 +71,20 @@ def _boundary(dataset: Dataset, polygon: Any, plane: LocalPlane) -> list[str]:
     step = next(step for limit, step in _STEPS if area_ha < limit)
     obstacles = dataset.table(schema.OBSTACLES.name)
     obstacles = obstacles[obstacles["status"] != "rejected"]
-    inner = [*polygon.interiors]
-    inner += [shape.exterior for shape in exact_geometry(schema.OBSTACLES, obstacles)]
+    rings = [polygon.exterior, *polygon.interiors]
+    rings += [shape.exterior for shape in exact_geometry(schema.OBSTACLES, obstacles)]
+    outer, *inner = to_lonlat(np.array(rings, dtype=object), dataset.crs)
     lines = ["$Boundary"]
     # The outer ring runs clockwise, inner rings the other way, as the program itself has them.
-    lines += _ring(_plane_ring(dataset, polygon.exterior, plane, clockwise=True), step)
+    lines += _ring(_plane_ring(outer, plane, clockwise=True), step)
     for ring in inner:
-        lines += _ring(_plane_ring(dataset, ring, plane, clockwise=False), step / 2)
+        lines += _ring(_plane_ring(ring, plane, clockwise=False), step / 2)
     return lines
 
 
-def _plane_ring(dataset: Dataset, ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
-    lonlat = shapely.get_coordinates(to_lonlat(np.array([ring], dtype=object), dataset.crs))[:-1]
+def _plane_ring(ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
+    """An open ring (n, 2) in the plane, from one in longitude and latitude."""
+    lonlat = shapely.get_coordinates(ring)[:-1]
     placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
     is_ccw = shapely.is_ccw(shapely.LinearRing(placed))
     return placed[::-1] if is_ccw == clockwise else placed
@@ -101,10 +103,11 @@ def _ring(ring: FloatArray, step: float) -> list[str]:
 def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
     lines = ["$TrackLines"]
     tracks = dataset.table(schema.TRACKS.name)
-    for number, shape in zip(tracks["track_no"], tracks.geometry, strict=True):
-        coordinates = shapely.get_coordinates(shape)[[0, -1]]
-        ends = to_lonlat(np.array([shapely.LineString(coordinates)], dtype=object), dataset.crs)
-        lonlat = shapely.get_coordinates(ends)
+    if not len(tracks):
+        return lines
+    placed = to_lonlat(exact_geometry(schema.TRACKS, tracks), dataset.crs)
+    for number, shape in zip(tracks["track_no"], placed, strict=True):
+        lonlat = shapely.get_coordinates(shape)[[0, -1]]
         a, b = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
         heading = np.arctan2(b[0] - a[0], b[1] - a[1]) % (2 * np.pi)
         lines += [

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import shapely
+from pyproj import Geod
 
 from geofield import schema
 from geofield.errors import FormatError
@@ -35,6 +36,8 @@ from geofield.model import Dataset
 
 if TYPE_CHECKING:
     import geopandas as gpd
+
+_GEOD = Geod(ellps="WGS84")
 
 
 def write_v4(
@@ -141,33 +144,33 @@ def _add_guidance_groups(part: ET.Element, dataset: Dataset) -> None:
     if reference is not None:
         number += 1
         line, left, right = reference
+        lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
         _add_group(
             part,
             number,
             "Reference AB",
-            dataset,
-            line,
+            lonlat,
             width_mm,
             # The terminal may lay the same pattern itself from this one line.
             {"E": REPEAT_BOTH, "N": str(left), "O": str(right)},
         )
-    for name, line in zip(segment_names(segments), segments.geometry, strict=True):
+    if not len(segments):
+        return
+    placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
+    explicit = {"E": REPEAT_NONE, "F": EXTEND_NONE}
+    for name, lonlat in zip(segment_names(segments), placed, strict=True):
         number += 1
-        _add_group(
-            part, number, name, dataset, line, width_mm, {"E": REPEAT_NONE, "F": EXTEND_NONE}
-        )
+        _add_group(part, number, name, lonlat, width_mm, explicit)
 
 
 def _add_group(
     part: ET.Element,
     number: int,
     name: str,
-    dataset: Dataset,
-    line: Any,
+    lonlat: Any,
     width_mm: int | None,
     how: Mapping[str, str],
 ) -> None:
-    lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
     straight = len(lonlat.coords) == 2
     group = ET.SubElement(part, "GGP", A=f"GGP{number}", B=cut_name(name, DESIGNATOR))
     attributes = {
@@ -231,10 +234,8 @@ def _add_point(
 
 def _heading_deg(line: Any) -> float:
     """True heading from A to B, degrees clockwise from north, 0 to 360."""
-    from pyproj import Geod
-
     (lon0, lat0), (lon1, lat1) = line.coords
-    azimuth, _, _ = Geod(ellps="WGS84").inv(lon0, lat0, lon1, lat1)
+    azimuth, _, _ = _GEOD.inv(lon0, lat0, lon1, lat1)
     return round(float(azimuth) % 360.0, 4) % 360.0
 
 

@@ -1,0 +1,125 @@
+"""A person edits the plan in QGIS; planning again keeps every word of theirs."""
+
+from __future__ import annotations
+
+import pytest
+import shapely
+from formats_plan import ORIGIN, make_dataset
+
+from geofield.cli.plan_files import save_plan
+from geofield.formats import read_dataset, write_dataset
+from geofield.model import Field, Provenance
+from geofield.pipeline import run_tracks
+from geofield.plan import outline_digest, read_plan
+from geofield.settings import Settings
+
+SETTINGS = Settings.model_validate({"tracks": {"spacing_m": 5.0}})
+
+
+def placed(*xy):
+    """WKT of a polygon in metres from the field's corner."""
+    return shapely.to_wkt(shapely.Polygon([(x + ORIGIN[0], y + ORIGIN[1]) for x, y in xy]))
+
+
+def plan_again(path):
+    plan = run_tracks(read_plan(path), settings=SETTINGS)
+    save_plan(plan, path, read_from=path)
+    return read_dataset(path)
+
+
+@pytest.fixture
+def plan_file(tmp_path):
+    dataset = make_dataset(points=False)
+    # A real plan: with what stage 2 records of an outline, not the test data's own evidence.
+    outline = Field(dataset.table("field").geometry.iloc[0], dataset.crs)
+    write_dataset(
+        type(dataset)(
+            {name: dataset.tables[name] for name in ("field", "obstacles")},
+            dataset.crs,
+            dataset.name,
+            Provenance(evidence={"field": {"outline_sha256": outline_digest(outline)}}),
+            dataset.grid,
+        ),
+        tmp_path,
+        ["gpkg"],
+    )
+    path = tmp_path / "field.gpkg"
+    plan_again(path)
+    return path
+
+
+def crossing(dataset, shape):
+    return int(shapely.intersects(dataset.table("segments").geometry.to_numpy(), shape).sum())
+
+
+def test_status_from_the_list(plan_file, qgis):
+    before = read_dataset(plan_file).table("obstacles")
+    first = before.geometry.iloc[0].buffer(-0.1)
+    assert crossing(read_dataset(plan_file), first) == 0
+    done = qgis(
+        "edit",
+        path=str(plan_file),
+        changes=[
+            {"layer": "obstacles", "where": "obstacle_no = 1", "values": {"status": "rejected"}},
+            {"layer": "obstacles", "where": "obstacle_no = 3", "values": {"status": "confirmed"}},
+        ],
+    )
+    assert done == {"done": 2}
+    after = plan_again(plan_file)
+    table = after.table("obstacles").set_index("obstacle_no")
+    assert table.loc[1, "status"] == "rejected"
+    assert table.loc[3, "status"] == "confirmed"
+    assert crossing(after, first) > 0  # tracks run where the rejected tree was
+    assert crossing(after, table.geometry.loc[3].buffer(-0.1)) == 0
+
+
+def test_a_drawn_obstacle_is_avoided_and_numbered(plan_file, qgis):
+    drawn = placed((20, 28), (26, 28), (26, 33), (20, 33))
+    done = qgis("edit", path=str(plan_file), changes=[{"layer": "obstacles", "wkt": drawn}])
+    assert done == {"done": 1}
+    after = plan_again(plan_file)
+    table = after.table("obstacles")
+    (new,) = table[~table["obstacle_no"].isin([1, 2, 3, 4])].to_dict("records")
+    assert new["status"] == "added"
+    assert new["obstacle_no"] == 5
+    assert crossing(after, shapely.from_wkt(drawn).buffer(-0.1)) == 0
+    # And a second round changes nothing.
+    again = plan_again(plan_file)
+    assert list(again.table("obstacles")["status"]) == list(table["status"])
+    assert again.table("segments").equals(after.table("segments"))
+
+
+def test_a_moved_outline_is_kept(plan_file, qgis):
+    moved = placed((0, 0), (60, 0), (60, 38), (0, 38))
+    done = qgis(
+        "edit", path=str(plan_file), changes=[{"layer": "field", "where": "TRUE", "wkt": moved}]
+    )
+    assert done == {"done": 1}
+    after = plan_again(plan_file)
+    outline = after.table("field").geometry.iloc[0]
+    assert outline.equals(shapely.from_wkt(moved))
+    assert after.table("field")["method"].iloc[0] == "drawn"
+    assert shapely.covered_by(
+        after.table("segments").geometry.to_numpy(), outline.buffer(0.01)
+    ).all()
+
+
+def test_a_column_that_a_person_added_survives(plan_file, qgis):
+    import pyogrio
+
+    frame = pyogrio.read_dataframe(plan_file, layer="obstacles")
+    frame["note"] = ["ask Anna", None, None, "old shed"]
+    pyogrio.write_dataframe(
+        frame, plan_file, layer="obstacles", driver="GPKG", append=False, geometry_type="Polygon"
+    )
+    assert read_dataset(plan_file).table("obstacles")["note"].iloc[0] == "ask Anna"
+    after = plan_again(plan_file)
+    assert "note" in after.table("obstacles").columns
+    assert after.table("obstacles")["note"].iloc[3] == "old shed"
+
+
+def test_the_styles_are_still_there_after_planning_again(plan_file, qgis):
+    plan_again(plan_file)
+    opened = qgis("project", uri=str(plan_file.with_suffix(".qgz")))
+    assert opened["bad"] == []
+    assert opened["layers"]["geofield_tracks"]["renderer"] == "RuleRenderer"
