@@ -268,6 +268,7 @@ TURNS = Layer(
         Column("radius_m", "float", "Turning radius", "radius_m", "m"),
         _LENGTH,
         Column("reverse_m", "float", "Driven backwards", "reverse_m", "m"),
+        Column("skipped_m", "float", "Track left out", "skipped_m", "m"),
         Column("outside_m", "float", "Outside the allowed area", "outside_m", "m"),
         Column("fits", "str", "Fits", "fits", values=("yes", "no")),
     ),

@@ -3,5 +3,6 @@
 from geofield.tracks.direction import find_baseline
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 from geofield.tracks.planner import plan_tracks
+from geofield.tracks.route import plan_route
 
-__all__ = ["StraightRun", "find_baseline", "longest_edge", "plan_tracks"]
+__all__ = ["StraightRun", "find_baseline", "longest_edge", "plan_route", "plan_tracks"]

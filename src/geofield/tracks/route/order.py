@@ -1,0 +1,94 @@
+"""In which order and direction the segments are driven."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import TrackError
+from geofield.tracks.frame import FloatArray
+
+Pattern = Literal["boustrophedon", "skip", "shortest"]
+PATTERNS: tuple[str, ...] = get_args(Pattern)
+
+IntArray = NDArray[np.int64]
+
+
+def track_order(tracks: IntArray, skip: int) -> list[int]:
+    """Order of the tracks: every (skip + 1)-th, then those between on the way back, and so on.
+
+    With ``skip=1`` from track 1 to 3, as in the study, because a turn to the next track would
+    need a smaller radius; with ``skip=0`` one after the other.
+
+    Parameters
+    ----------
+    tracks : int array
+        Track numbers, increasing.
+    skip : int
+        Tracks left out at each turn.
+    """
+    if skip < 0:
+        raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
+    order: list[int] = []
+    for begin in range(skip + 1):
+        chosen = tracks[begin :: skip + 1].tolist()
+        order.extend(chosen if begin % 2 == 0 else chosen[::-1])
+    return order
+
+
+def field_order(
+    track_no: IntArray, order: list[int], *, backward_first: bool = False
+) -> tuple[IntArray, NDArray[np.bool_]]:
+    """Segments of the tracks in order, up one track and down the next.
+
+    Parameters
+    ----------
+    track_no : int array, shape (segments,)
+        Track of each segment; segments of a track follow one another along it.
+    order : list of int
+        Track numbers.
+    backward_first : bool
+        Start against the segments' direction.
+
+    Returns
+    -------
+    segment : int array
+        Row of each segment, in the order of driving.
+    backward : bool array
+        Whether it is driven against its direction.
+    """
+    rows: list[IntArray] = []
+    flags: list[NDArray[np.bool_]] = []
+    first = np.searchsorted(track_no, order, side="left")
+    last = np.searchsorted(track_no, order, side="right")
+    backward = backward_first
+    for begin, end in zip(first.tolist(), last.tolist(), strict=True):
+        mine = np.arange(begin, end)
+        rows.append(mine[::-1] if backward else mine)
+        flags.append(np.full(len(mine), backward))
+        backward = not backward
+    if not rows:
+        return np.empty(0, np.int64), np.empty(0, bool)
+    return np.concatenate(rows), np.concatenate(flags)
+
+
+def nearest_start(
+    ends: FloatArray, track_no: IntArray, skip: int, start: FloatArray | None
+) -> tuple[IntArray, NDArray[np.bool_]]:
+    """Of the four ways to begin (first or last track, either direction) the one near a place."""
+    numbers = np.unique(track_no)
+    best: tuple[float, IntArray, NDArray[np.bool_]] | None = None
+    for reverse in (False, True):
+        order = track_order(numbers[::-1] if reverse else numbers, skip)
+        for backward in (False, True):
+            rows, flags = field_order(track_no, order, backward_first=backward)
+            if start is None or not len(rows):
+                return rows, flags
+            away = float(np.hypot(*(ends[rows[0], int(flags[0])] - start)))
+            if best is None or away < best[0]:
+                best = (away, rows, flags)
+    if best is None:
+        return np.empty(0, np.int64), np.empty(0, bool)
+    return best[1], best[2]

@@ -1,0 +1,237 @@
+"""A route through all segments, with the turns between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import geopandas as gpd
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from geofield import schema
+from geofield.errors import TrackError
+from geofield.model.tracks import Tracks
+from geofield.tracks.frame import FloatArray
+from geofield.tracks.route.order import PATTERNS, IntArray, Pattern, nearest_start
+from geofield.tracks.route.passage import Passage
+from geofield.tracks.route.shortest import shortest_order
+from geofield.tracks.route.turns import Curve, Turn, plan_turns, straight_ways
+
+_SPARE_SHARE = 0.45
+"""Of a segment, at most this much may be left out at either end to pass an obstacle."""
+
+
+def plan_route(
+    tracks: Tracks,
+    *,
+    pattern: Pattern = "boustrophedon",
+    skip: int = 1,
+    turning_radius_m: float | None = None,
+    curve: Curve = "dubins",
+    margin_m: float = 0.0,
+    start: Any = None,
+) -> Tracks:
+    """Put the segments of planned tracks into an order, and find the ways between them.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        From `plan_tracks`.
+    pattern : {"boustrophedon", "skip", "shortest"}
+        Up one track and down the next; the same leaving out `skip` tracks at every turn; or the
+        order with the shortest drive between segments.
+    skip : int
+        For ``skip``: tracks left out at a turn (1: from track 1 to 3).
+    turning_radius_m : float, optional
+        Of the machine. Without it the ways are the shortest ones, with sharp corners.
+    curve : {"dubins", "reeds_shepp"}
+        Turns forwards only, or with reversing.
+    margin_m : float
+        How far beyond the outer border a turn may reach.
+    start : (x, y) or shapely.Point, optional
+        A place in the CRS to begin near.
+
+    Returns
+    -------
+    Tracks
+        The same tracks with the tables `route` and `turns`. A turn that cannot be driven within the
+        allowed area is there all the same, with ``fits`` = ``no``; no way runs through an obstacle.
+
+    Raises
+    ------
+    TrackError
+        When a setting is unfit, or the tracks do not know their field.
+    """
+    outline, shapes = tracks.outline, tracks.shapes
+    if outline is None or shapes is None:
+        raise TrackError(
+            "These tracks do not know their field and obstacles.", hint="Plan them anew first."
+        )
+    _check(pattern, curve, skip, margin_m)
+    if turning_radius_m is not None:
+        _check_radius(turning_radius_m, outline.bounds, margin_m)
+    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)
+    track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
+    place = None if start is None else _place(start)
+    passage = Passage(outline, shapes, margin_m=margin_m)
+    rows, backward = nearest_start(ends, track_no, skip if pattern == "skip" else 0, place)
+    if pattern == "shortest":
+        rows, backward = shortest_order(
+            ends, rows, backward, passage, radius_m=turning_radius_m, start=place
+        )
+    exits, entries = _poses(ends[rows], backward)
+    if turning_radius_m is None:
+        turns = straight_ways(exits, entries, passage)
+    else:
+        turns = plan_turns(
+            exits,
+            entries,
+            passage,
+            radius_m=turning_radius_m,
+            curve=curve,
+            spare_m=_spare(ends[rows], track_no[rows], backward),
+        )
+    route, table = _tables(tracks, rows, backward, turns, exits, entries, turning_radius_m)
+    return replace(tracks, route=route, turns=table)
+
+
+def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
+    if pattern not in PATTERNS:
+        raise TrackError(
+            f"Unknown pattern {pattern!r}.", hint=f"Choose one of {', '.join(PATTERNS)}."
+        )
+    if curve not in ("dubins", "reeds_shepp"):
+        raise TrackError(f"Unknown curve {curve!r}.", hint="Choose dubins or reeds_shepp.")
+    if skip < 0:
+        raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
+    if not np.isfinite(margin_m) or margin_m < 0.0:
+        raise TrackError(f"margin_m is {margin_m}; it must be 0 or more metres.")
+
+
+def _check_radius(radius_m: float, bounds: tuple[float, ...], margin_m: float) -> None:
+    if not np.isfinite(radius_m) or radius_m <= 0.0:
+        raise TrackError(f"turning_radius_m is {radius_m}; it must be more than 0 metres.")
+    size = float(np.hypot(bounds[2] - bounds[0], bounds[3] - bounds[1])) + 2.0 * margin_m
+    if 2.0 * radius_m > size:
+        raise TrackError(
+            f"A turning radius of {radius_m:g} m is larger than the field ({size:.0f} m across): "
+            "no turn fits.",
+            hint="Give the radius in metres, or leave it out for a route without curves.",
+        )
+
+
+def _place(start: Any) -> FloatArray:
+    place = np.array((start.x, start.y) if hasattr(start, "x") else tuple(start), dtype=np.float64)
+    if place.shape != (2,) or not np.isfinite(place).all():
+        raise TrackError("The start must be two finite coordinates in the field's CRS.")
+    return place
+
+
+def _poses(ends: FloatArray, backward: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+    """Poses at which one segment is left and the next is entered."""
+    first = np.where(backward[:, None], ends[:, 1], ends[:, 0])
+    last = np.where(backward[:, None], ends[:, 0], ends[:, 1])
+    angle = np.arctan2(*(last - first).T[::-1])
+    exits = np.column_stack((last, angle))[:-1]
+    entries = np.column_stack((first, angle))[1:]
+    return exits, entries
+
+
+def _spare(ends: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]) -> FloatArray:
+    """What may be left out of the segments before and after each turn along one track."""
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T) * _SPARE_SHARE
+    same = (track_no[1:] == track_no[:-1]) & (backward[1:] == backward[:-1])
+    return np.column_stack((length[:-1], length[1:])) * same[:, None]
+
+
+def _tables(
+    tracks: Tracks,
+    rows: IntArray,
+    backward: NDArray[np.bool_],
+    turns: list[Turn],
+    exits: FloatArray,
+    entries: FloatArray,
+    radius_m: float | None,
+) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+    """Layers `route` and `turns`; work gets the odd sequence numbers, ways the even ones."""
+    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)[rows]
+    ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
+    early = np.array([turn.early_m for turn in turns] + [0.0] * (len(rows) > len(turns)))
+    late = np.array([0.0] * (len(rows) > len(turns)) + [turn.late_m for turn in turns])
+    whole = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    along = (ends[:, 1] - ends[:, 0]) / whole[:, None]
+    ends = ends + np.stack((along * late[:, None], -along * early[:, None]), axis=1)
+    work_m = whole - early - late
+    count = len(rows) + len(turns)
+    geometry = np.empty(count, dtype=object)
+    geometry[0::2] = shapely.linestrings(ends) if len(ends) else []
+    lines = [shapely.LineString(_two(turn.places)) for turn in turns]
+    geometry[1::2] = lines
+    length = np.empty(count)
+    length[0::2] = work_m
+    length[1::2] = [turn.length_m for turn in turns]
+    kind = np.empty(count, dtype=object)
+    kind[0::2] = "work"
+    kind[1::2] = ["drive" if turn.kind == "drive" else "turn" for turn in turns]
+    direction = np.full(count, "forward", dtype=object)
+    direction[0::2] = np.where(backward, "backward", "forward")
+    track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)[rows]
+    segment_no = tracks.segments["segment_no"].to_numpy(dtype=np.int64)[rows]
+    crs = CRS(tracks.segments.crs)
+    route = schema.table(
+        schema.ROUTE,
+        {
+            "sequence": np.arange(1, count + 1),
+            "kind": kind,
+            "direction": direction,
+            "track_no": _between(track_no, count),
+            "segment_no": _between(segment_no, count),
+            "length_m": length,
+            "start_m": np.cumsum(length) - length,
+        },
+        geometry,
+        crs,
+    )
+    table = schema.table(
+        schema.TURNS,
+        {
+            "turn_no": np.arange(1, len(turns) + 1),
+            "sequence": np.arange(2, count + 1, 2),
+            "from_track": track_no[:-1],
+            "to_track": track_no[1:],
+            "kind": [turn.kind for turn in turns],
+            "direction": _sides(exits, entries),
+            "radius_m": [
+                np.nan if radius_m is None or turn.kind == "drive" else radius_m for turn in turns
+            ],
+            "length_m": [turn.length_m for turn in turns],
+            "reverse_m": [turn.reverse_m for turn in turns],
+            "outside_m": [turn.outside_m for turn in turns],
+            "skipped_m": [turn.early_m + turn.late_m for turn in turns],
+            "fits": ["yes" if turn.fits else "no" for turn in turns],
+        },
+        lines,
+        crs,
+    )
+    return route, table
+
+
+def _between(values: IntArray, count: int) -> list[int | None]:
+    """Numbers of the work, with nothing for the ways between."""
+    out: list[int | None] = [None] * count
+    out[0::2] = values.tolist()
+    return out
+
+
+def _sides(exits: FloatArray, entries: FloatArray) -> list[str]:
+    """To which side of the way out the next segment begins."""
+    offset = entries[:, :2] - exits[:, :2]
+    across = np.cos(exits[:, 2]) * offset[:, 1] - np.sin(exits[:, 2]) * offset[:, 0]
+    return np.select([across > 1e-6, across < -1e-6], ["left", "right"], "straight").tolist()
+
+
+def _two(places: FloatArray) -> FloatArray:
+    return places if len(places) > 1 else np.repeat(places, 2, axis=0)

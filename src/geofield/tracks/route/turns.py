@@ -1,0 +1,310 @@
+"""From the end of one segment to the start of the next: curves where the machine can drive them.
+
+Tried in this order, and the first that stays in the allowed area is taken: one curve of the turning
+radius; a chain of curves along the shortest way around what is between; around an obstacle on the
+same track, a chain that leaves the track early and joins it late. Where none fits, the turn says so:
+a curve that leaves the field by up to three radii, else the shortest way itself with its
+sharp corners. No way ever runs through an obstacle or a hole.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from geofield.tracks.frame import FloatArray
+from geofield.tracks.route.curves import Words, dubins_words, trace
+from geofield.tracks.route.passage import Passage
+from geofield.tracks.route.reeds_shepp import reeds_shepp_words
+
+Curve = Literal["dubins", "reeds_shepp"]
+
+_TRIED_WORDS = 12
+_CUSP_RADII = 2.0
+"""Changing between forwards and backwards costs as much as driving this many radii."""
+_NEAR_RADII = 3.0
+_STEP_RADII = 0.05
+_OPEN = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One way between segments.
+
+    Attributes
+    ----------
+    places : array, shape (n, 2)
+        The way, in the CRS.
+    kind : str
+        ``dubins``, ``reeds_shepp`` or ``drive``.
+    length_m, reverse_m, outside_m : float
+        All of it, backwards, beyond the border and its margin.
+    fits : bool
+        Whether the machine can drive it within the allowed area.
+    early_m, late_m : float
+        How much of the segment before and of the one after it leaves out.
+    """
+
+    places: FloatArray
+    kind: str
+    length_m: float
+    reverse_m: float = 0.0
+    outside_m: float = 0.0
+    fits: bool = True
+    early_m: float = 0.0
+    late_m: float = 0.0
+
+
+def straight_ways(exits: FloatArray, entries: FloatArray, passage: Passage) -> list[Turn]:
+    """Shortest ways without regard to a turning radius.
+
+    Parameters
+    ----------
+    exits, entries : array, shape (n, 3)
+        Poses.
+    passage : Passage
+    """
+    ends = np.stack((exits[:, :2], entries[:, :2]), axis=1)
+    fits = passage.fits(shapely.linestrings(ends)) if len(ends) else []
+    return [
+        _drive(ends[row], passage) if not free else _polyline(ends[row], fits=True)
+        for row, free in enumerate(fits)
+    ]
+
+
+def plan_turns(
+    exits: FloatArray,
+    entries: FloatArray,
+    passage: Passage,
+    *,
+    radius_m: float,
+    curve: Curve = "dubins",
+    spare_m: FloatArray | None = None,
+) -> list[Turn]:
+    """Turns of a turning radius.
+
+    Parameters
+    ----------
+    exits, entries : array, shape (n, 3)
+        Poses: where each way begins and ends, metres and radians.
+    passage : Passage
+    radius_m : float
+    curve : {"dubins", "reeds_shepp"}
+        Forwards only, or with reversing.
+    spare_m : array, shape (n, 2), optional
+        Length of the segments before and after that a way around an obstacle on their track may
+        leave out; 0 where the segments are on different tracks.
+    """
+    count = len(exits)
+    found: list[Turn | None] = [None] * count
+    loose: list[Turn | None] = [None] * count
+    if not count:
+        return []
+    spare = np.zeros((count, 2)) if spare_m is None else spare_m
+    _single_curves(exits, entries, passage, radius_m, curve, found, loose, spare)
+    for row in range(count):
+        if found[row] is not None:
+            continue
+        ends = np.stack((exits[row, :2], entries[row, :2]))
+        way = passage.shortest(ends[0], ends[1])
+        if way is not None and len(way) > 2:
+            found[row] = _chain(exits[row], entries[row], way, passage, radius_m, curve)
+            if found[row] is None and spare[row].min() > 0.0:
+                found[row] = _lane_change(
+                    exits[row], entries[row], way, passage, radius_m, spare[row]
+                )
+        if found[row] is None:
+            found[row] = loose[row] or _drive(ends, passage, way)
+    return [turn for turn in found if turn is not None]
+
+
+def _single_curves(
+    exits: FloatArray,
+    entries: FloatArray,
+    passage: Passage,
+    radius_m: float,
+    curve: Curve,
+    found: list[Turn | None],
+    loose: list[Turn | None],
+    spare: FloatArray,
+) -> None:
+    """Try one curve for every pair, from the shortest word upwards, all pairs at a time."""
+    words = _words(exits, entries, radius_m, curve)
+    cost = words.total + _CUSP_RADII * words.cusps
+    rank = np.argsort(cost, axis=1)
+    wider = shapely.buffer(passage.open_shell, _NEAR_RADII * radius_m)
+    shapely.prepare(wider)
+    open_rows = np.arange(len(exits))
+    for place in range(min(_TRIED_WORDS, rank.shape[1])):
+        word = rank[open_rows, place]
+        # On one track a loop is never the way past an obstacle.
+        limit = np.where(spare[open_rows].min(axis=1) > 0.0, np.pi, np.inf)
+        apart = np.hypot(*(entries[open_rows, :2] - exits[open_rows, :2]).T) / radius_m
+        best = cost[open_rows, word]
+        usable = np.isfinite(best) & (best - apart < limit)
+        rows, word = open_rows[usable], word[usable]
+        if not len(rows):
+            break
+        places = [
+            trace(
+                exits[row],
+                words.steer[w],
+                words.length[row, w],
+                radius_m,
+                step_m=_STEP_RADII * radius_m,
+            )
+            for row, w in zip(rows.tolist(), word.tolist(), strict=True)
+        ]
+        lines = np.array([_line(each) for each in places], dtype=object)
+        clear = ~passage.hits(lines)
+        inside = clear & shapely.covers(passage.open_shell, lines)
+        near = clear & shapely.covers(wider, lines)
+        for at, row in enumerate(rows.tolist()):
+            if inside[at] or (near[at] and loose[row] is None):
+                pieces = words.length[row, word[at]] * radius_m
+                turn = Turn(
+                    places[at],
+                    curve if (pieces < 0).any() else "dubins",
+                    float(np.abs(pieces).sum()),
+                    float(-pieces[pieces < 0].sum()),
+                    0.0 if inside[at] else passage.outside_m(lines[at]),
+                    bool(inside[at]),
+                )
+                if inside[at]:
+                    found[row] = turn
+                else:
+                    loose[row] = turn
+        open_rows = np.array([row for row in open_rows if found[row] is None], dtype=np.int64)
+
+
+def _words(exits: FloatArray, entries: FloatArray, radius_m: float, curve: Curve) -> Words:
+    return (dubins_words if curve == "dubins" else reeds_shepp_words)(exits, entries, radius_m)
+
+
+def _chain(
+    start: FloatArray,
+    goal: FloatArray,
+    way: FloatArray,
+    passage: Passage,
+    radius_m: float,
+    curve: Curve,
+) -> Turn | None:
+    """Curves from corner to corner of the shortest way, a little outside of each corner."""
+    for out in (0.1, 0.3 * radius_m, radius_m):
+        turn = _through(
+            np.vstack((start, _corner_poses(way, out, radius_m), goal)), passage, radius_m, curve
+        )
+        if turn is not None and turn.length_m < 2.0 * _length(way) + 4.0 * np.pi * radius_m:
+            return turn
+    return None
+
+
+def _through(poses: FloatArray, passage: Passage, radius_m: float, curve: Curve) -> Turn | None:
+    """The shortest curves through poses, where together they fit."""
+    words = _words(poses[:-1], poses[1:], radius_m, curve)
+    cost = words.total + _CUSP_RADII * words.cusps
+    best = np.argmin(cost, axis=1)
+    if not np.isfinite(cost[np.arange(len(best)), best]).all():
+        return None
+    pieces = words.length[np.arange(len(best)), best] * radius_m
+    step_m = _STEP_RADII * radius_m
+    parts = [
+        trace(poses[k], words.steer[word], words.length[k, word], radius_m, step_m=step_m)
+        for k, word in enumerate(best.tolist())
+    ]
+    places = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+    if not passage.fits(np.array([_line(places)], dtype=object))[0]:
+        return None
+    reverse = float(-pieces[pieces < 0].sum())
+    kind = "reeds_shepp" if reverse > 0.0 else "dubins"
+    return Turn(places, kind, float(np.abs(pieces).sum()), reverse)
+
+
+def _corner_poses(way: FloatArray, out_m: float, radius_m: float) -> FloatArray:
+    """Poses at the bends of a way: of corners close together on one side, the middle one."""
+    into = way[1:-1] - way[:-2]
+    out = way[2:] - way[1:-1]
+    into = into / np.maximum(np.hypot(into[:, 0], into[:, 1]), 1e-12)[:, None]
+    out = out / np.maximum(np.hypot(out[:, 0], out[:, 1]), 1e-12)[:, None]
+    side = np.sign(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0])
+    along = into + out
+    angle = np.arctan2(along[:, 1], along[:, 0])
+    # What the way bends around lies on the inside: keep to the outside.
+    shift = np.column_stack((np.sin(angle), -np.cos(angle))) * (side * out_m)[:, None]
+    poses = np.column_stack((way[1:-1] + shift, angle))
+    groups: list[list[int]] = [[0]]
+    for corner in range(1, len(poses)):
+        near = np.hypot(*(way[corner + 1] - way[corner])) < radius_m
+        if near and side[corner] == side[corner - 1]:
+            groups[-1].append(corner)
+        else:
+            groups.append([corner])
+    return poses[[group[len(group) // 2] for group in groups]]
+
+
+def _lane_change(
+    start: FloatArray,
+    goal: FloatArray,
+    way: FloatArray,
+    passage: Passage,
+    radius_m: float,
+    spare_m: FloatArray,
+) -> Turn | None:
+    """Leave the track before the obstacle, pass beside it, join the track behind it."""
+    ahead = np.array([np.cos(start[2]), np.sin(start[2])])
+    left = np.array([-ahead[1], ahead[0]])
+    along, across = (way - way[0]) @ ahead, (way - way[0]) @ left
+    side = 1.0 if across.max() > -across.min() else -1.0
+    reach = float((side * across).max())
+    beside = along[side * across > reach - 0.05 * radius_m - 0.1]
+    low, high = float(beside.min()), float(beside.max())
+    gap = float(along[-1])
+    for more, wide, longer in itertools.product((0.1, 0.4 * radius_m), (0.0, 0.5, 1.0), (0.0, 0.5)):
+        aside = reach + more
+        # Two arcs that leave a line and join its parallel (a lane change) take this length.
+        needed = (
+            np.sqrt(aside * (4.0 * radius_m - aside)) if aside < 2.0 * radius_m else 2.0 * radius_m
+        ) + longer * radius_m
+        first, last = low - wide * reach, high + wide * reach
+        early = float(np.clip(needed - first, 0.0, None))
+        late = float(np.clip(last + needed - gap, 0.0, None))
+        if early > spare_m[0] or late > spare_m[1]:
+            continue
+        poses = np.array(
+            [
+                [*(start[:2] - early * ahead), start[2]],
+                [*(start[:2] + first * ahead + side * aside * left), start[2]],
+                [*(start[:2] + last * ahead + side * aside * left), start[2]],
+                [*(goal[:2] + late * ahead), start[2]],
+            ]
+        )
+        turn = _through(poses, passage, radius_m, "dubins")
+        if turn is not None and turn.length_m < 1.5 * (gap + early + late) + np.pi * radius_m:
+            return Turn(turn.places, turn.kind, turn.length_m, early_m=early, late_m=late)
+    return None
+
+
+def _drive(ends: FloatArray, passage: Passage, way: FloatArray | None = None) -> Turn:
+    """The shortest way, with corners; straight and not fit where there is no way at all."""
+    if way is None:
+        way = passage.shortest(ends[0], ends[1])
+    return _polyline(ends, fits=False) if way is None else _polyline(way, fits=len(way) == 2)
+
+
+def _polyline(places: FloatArray, *, fits: bool) -> Turn:
+    return Turn(places, "drive", _length(places), fits=fits)
+
+
+def _length(places: FloatArray) -> float:
+    return float(np.hypot(*np.diff(places, axis=0).T).sum())
+
+
+def _line(places: NDArray[np.float64]) -> BaseGeometry:
+    """A line, also of one place: shapely wants two."""
+    return shapely.LineString(places if len(places) > 1 else np.repeat(places, 2, axis=0))
