@@ -37,7 +37,7 @@ class Words:
     @property
     def total(self) -> FloatArray:
         """Length of each word in radii, infinite where it does not join: (pairs, words)."""
-        return np.nan_to_num(np.abs(self.length).sum(axis=2), nan=np.inf)
+        return np.asarray(np.nan_to_num(np.abs(self.length).sum(axis=2), nan=np.inf))
 
     @property
     def cusps(self) -> NDArray[np.int64]:

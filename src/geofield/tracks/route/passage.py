@@ -72,25 +72,21 @@ class Passage:
         self._tree = shapely.STRtree(self._blocks)
         # Corners of a circle's polygon lie so far out that its edges keep clear of the circle.
         out = (radius + _AROUND_M) / np.cos(np.pi / _CORNERS)
-        self._corners: dict[int, FloatArray] = {
-            index: corners
-            for index, corners in enumerate(
-                [
-                    *(_circle_corners(x, y, r) for (x, y, _), r in zip(shapes.circles, out)),
-                    *(
-                        _reflex(shapely.buffer(each, _AROUND_M, join_style="mitre"))
-                        for each in solid
-                    ),
-                ]
-            )
-        }
+        corners = [
+            _circle_corners(x, y, r)
+            for x, y, r in zip(*shapes.circles[:, :2].T.tolist(), out.tolist(), strict=True)
+        ]
+        corners += [
+            _sticking_out(shapely.buffer(each, _AROUND_M, join_style="mitre")) for each in solid
+        ]
+        self._corners: dict[int, FloatArray] = dict(enumerate(corners))
         inner = shapely.buffer(shell, margin_m - _AROUND_M, join_style="mitre")
-        self._corners[_SHELL] = _turned_in(inner)
+        self._corners[_SHELL] = _sticking_in(inner)
         self._sights: dict[tuple[int, int], _Sight] = {}
 
     def fits(self, lines: NDArray[np.object_]) -> NDArray[np.bool_]:
         """Whether each line stays inside the border and outside every obstacle and hole."""
-        return shapely.covers(self.open_shell, lines) & ~self.hits(lines)
+        return np.asarray(shapely.covers(self.open_shell, lines) & ~self.hits(lines))
 
     def hits(self, lines: NDArray[np.object_]) -> NDArray[np.bool_]:
         """Whether each line runs into an obstacle or hole."""
@@ -200,7 +196,7 @@ def _circle_corners(x: float, y: float, radius: float) -> FloatArray:
     return np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle)))
 
 
-def _reflex(shape: BaseGeometry) -> FloatArray:
+def _sticking_out(shape: BaseGeometry) -> FloatArray:
     """Corners that stick out of a shape: only there can a shortest way around it turn."""
     found = []
     for part in shapely.get_parts(shape):
@@ -209,7 +205,7 @@ def _reflex(shape: BaseGeometry) -> FloatArray:
     return np.concatenate(found) if found else np.empty((0, 2))
 
 
-def _turned_in(shape: BaseGeometry) -> FloatArray:
+def _sticking_in(shape: BaseGeometry) -> FloatArray:
     """Corners of a border that stick into the field."""
     found = []
     for part in shapely.get_parts(shape):

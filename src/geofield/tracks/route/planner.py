@@ -94,7 +94,9 @@ def plan_route(
             curve=curve,
             spare_m=_spare(ends[rows], track_no[rows], backward),
         )
-    route, table = _tables(tracks, rows, backward, turns, exits, entries, turning_radius_m)
+    route, table = _tables(
+        tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
+    )
     return replace(tracks, route=route, turns=table)
 
 
@@ -144,7 +146,7 @@ def _spare(ends: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]) ->
     """What may be left out of the segments before and after each turn along one track."""
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T) * _SPARE_SHARE
     same = (track_no[1:] == track_no[:-1]) & (backward[1:] == backward[:-1])
-    return np.column_stack((length[:-1], length[1:])) * same[:, None]
+    return np.asarray(np.column_stack((length[:-1], length[1:])) * same[:, None])
 
 
 def _tables(
@@ -152,6 +154,7 @@ def _tables(
     rows: IntArray,
     backward: NDArray[np.bool_],
     turns: list[Turn],
+    *,
     exits: FloatArray,
     entries: FloatArray,
     radius_m: float | None,
@@ -230,7 +233,10 @@ def _sides(exits: FloatArray, entries: FloatArray) -> list[str]:
     """To which side of the way out the next segment begins."""
     offset = entries[:, :2] - exits[:, :2]
     across = np.cos(exits[:, 2]) * offset[:, 1] - np.sin(exits[:, 2]) * offset[:, 0]
-    return np.select([across > 1e-6, across < -1e-6], ["left", "right"], "straight").tolist()
+    return [
+        "left" if value > 1e-6 else "right" if value < -1e-6 else "straight"
+        for value in across.tolist()
+    ]
 
 
 def _two(places: FloatArray) -> FloatArray:

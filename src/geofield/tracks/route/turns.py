@@ -1,9 +1,9 @@
 """From the end of one segment to the start of the next: curves where the machine can drive them.
 
-Tried in this order, and the first that stays in the allowed area is taken: one curve of the turning
-radius; a chain of curves along the shortest way around what is between; around an obstacle on the
-same track, a chain that leaves the track early and joins it late. Where none fits, the turn says so:
-a curve that leaves the field by up to three radii, else the shortest way itself with its
+Tried in this order, and the first that stays in the allowed area is taken: one curve of the
+turning radius; a chain of curves along the shortest way around what is between; around an obstacle
+on the same track, a chain that leaves the track early and joins it late. Where none fits, the turn
+says so: a curve that leaves the field by up to three radii, else the shortest way itself with its
 sharp corners. No way ever runs through an obstacle or a hole.
 """
 
@@ -30,7 +30,6 @@ _CUSP_RADII = 2.0
 """Changing between forwards and backwards costs as much as driving this many radii."""
 _NEAR_RADII = 3.0
 _STEP_RADII = 0.05
-_OPEN = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +70,12 @@ def straight_ways(exits: FloatArray, entries: FloatArray, passage: Passage) -> l
     passage : Passage
     """
     ends = np.stack((exits[:, :2], entries[:, :2]), axis=1)
-    fits = passage.fits(shapely.linestrings(ends)) if len(ends) else []
+    if not len(ends):
+        return []
+    free = passage.fits(np.asarray(shapely.linestrings(ends)))
     return [
-        _drive(ends[row], passage) if not free else _polyline(ends[row], fits=True)
-        for row, free in enumerate(fits)
+        _polyline(ends[row], fits=True) if clear else _drive(ends[row], passage)
+        for row, clear in enumerate(free.tolist())
     ]
 
 
@@ -107,17 +108,28 @@ def plan_turns(
     if not count:
         return []
     spare = np.zeros((count, 2)) if spare_m is None else spare_m
-    _single_curves(exits, entries, passage, radius_m, curve, found, loose, spare)
+    _single_curves(
+        exits,
+        entries,
+        passage,
+        radius_m=radius_m,
+        curve=curve,
+        found=found,
+        loose=loose,
+        spare=spare,
+    )
     for row in range(count):
         if found[row] is not None:
             continue
         ends = np.stack((exits[row, :2], entries[row, :2]))
         way = passage.shortest(ends[0], ends[1])
         if way is not None and len(way) > 2:
-            found[row] = _chain(exits[row], entries[row], way, passage, radius_m, curve)
+            found[row] = _chain(
+                exits[row], entries[row], way, passage, radius_m=radius_m, curve=curve
+            )
             if found[row] is None and spare[row].min() > 0.0:
                 found[row] = _lane_change(
-                    exits[row], entries[row], way, passage, radius_m, spare[row]
+                    exits[row], entries[row], way, passage, radius_m=radius_m, spare_m=spare[row]
                 )
         if found[row] is None:
             found[row] = loose[row] or _drive(ends, passage, way)
@@ -128,6 +140,7 @@ def _single_curves(
     exits: FloatArray,
     entries: FloatArray,
     passage: Passage,
+    *,
     radius_m: float,
     curve: Curve,
     found: list[Turn | None],
@@ -192,6 +205,7 @@ def _chain(
     goal: FloatArray,
     way: FloatArray,
     passage: Passage,
+    *,
     radius_m: float,
     curve: Curve,
 ) -> Turn | None:
@@ -253,6 +267,7 @@ def _lane_change(
     goal: FloatArray,
     way: FloatArray,
     passage: Passage,
+    *,
     radius_m: float,
     spare_m: FloatArray,
 ) -> Turn | None:

@@ -1,0 +1,63 @@
+"""Dubins and Reeds-Shepp curves against what is known of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geofield.tracks.route.curves import dubins_words, trace
+from geofield.tracks.route.reeds_shepp import reeds_shepp_words
+
+
+@pytest.fixture(scope="module")
+def pairs() -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(7)
+    start = np.column_stack((rng.uniform(-30, 30, (2000, 2)), rng.uniform(-4, 4, 2000)))
+    goal = np.column_stack((rng.uniform(-30, 30, (2000, 2)), rng.uniform(-4, 4, 2000)))
+    return start, goal
+
+
+def test_every_pair_has_a_curve(pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    for words in (dubins_words(*pairs, 5.0), reeds_shepp_words(*pairs, 5.0)):
+        assert np.isfinite(words.total.min(axis=1)).all()
+
+
+def test_reversing_is_never_longer(pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    forward = dubins_words(*pairs, 5.0).total.min(axis=1)
+    both = reeds_shepp_words(*pairs, 5.0).total.min(axis=1)
+    assert (both <= forward + 1e-9).all()
+    assert (both < 0.8 * forward).mean() > 0.2
+
+
+def test_reeds_shepp_is_the_same_both_ways(pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    there = reeds_shepp_words(*pairs, 5.0).total.min(axis=1)
+    back = reeds_shepp_words(*pairs[::-1], 5.0).total.min(axis=1)
+    assert np.abs(there - back).max() < 1e-9
+
+
+def test_known_lengths() -> None:
+    start = np.zeros((3, 3))
+    goal = np.array([[0.0, 0.0, np.pi], [0.0, 4.0, np.pi], [10.0, 0.0, 0.0]])
+    # Turning on the spot takes three arcs of 60 degrees; two radii to the side a half circle.
+    assert reeds_shepp_words(start, goal, 2.0).total.min(axis=1) * 2.0 == pytest.approx(
+        [2.0 * np.pi, 2.0 * np.pi, 10.0]
+    )
+    assert dubins_words(start, goal, 2.0).total.min(axis=1) * 2.0 == pytest.approx(
+        [2.0 * 7.0 * np.pi / 3.0, 2.0 * np.pi, 10.0]
+    )
+
+
+def test_traces_end_at_the_goal_and_keep_the_radius(
+    pairs: tuple[np.ndarray, np.ndarray],
+) -> None:
+    start, goal = pairs
+    words = reeds_shepp_words(start, goal, 5.0)
+    best = words.total.argmin(axis=1)
+    for row in range(0, 2000, 20):
+        places = trace(
+            start[row], words.steer[best[row]], words.length[row, best[row]], 5.0, step_m=0.05
+        )
+        assert places[0] == pytest.approx(start[row, :2])
+        assert places[-1] == pytest.approx(goal[row, :2], abs=1e-6)
+        length = np.hypot(*np.diff(places, axis=0).T).sum()
+        assert length == pytest.approx(words.total[row, best[row]] * 5.0, rel=1e-4)

@@ -1,0 +1,194 @@
+"""Routes drive every segment once, in order, and never through an obstacle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield import schema
+from geofield.errors import TrackError
+from geofield.model.tracks import Tracks
+from geofield.tracks import plan_route, plan_tracks
+from geofield.tracks.route.order import track_order
+from geofield.tracks.route.passage import Passage
+
+CRS = 32633
+FIELD = shapely.difference(
+    shapely.box(500000, 5600000, 500300, 5600200),
+    shapely.union(
+        shapely.box(500120, 5600120, 500180, 5600200), shapely.box(500040, 5600040, 500060, 5600060)
+    ),
+)
+
+
+def obstacles(count: int = 12) -> list[shapely.Polygon]:
+    rng = np.random.default_rng(4)
+    places = rng.uniform((500030, 5600030), (500270, 5600170), (count, 2))
+    return list(shapely.buffer(shapely.points(places), rng.uniform(1.5, 5.0, count), quad_segs=16))
+
+
+@pytest.fixture(scope="module")
+def tracks() -> Tracks:
+    return plan_tracks(FIELD, obstacles(), crs=CRS, spacing_m=6.0, headland_m=18.0, direction=2.0)
+
+
+@pytest.mark.parametrize("pattern", ["boustrophedon", "skip", "shortest"])
+@pytest.mark.parametrize(
+    ("radius_m", "curve"), [(None, "dubins"), (5.0, "dubins"), (5.0, "reeds_shepp")]
+)
+def test_route_is_whole_and_free(
+    tracks: Tracks, pattern: str, radius_m: float | None, curve: str
+) -> None:
+    planned = plan_route(tracks, pattern=pattern, turning_radius_m=radius_m, curve=curve)
+    route, turns = planned.route, planned.turns
+    assert route is not None
+    assert turns is not None
+    assert list(route.columns[:-1]) == schema.ROUTE.column_names
+    assert list(turns.columns[:-1]) == schema.TURNS.column_names
+    assert route["sequence"].tolist() == list(range(1, len(route) + 1))
+
+    work = route[route["kind"] == "work"]
+    driven = list(zip(work["track_no"], work["segment_no"], strict=True))
+    all_segments = list(
+        zip(tracks.segments["track_no"], tracks.segments["segment_no"], strict=True)
+    )
+    assert sorted(driven) == all_segments
+
+    # One unbroken line, on which every metre is counted.
+    lines = route.geometry.to_numpy()
+    ends = shapely.get_coordinates(shapely.get_point(lines, -1))
+    starts = shapely.get_coordinates(shapely.get_point(lines, 0))
+    assert np.abs(ends[:-1] - starts[1:]).max() < 1e-5
+    assert route["start_m"].iloc[-1] + route["length_m"].iloc[-1] == pytest.approx(
+        route["length_m"].sum()
+    )
+    assert shapely.length(lines) == pytest.approx(route["length_m"].to_numpy(), rel=2e-3, abs=1e-3)
+
+    # Through nothing, ever; and inside the field where it is said to fit.
+    solid = shapely.union_all([*obstacles(), shapely.Polygon(FIELD.interiors[0])])
+    assert not shapely.intersects(lines, shapely.buffer(solid, -0.01)).any()
+    fits = turns["fits"] == "yes"
+    assert shapely.covers(shapely.buffer(FIELD, 0.01), turns.geometry.to_numpy()[fits]).all()
+    assert (turns.loc[fits, "outside_m"] == 0.0).all()
+    if radius_m is not None:
+        assert fits.mean() > 0.7
+        assert (turns.loc[~fits & (turns["kind"] != "drive"), "outside_m"] > 0.0).all()
+    if curve == "dubins":
+        assert (turns["reverse_m"] == 0.0).all()
+
+
+def test_curves_keep_the_turning_radius(tracks: Tracks) -> None:
+    turns = plan_route(tracks, turning_radius_m=5.0).turns
+    assert turns is not None
+    checked = 0
+    for row in turns[turns["kind"] == "dubins"].itertuples():
+        places = shapely.get_coordinates(row.geometry)
+        a, b, c = places[:-2], places[1:-1], places[2:]
+        twice_area = np.abs(
+            np.cross(np.c_[b - a, np.zeros(len(a))], np.c_[c - a, np.zeros(len(a))])[:, 2]
+        )
+        sides = np.hypot(*(b - a).T) * np.hypot(*(c - b).T) * np.hypot(*(c - a).T)
+        # Where two arcs meet, three points see a mean of both, which is no sharper than either.
+        long = np.minimum(np.hypot(*(b - a).T), np.hypot(*(c - b).T)) > 1e-3
+        curvature = 2.0 * twice_area[long] / sides[long]
+        assert curvature.max(initial=0.0) <= 1.01 / 5.0
+        checked += int(long.sum())
+    assert checked > 500
+
+
+def test_shortest_is_shorter(tracks: Tracks) -> None:
+    drive = {}
+    for pattern in ("boustrophedon", "shortest"):
+        planned = plan_route(tracks, pattern=pattern, turning_radius_m=5.0)
+        assert planned.turns is not None
+        drive[pattern] = planned.turns["length_m"].sum()
+    assert drive["shortest"] < 0.9 * drive["boustrophedon"]
+
+
+def test_equal_input_gives_equal_routes(tracks: Tracks) -> None:
+    one, two = (plan_route(tracks, pattern="shortest", turning_radius_m=5.0) for _ in range(2))
+    assert one.route is not None
+    assert two.route is not None
+    assert one.route.to_wkb().equals(two.route.to_wkb())
+
+
+def test_a_margin_lets_turns_leave_the_field() -> None:
+    plain = shapely.box(500000, 5600000, 500100, 5600060)
+    tracks = plan_tracks(plain, crs=CRS, spacing_m=6.0)
+    without = plan_route(tracks, turning_radius_m=3.0).turns
+    with_margin = plan_route(tracks, turning_radius_m=3.0, margin_m=3.1).turns
+    assert without is not None
+    assert with_margin is not None
+    assert (without["fits"] == "no").all()
+    assert (without["outside_m"] > 0.0).all()
+    assert (with_margin["fits"] == "yes").all()
+    assert with_margin["length_m"].to_numpy() == pytest.approx(3.0 * np.pi)
+    # Going backwards first, there is room inside the field.
+    reversing = plan_route(tracks, turning_radius_m=3.0, curve="reeds_shepp").turns
+    assert reversing is not None
+    assert (reversing["fits"] == "yes").all()
+    assert (reversing["reverse_m"] > 0.0).all()
+
+
+def test_skip_orders() -> None:
+    assert track_order(np.arange(1, 8), 0) == [1, 2, 3, 4, 5, 6, 7]
+    assert track_order(np.arange(1, 8), 1) == [1, 3, 5, 7, 6, 4, 2]
+    assert track_order(np.arange(1, 8), 2) == [1, 4, 7, 5, 2, 3, 6]
+
+
+def test_start_chooses_the_corner(tracks: Tracks) -> None:
+    for corner in ((500000, 5600000), (500300, 5600000), (500300, 5600200)):
+        route = plan_route(tracks, start=corner).route
+        assert route is not None
+        first = shapely.get_coordinates(route.geometry.iloc[0])[0]
+        # The first and last tracks are cut off where they leave the tilted field.
+        assert np.hypot(*(first - corner)) < 110.0
+
+
+def test_shortest_ways_are_shortest() -> None:
+    """Around one circle the length is known: two tangents and an arc."""
+    from geofield.model.obstacles import ObstacleShapes
+
+    shapes = ObstacleShapes(
+        np.array([[50.0, 50.0, 10.0]]), np.array([1]), np.empty(0, dtype=object), np.empty(0, int)
+    )
+    passage = Passage(shapely.box(0, 0, 100, 100), shapes)
+    way = passage.shortest(np.array([10.0, 50.0]), np.array([90.0, 50.0]))
+    assert way is not None
+    tangent = np.sqrt(40.0**2 - 10.0**2)
+    arc = 10.0 * (np.pi - 2.0 * np.arccos(10.0 / 40.0))
+    length = np.hypot(*np.diff(way, axis=0).T).sum()
+    assert 2.0 * tangent + arc <= length < (2.0 * tangent + arc) * 1.005
+    # A wall from border to border leaves no way.
+    wall = ObstacleShapes(
+        np.empty((0, 3)), np.empty(0, int), np.array([shapely.box(48, -5, 52, 105)]), np.array([1])
+    )
+    closed = Passage(shapely.box(0, 0, 100, 100), wall)
+    assert closed.shortest(np.array([10.0, 50.0]), np.array([90.0, 50.0])) is None
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"pattern": "spiral"},
+        {"pattern": "skip", "skip": -1},
+        {"turning_radius_m": 0.0},
+        {"turning_radius_m": float("nan")},
+        {"turning_radius_m": 500.0},
+        {"curve": "clothoid"},
+        {"margin_m": -1.0},
+        {"start": (float("nan"), 0.0)},
+    ],
+)
+def test_bad_settings_are_refused(tracks: Tracks, wrong: dict[str, object]) -> None:
+    with pytest.raises(TrackError):
+        plan_route(tracks, **wrong)  # type: ignore[arg-type]
+
+
+def test_fields_with_nothing_to_drive() -> None:
+    field = shapely.box(500000, 5600000, 500100, 5600060)
+    empty = plan_tracks(field, [shapely.buffer(field, 5.0)], crs=CRS, spacing_m=5.0)
+    planned = plan_route(empty, turning_radius_m=5.0)
+    assert planned.route is not None
+    assert len(planned.route) == 0
