@@ -1,0 +1,179 @@
+"""Queries: SPARQL that comes with the package, over files, with GeoSPARQL functions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pyoxigraph as ox
+
+from geofield.errors import FormatError
+from geofield.formats.rdf.geosparql import oxigraph_functions
+from geofield.formats.rdf.namespaces import BOOLEAN, DOUBLE, INTEGER, SCHEMA_PREFIXES, XSD
+from geofield.formats.rdf.ntriples import escape_literal
+from geofield.formats.rdf.parse import parse
+
+#: A parameter is a variable with one value, which stands in the query and can be replaced.
+_PARAMETER = re.compile(
+    r'VALUES \?(?P<name>\w+) \{ (?P<value>"(?P<text>[^"]*)"(?:\^\^xsd:(?P<kind>\w+))?|-?\d+) \}'
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A query of the package.
+
+    Attributes
+    ----------
+    name : str
+        As the user writes it.
+    title, description : str
+        For people.
+    text : str
+        SPARQL, without prefixes.
+    parameters : mapping of str to str
+        Variables that stand for values, with defaults as a person writes them.
+    """
+
+    name: str
+    title: str
+    description: str
+    text: str
+    parameters: Mapping[str, str]
+
+    @property
+    def sparql(self) -> str:
+        """The text with its prefixes: to paste into any store."""
+        lines = (f"PREFIX {prefix}: <{iri}>" for prefix, iri in SCHEMA_PREFIXES.items())
+        return "\n".join(lines) + "\n" + self.text
+
+    def with_values(self, values: Mapping[str, str]) -> str:
+        """The text with other values of its parameters.
+
+        Raises
+        ------
+        FormatError
+            When a parameter is unknown or its value of the wrong kind.
+        """
+        unknown = set(values) - set(self.parameters)
+        if unknown:
+            raise FormatError(
+                f"The query {self.name!r} has no parameter {min(unknown)!r}.",
+                hint=f"Parameters: {', '.join(self.parameters) or 'none'}.",
+            )
+
+        def replaced(match: re.Match[str]) -> str:
+            value = values.get(match["name"])
+            if value is None:
+                return match[0]
+            return f"VALUES ?{match['name']} {{ {_literal(match, value)} }}"
+
+        return _PARAMETER.sub(replaced, self.text)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A table of answers.
+
+    Attributes
+    ----------
+    columns : tuple of str
+    rows : tuple of tuples
+        Python values: text (of IRIs too), int, float, bool or None.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+
+
+def queries() -> dict[str, Query]:
+    """All queries of the package, by name."""
+    folder = files(__package__) / "queries"
+    names = sorted(each.name for each in folder.iterdir() if each.name.endswith(".rq"))
+    return {
+        name[:-3]: _parsed(name[:-3], (folder / name).read_text(encoding="utf-8")) for name in names
+    }
+
+
+def open_store(paths: Iterable[Path]) -> ox.Store:
+    """A store in memory with the triples of files, merged.
+
+    Raises
+    ------
+    FormatError
+        When one of them is hostile or not valid.
+    """
+    store = ox.Store()
+    for path in paths:
+        store.bulk_extend(parse(Path(path)))
+    return store
+
+
+def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = None) -> Answer:
+    """The answers of a query.
+
+    Parameters
+    ----------
+    store : pyoxigraph.Store
+    query : Query or str
+        One of the package, or SPARQL; geofield's prefixes are known.
+    values : mapping of str to str, optional
+        Values of the query's parameters, as a person writes them.
+
+    Raises
+    ------
+    FormatError
+        When the query is not SPARQL, or a parameter is unknown or of the wrong kind.
+    """
+    text = query.with_values(values or {}) if isinstance(query, Query) else query
+    try:
+        result = store.query(
+            text,
+            prefixes=SCHEMA_PREFIXES,
+            custom_functions=oxigraph_functions(),
+        )
+    except (SyntaxError, ValueError) as error:
+        raise FormatError(f"The query is not valid SPARQL: {error}.") from error
+    if not isinstance(result, ox.QuerySolutions):
+        raise FormatError("Only SELECT queries are answered here.", hint="Ask with SELECT.")
+    columns = tuple(variable.value for variable in result.variables)
+    rows = tuple(tuple(_python(row[column]) for column in columns) for row in result)
+    return Answer(columns, rows)
+
+
+def _parsed(name: str, text: str) -> Query:
+    words = [line[1:].strip() for line in text.splitlines() if line.startswith("#")]
+    parameters = {
+        m["name"]: m["value"] if m["text"] is None else m["text"] for m in _PARAMETER.finditer(text)
+    }
+    return Query(name, words[0], " ".join(words[1:]), text, parameters)
+
+
+def _literal(match: re.Match[str], value: str) -> str:
+    """A value as a person writes it, in the kind of the parameter's default."""
+    kind = match["kind"] or ("integer" if match["text"] is None else "string")
+    try:
+        if kind == "integer":
+            return str(int(value))
+        if kind == "double":
+            return f'"{float(value)!r}"^^xsd:double'
+    except ValueError as error:
+        raise FormatError(f"{match['name']} is {value!r}, not a number.") from error
+    return f'"{escape_literal(value)}"'
+
+
+def _python(term: Any) -> Any:
+    if term is None:
+        return None
+    if not isinstance(term, ox.Literal):
+        return term.value
+    kind = term.datatype.value
+    if kind == BOOLEAN:
+        return term.value == "true"
+    if kind in (DOUBLE, XSD + "decimal", XSD + "float"):
+        return float(term.value)
+    return int(term.value) if kind in (INTEGER, XSD + "int") else term.value
