@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
     "import": ("geofield.cli.import_:import_", "Read other programs' boundaries and lines."),
     "validate": ("geofield.cli.validate:validate", "Check products against their formats."),
+    "query": ("geofield.cli.query:query", "Ask linked data."),
     "info": ("geofield.cli.info:info", "Show what a file holds."),
     "formats": ("geofield.cli.formats:formats", "List the formats and what each carries."),
     "sources": ("geofield.cli.sources:sources", "List imagery sources and their terms."),
