@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 import rdflib
@@ -221,8 +222,8 @@ def test_the_validate_command_tells_and_exits_with_one(files, tmp_path):
     broken.write_text(files[1].read_text().replace("#Confirmed", "#Perhaps"))
     result = run(cli, ["validate", str(broken)])
     assert result.exit_code == 1
-    assert "obstacle/2>: Its status (gf:status) is 'gf:Perhaps', which is not allowed" in (
-        result.stdout
-    )
+    words = "obstacle/2>: Its status (gf:status) is 'gf:Perhaps', which is not allowed"
+    assert words in result.stderr
     result = run(cli, ["validate", "--json", str(broken)])
-    assert json.loads(result.stdout)[str(broken)][0]["line"] > 1
+    (finding, *_) = json.loads(result.stdout)[str(broken)]
+    assert re.match(r"line \d+, <https://example.org/geofield/field/", finding["where"])

@@ -62,6 +62,9 @@ def validate_file(path: Path | str) -> list[Finding]:
             warnings.simplefilter("always", FormatWarning)
             dataset = read_dataset(place)
     except GeofieldError as error:
+        # Where the format's own rules are broken already, that is why it cannot be read.
+        if any(each.level == "error" for each in findings):
+            return findings
         return [*findings, Finding("error", place.name, str(error))]
     findings += [
         Finding("warning", place.name, str(each.message))

@@ -12,10 +12,10 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
-from geofield.formats.problem import Problem
 from geofield.formats.rdf.layers import LayerMap, layer_maps
 from geofield.formats.rdf.namespaces import GEO, GF, GML, STUDY_POINT, expand
 from geofield.formats.rdf.parse import Graph
+from geofield.formats.rdf.problem import Problem
 from geofield.formats.rdf.wkt import geometry_of
 
 #: Farther than this from its field, in degrees (about 10 km), nothing belongs to it.

@@ -13,12 +13,13 @@ import rdflib
 from rdflib.namespace import RDF, SH
 
 from geofield.errors import FormatError
-from geofield.formats.problem import Problem
 from geofield.formats.rdf.checks import check_graph
 from geofield.formats.rdf.layers import all_terms, layer_maps
 from geofield.formats.rdf.namespaces import GML, SCHEMA_PREFIXES, STRING, STUDY_TREE, expand
 from geofield.formats.rdf.parse import Graph, parse
+from geofield.formats.rdf.problem import Problem
 from geofield.formats.rdf.publish import SHAPES, resource
+from geofield.formats.validation import Finding
 
 _BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
 
@@ -59,6 +60,12 @@ def validate(path: Path) -> list[Problem]:
         return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
     problems = [*_shape_problems(quads), *check_graph(graph)]
     return _located(_distinct(problems), path)
+
+
+def check(path: Path) -> Iterator[Finding]:
+    """The problems of a file as findings: what `geofield validate` shows."""
+    for problem in validate(path):
+        yield Finding("error", problem.place, problem.words)
 
 
 def _distinct(problems: list[Problem]) -> list[Problem]:
