@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 import geofield as gf
-from geofield.errors import OutputExistsError
+from geofield.errors import FieldError, OutputExistsError
 from geofield.model.review import complete_review
 from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
 from geofield.plan import Plan, read_plan
@@ -146,6 +146,30 @@ def test_a_moved_outline_is_kept(file: Path, simulated: SimulatedField) -> None:
     assert again.field.method == "drawn"
     third = plan_field(simulated.scene, **where, settings=SETTINGS, previous=again)
     assert third.field.polygon.equals(edited.field.polygon)
+
+
+def test_another_fields_plan_is_not_mixed_in(
+    plan: Plan, file: Path, simulated: SimulatedField
+) -> None:
+    from dataclasses import replace
+
+    from shapely.affinity import translate
+
+    elsewhere = replace(plan.field, polygon=translate(plan.field.polygon, 5000, 0))
+    other = replace(plan, field=elsewhere, evidence={}, tracks=None)
+    where = {"lat": simulated.lat, "lon": simulated.lon}
+    again = run_field(simulated.scene, **where, settings=SETTINGS, previous=other)
+    assert again.obstacles is None
+    assert other.obstacles is not None
+    reviewed = other.obstacles.copy()
+    reviewed.loc[0, "status"] = "confirmed"
+    with pytest.raises(FieldError, match="another field"):
+        run_field(
+            simulated.scene,
+            **where,
+            settings=SETTINGS,
+            previous=replace(other, obstacles=reviewed),
+        )
 
 
 def test_incomplete_rows_become_added_obstacles(plan: Plan) -> None:

@@ -15,8 +15,9 @@ from typing import Any
 
 import shapely
 
+from geofield import schema
 from geofield.crs import LONLAT, transformer
-from geofield.errors import GeofieldError
+from geofield.errors import FieldError, GeofieldError
 from geofield.model.field import Field
 from geofield.model.review import complete_review, merge_reviewed
 from geofield.model.scene import Scene
@@ -103,7 +104,10 @@ def run_field(
     """Stage 2: find the outline, unless a person drew it."""
     from geofield.field import extract_field
 
-    if previous is not None and keeps_outline(previous, lat=lat, lon=lon):
+    if previous is not None and not _holds(previous, lat=lat, lon=lon):
+        _refuse_to_forget(previous, lat, lon)
+        previous = None
+    if previous is not None and keeps_outline(previous):
         field = replace(previous.field, method="drawn", quality=None)
     else:
         field = extract_field(scene, lat=lat, lon=lon, **settings.field.model_dump())
@@ -113,7 +117,7 @@ def run_field(
             imagery_date=scene.source.date,
             licence=scene.source.licence,
         )
-        if previous is not None and previous.field.polygon.intersects(field.polygon):
+        if previous is not None:
             # The same field, found again: its names are the user's to keep.
             field = replace(field, field_id=previous.field.field_id, name=previous.field.name)
     evidence: dict[str, Any] = {"point": {"lat": lat, "lon": lon}, "field": _field_evidence(field)}
@@ -174,12 +178,31 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     )
 
 
-def keeps_outline(previous: Plan, *, lat: float, lon: float) -> bool:
-    """Whether an earlier plan's outline is a person's and holds the point."""
-    if not (previous.outline_edited or previous.field.method in ("drawn", "boundary")):
-        return False
+def keeps_outline(previous: Plan) -> bool:
+    """Whether an earlier plan's outline is a person's word."""
+    return previous.outline_edited or previous.field.method in ("drawn", "boundary")
+
+
+def _holds(previous: Plan, *, lat: float, lon: float) -> bool:
+    """Whether an earlier plan is of the field at a point."""
     x, y = transformer(LONLAT, previous.field.crs).transform(lon, lat)
     return bool(shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)))
+
+
+def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
+    """Another field's plan may be replaced, but not a person's work on it."""
+    reviewed = 0
+    if previous.obstacles is not None:
+        status = complete_review(previous.obstacles)["status"]
+        reviewed = int(status.isin(schema.REVIEWED).sum())
+    if reviewed or keeps_outline(previous):
+        work = [f"{reviewed} reviewed obstacles"] if reviewed else []
+        work += ["an outline drawn by hand"] if keeps_outline(previous) else []
+        raise FieldError(
+            f"The earlier plan there is of another field ({previous.field.name}; lat {lat}, lon "
+            f"{lon} lies outside it) and holds {' and '.join(work)}.",
+            hint="Choose another folder, or --fresh to forget that work.",
+        )
 
 
 def _field_evidence(field: Field) -> dict[str, Any]:

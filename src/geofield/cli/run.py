@@ -37,6 +37,11 @@ Examples (on the project's own sample):
     help="Replace earlier products there; reviewed obstacles and a moved outline are kept.",
 )
 @click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
+@click.option(
+    "--acknowledge-terms",
+    is_flag=True,
+    help="You have permission to derive geodata, though the source's terms forbid it.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
 @settings_option
 @section_options("imagery")
@@ -53,16 +58,18 @@ def run(
     out: Path,
     overwrite: bool,
     fresh: bool,
+    acknowledge_terms: bool,
     as_json: bool,
     settings_file: str | None,
     **options: Any,
 ) -> None:
     """From a picture and a point in a field to outline, obstacles and tracks.
 
-    IMAGERY is a GeoTIFF or any other source that `geofield sources` lists. Written are the
-    picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON, Shapefiles, RDF, a map
-    picture and report.json.
+    IMAGERY is a GeoTIFF, a folder of them, or any other source that `geofield tiles` takes.
+    Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
+    Shapefiles, RDF, a map picture and report.json.
     """
+    from geofield.cli.imagery_tools import as_picture
     from geofield.pipeline import plan_field
     from geofield.settings import load_settings
 
@@ -70,9 +77,19 @@ def run(
     _refuse_occupied(out, settings, overwrite=overwrite)
     previous = None if fresh else _previous(out)
     timings: dict[str, float] = {}
-    with progress_bar(quiet=as_json) as progress:
-        plan = plan_field(
+    with (
+        progress_bar(quiet=as_json) as progress,
+        as_picture(
             imagery,
+            settings,
+            lat=lat,
+            lon=lon,
+            acknowledged=acknowledge_terms,
+            progress=progress,
+        ) as picture,
+    ):
+        plan = plan_field(
+            picture,
             lat=lat,
             lon=lon,
             settings=settings,
