@@ -11,6 +11,7 @@ import shapely
 from shapely import Polygon
 
 from geofield.errors import FieldError, FieldWarning, SettingsError
+from geofield.field.auto import segment
 from geofield.field.outline import straight_outline
 from geofield.field.quality import judge
 from geofield.field.segmentation import Segmentation, fill_holes, part_at
@@ -144,4 +145,8 @@ def _joined(mask: np.ndarray) -> np.ndarray:
     return np.asarray(closing(mask, disk(3)), bool)
 
 
-METHODS: dict[str, _Method] = {"study": _study}
+def _auto(scene: Scene, x_px: float, y_px: float, regions: Sequence[int]) -> Segmentation:
+    return segment(scene, x_px, y_px)
+
+
+METHODS: dict[str, _Method] = {"auto": _auto, "study": _study}

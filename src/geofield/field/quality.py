@@ -41,7 +41,8 @@ def judge(
     touching = edge_share(outline_px, mask.shape[1], mask.shape[0])
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
-    score = 1.0 - 0.1 * len(reasons)
+    measured = dict(found.figures)
+    score = min(1.0, 0.3 + measured.get("certainty", 1.0)) - 0.25 * len(reasons)
     if touching > 0.02:
         reasons.append(
             f"it touches the picture's edge along {touching:.0%} of its length, so the field "

@@ -1,0 +1,111 @@
+"""Auto: the field around a point from colour, near infrared and edges at several scales."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import FieldError
+from geofield.field.choice import Candidate, candidates, certainty, scores
+from geofield.field.evidence import channels, gradient, whiten
+from geofield.field.hierarchy import merge
+from geofield.field.refine import enlarge, snap
+from geofield.field.segmentation import Segmentation
+from geofield.field.superpixels import borders, superpixels
+from geofield.model import Scene
+
+#: The hierarchy works on a picture reduced to at most this many pixels a side.
+_COARSE_PX = 400
+#: Side of a superpixel's cell, pixels.
+_STEP_PX = 5
+#: A border weaker than this, in units of what the field has inside, is none.
+_WEAK = 1.6
+
+
+def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
+    """The field around a pixel position.
+
+    Parameters
+    ----------
+    scene : Scene
+    x_px, y_px : float
+        The seed, pixel coordinates.
+    """
+    rows, columns = scene.grid.shape
+    factor = max(1, math.ceil(max(rows, columns) / _COARSE_PX))
+    seed = (x_px / factor, y_px / factor)
+    raw = channels(scene, factor)
+    stack = whiten(raw, seed)
+    labels = superpixels(gradient(stack), _STEP_PX)
+    count = int(labels.max()) + 1
+    lines = borders(labels, stack)
+    if not len(lines.first):
+        raise FieldError("The picture is too small to find a field in.")
+    pairs = lines.pairs(count)
+    sizes = np.bincount(labels.ravel(), minlength=count).astype(float)
+    found = candidates(labels, merge(sizes, *pairs), lines, pairs, seed)
+    if not found:
+        # Nothing stands out of anything: one surface fills the picture.
+        return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
+    score = scores(found)
+    best = int(np.argmax(score))
+    chosen = found[best]
+    mask = _finer(scene, chosen, stack, factor, seed)
+    notes, figures = _evidence(chosen, certainty(found, score, best))
+    return Segmentation(mask & scene.valid, notes, figures)
+
+
+def _finer(
+    scene: Scene,
+    chosen: Candidate,
+    coarse: NDArray[np.float32],
+    factor: int,
+    seed: tuple[float, float],
+) -> NDArray[np.bool_]:
+    """The chosen mask at the picture's own pixels, in steps of at most four."""
+    mask, holes = snap(chosen.mask, coarse, 2.5), chosen.holes
+    size = factor
+    while size > 1:
+        finer = 1 if size <= 4 else math.ceil(size / 4)
+        fine = channels(scene, finer)
+        shape = fine.shape[1:]
+        mask = _resize(mask, size / finer, shape)
+        holes = _resize(holes, size / finer, shape)
+        mask = snap(
+            mask,
+            whiten(fine, (seed[0] * factor / finer, seed[1] * factor / finer)),
+            1.5 * size / finer,
+        )
+        size = finer
+    return mask & ~holes
+
+
+def _resize(mask: NDArray[np.bool_], ratio: float, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    if ratio == int(ratio):
+        return enlarge(mask, int(ratio), (shape[0], shape[1]))
+    row = np.minimum(((np.arange(shape[0]) + 0.5) / ratio).astype(int), mask.shape[0] - 1)
+    column = np.minimum(((np.arange(shape[1]) + 0.5) / ratio).astype(int), mask.shape[1] - 1)
+    return mask[np.ix_(row, column)]
+
+
+def _evidence(
+    chosen: Candidate, certain: float
+) -> tuple[tuple[str, ...], tuple[tuple[str, float], ...]]:
+    f = chosen.figures
+    contrast = f["outline50"] / f["i50"]
+    weakest = f["outline20"] / f["i50"]
+    notes = []
+    if contrast < _WEAK:
+        notes.append("its border hardly differs from what lies inside")
+    elif weakest < _WEAK:
+        notes.append("a fifth of its border or more is weak")
+    if certain < 0.5:
+        notes.append(f"other outlines are as likely (certainty {certain:.0%})")
+    return tuple(notes), (
+        ("certainty", certain),
+        ("border_contrast", contrast),
+        ("weakest_fifth", weakest),
+        ("straightness", f["straight"]),
+    )

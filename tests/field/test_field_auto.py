@@ -1,0 +1,40 @@
+"""The default method: fields with known outlines, seeds anywhere, equal brightness."""
+
+import numpy as np
+import pytest
+
+from geofield.field import extract_field
+from geofield.simulate import SimulationSettings, simulate_field
+
+
+def overlap(a, b):
+    return a.intersection(b).area / a.union(b).area
+
+
+@pytest.mark.parametrize("seed", [700_021, 700_027])
+def test_equal_brightness_is_no_obstacle(seed):
+    truth = simulate_field(
+        seed, SimulationSettings(width_px=400, height_px=400, equal_brightness=True)
+    )
+    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon)
+    assert overlap(field.polygon, truth.field.polygon) > 0.95
+    assert field.polygon.is_valid
+    assert not list(field.polygon.interiors)
+    assert field.quality is not None
+    assert field.quality.trusted
+
+
+def test_crowns_become_holes_when_asked():
+    truth = simulate_field(700_024, SimulationSettings(width_px=400, height_px=400, obstacles=8))
+    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon, holes="keep", min_hole_m2=10.0)
+    holes = len(list(field.polygon.interiors))
+    assert 4 <= holes <= 9
+    assert field.polygon.area < truth.field.polygon.area
+
+
+def test_the_same_picture_gives_the_same_outline():
+    truth = simulate_field(700_024, SimulationSettings(width_px=300, height_px=300))
+    first, second = (
+        extract_field(truth.scene, lat=truth.lat, lon=truth.lon).polygon for _ in range(2)
+    )
+    assert np.array_equal(np.array(first.exterior.coords), np.array(second.exterior.coords))
