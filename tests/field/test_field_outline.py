@@ -24,7 +24,7 @@ def pixels(polygon, side=256):
 
 
 @pytest.mark.parametrize(("corners", "count"), [(RECTANGLE, 4), (L_SHAPE, 6)])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(angle=st.floats(0, np.pi))
 def test_straight_fields_keep_their_corners(corners, count, angle):
     truth = turned(corners, angle)

@@ -27,7 +27,7 @@ _PARALLEL_SINE = 0.12
 #: How far a corner may move from where the chain turns, in tolerances.
 _CORNER_REACH = 2.5
 #: Pieces of fewer steps than this, in tolerances, say nothing about a direction.
-_SHORT = 2.5
+_SHORT = 4.5
 
 
 def mask_polygon(mask: BoolArray) -> Polygon:
