@@ -29,7 +29,7 @@ def make_dataset(*, points: bool = True) -> Dataset:
         [[(10, 5), (14, 5), (14, 9), (10, 9)]],
     )
     outline = shapely.transform(outline, lambda c: c + ORIGIN)
-    centres = np.array([[30.25, 20.5], [70.75, 20.125], [100.0, 45.0]]) + ORIGIN
+    centres = np.array([[30.25, 20.25], [70.75, 20.125], [100.0, 45.0]]) + ORIGIN
     radius, margin = np.array([2.5, 3.125, 4.0]), 0.5
     shed = shapely.Polygon(
         [(55, 10), (62, 10), (62, 17), (55, 17)], [[(57, 12), (59, 12), (59, 14), (57, 14)]]

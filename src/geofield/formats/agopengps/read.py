@@ -130,9 +130,9 @@ def _rings(folder: Path) -> list[np.ndarray]:
                 position += 1
             count = int(lines[position])
             rows = lines[position + 1 : position + 1 + count]
-            rings.append(np.array([_numbers(row)[:2] for row in rows]))
             if len(rows) != count:
                 raise IndexError
+            rings.append(np.array([_numbers(row)[:2] for row in rows]))
             position += 1 + count
     except (ValueError, IndexError) as error:
         raise FormatError(f"{path} breaks off or is damaged in ring {len(rings) + 1}.") from error

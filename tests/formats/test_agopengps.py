@@ -1,0 +1,164 @@
+"""AgOpenGPS: read by a reader written from the format's description alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from formats_plan import NAME, make_dataset
+from hypothesis import given
+from hypothesis import strategies as st
+from pyproj import Geod
+
+from geofield.errors import FormatError
+from geofield.formats import read_dataset, validate_file, write_dataset
+from geofield.formats.agopengps.plane import LocalPlane, densified, ring_headings
+from geofield.formats.arrow import to_lonlat
+
+pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("agopengps")
+    write_dataset(make_dataset(), out, ["agopengps"])
+    return out / "agopengps" / "Fields" / "Grosser_Acker_Nandu"
+
+
+def lines(path):
+    content = path.read_bytes().decode("utf-8")
+    assert "\r\n" in content
+    return content.split("\r\n")
+
+
+def test_field_file(folder):
+    content = lines(folder / "Field.txt")
+    assert content[1:9] == [
+        "$FieldDir",
+        NAME,
+        "$Offsets",
+        "0,0",
+        "Convergence",
+        "0",
+        "StartFix",
+        content[8],
+    ]
+    lat, lon = map(float, content[8].split(","))
+    assert 35.07 < lat < 35.072
+    assert 33.53 < lon < 33.54
+
+
+def rings_of(folder):
+    content = lines(folder / "Boundary.txt")
+    assert content[0] == "$Boundary"
+    position, rings = 1, []
+    while content[position]:
+        assert content[position] == "False"
+        count = int(content[position + 1])
+        rows = content[position + 2 : position + 2 + count]
+        rings.append(np.array([[float(v) for v in row.split(",")] for row in rows]))
+        position += 2 + count
+    return rings
+
+
+def test_rings_headings_and_spacing(folder):
+    outer, *inner = rings_of(folder)
+    assert len(inner) == 4  # the field's hole and three obstacles; the rejected one is not there
+    for ring, step in [(outer, 1.1), *((each, 0.55) for each in inner)]:
+        polygon = shapely.Polygon(ring[:, :2])
+        assert polygon.is_valid
+        assert not np.allclose(ring[0, :2], ring[-1, :2])
+        sides = np.hypot(*(np.roll(ring[:, :2], -1, axis=0) - ring[:, :2]).T)
+        assert sides.max() <= step + 0.003
+        for i, (_, _, heading) in enumerate(ring):
+            before, after = ring[i - 1], ring[(i + 1) % len(ring)]
+            expected = math.atan2(after[0] - before[0], after[1] - before[1]) % (2 * math.pi)
+            assert abs((heading - expected + math.pi) % (2 * math.pi) - math.pi) < 1e-4
+        assert ((ring[:, 2] >= 0) & (ring[:, 2] <= 2 * math.pi)).all()
+    assert not shapely.is_ccw(shapely.LinearRing(outer[:, :2]))
+    field = make_dataset().table("field").geometry.iloc[0]
+    # The plane is not UTM: its lengths are true, UTM's shortened by 0.04 % here.
+    assert abs(shapely.Polygon(outer[:, :2]).area / shapely.Polygon(field.exterior).area - 1) < 2e-3
+
+
+def test_track_lines(folder):
+    content = lines(folder / "TrackLines.txt")
+    assert content[0] == "$TrackLines"
+    tracks = [content[i : i + 8] for i in range(1, len(content) - 1, 8)]
+    assert len(tracks) == 12
+    for number, (name, heading, a, b, nudge, mode, visible, count) in enumerate(tracks, start=1):
+        assert name == f"Track {number}"
+        (ea, na), (eb, nb) = (map(float, end.split(",")) for end in (a, b))
+        assert abs(math.atan2(eb - ea, nb - na) % (2 * math.pi) - float(heading)) < 1e-4
+        assert (nudge, mode, visible, count) == ("0", "2", "True", "0")
+
+
+def test_flags(folder):
+    content = lines(folder / "Flags.txt")
+    assert content[:2] == ["$Flags", "3"]
+    lat, lon, _, _, heading, colour, number, note = content[2].split(",")
+    dataset = make_dataset()
+    row = dataset.table("obstacles").iloc[0]
+    assert abs(float(lat) - row["lat"]) < 1e-8
+    assert abs(float(lon) - row["lon"]) < 1e-8
+    assert (heading, colour, number) == ("0", "0", "1")
+    assert note == "Obstacle 1 radius 2.50 m"
+
+
+def test_no_fault_by_the_rules(folder):
+    assert [each for each in validate_file(folder) if each.level == "error"] == []
+
+
+def test_wrong_headings_are_found(folder, tmp_path):
+    import shutil
+
+    broken = tmp_path / "Field"
+    shutil.copytree(folder, broken)
+    content = lines(broken / "Boundary.txt")
+    east, north, heading = content[10].split(",")
+    content[10] = f"{east},{north},{float(heading) + 0.5:.5f}"
+    (broken / "Boundary.txt").write_bytes("\r\n".join(content).encode())
+    assert any("1 headings do not fit" in each.message for each in validate_file(broken))
+    (broken / "Boundary.txt").write_bytes("\r\n".join(content[:30]).encode())
+    with pytest.raises(FormatError, match="ring 1"):
+        read_dataset(broken)
+
+
+def test_a_folder_without_the_file_says_so(tmp_path):
+    (tmp_path / "Boundary.txt").write_text("$Boundary\n")
+    with pytest.raises(FormatError, match="0 AgOpenGPS fields"):
+        read_dataset(tmp_path)
+
+
+@given(st.floats(-70, 70), st.floats(-179, 179), st.floats(-3000, 3000), st.floats(-3000, 3000))
+def test_plane_there_and_back(lat, lon, east, north):
+    plane = LocalPlane(lat, lon)
+    ((back_lon, back_lat),) = plane.to_lonlat([east], [north])
+    ((e, n),) = plane.to_plane([back_lon], [back_lat])
+    assert abs(e - east) < 1e-5
+    assert abs(n - north) < 1e-5
+    _, _, metres = Geod(ellps="WGS84").inv(lon, lat, back_lon, back_lat)
+    # The series is good to a few millimetres per kilometre near the start point.
+    assert abs(metres - math.hypot(east, north)) < 0.002 * math.hypot(east, north) + 0.01
+
+
+@given(st.integers(3, 40), st.floats(0.3, 5.0), st.floats(3, 200))
+def test_densified_rings_keep_their_corners(corners, step, radius):
+    angle = 2 * np.pi * np.arange(corners) / corners
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    dense = densified(ring, step)
+    sides = np.hypot(*(np.roll(dense, -1, axis=0) - dense).T)
+    assert sides.max() <= step * (1 + 1e-6) or len(dense) == corners
+    assert abs(shapely.Polygon(dense).area - shapely.Polygon(ring).area) < 1e-6 * radius**2
+    headings = ring_headings(dense)
+    assert ((headings >= 0) & (headings <= 2 * np.pi)).all()
+
+
+def test_positions_are_those_of_the_plan(folder):
+    back = read_dataset(folder)
+    ours = make_dataset()
+    a = to_lonlat(ours.table("field").geometry.to_numpy(), ours.crs)[0]
+    b = to_lonlat(back.table("field").geometry.to_numpy(), back.crs)[0]
+    assert shapely.hausdorff_distance(a, b) < 5e-8

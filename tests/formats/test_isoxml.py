@@ -1,0 +1,165 @@
+"""ISOXML: read by a second reader, checked against the standard's rules, broken on purpose."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+import shapely
+from formats_plan import NAME, make_dataset
+from isoxml.models.base import v3, v4
+from isoxml.util.isoxml_io import isoxml_from_path
+from pyproj import Geod
+
+from geofield.errors import FormatError
+from geofield.formats import read_dataset, validate_file, write_dataset
+from geofield.formats.arrow import to_lonlat
+
+pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+NAMES = {4: "isoxml", 3: "isoxml-v3"}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("isoxml")
+    options = {"customer": "Müller & Söhne", "farm": "Hof <Ost>"}
+    write_dataset(make_dataset(), folder, list(NAMES.values()), options=options)
+    return {v: folder / name / "TASKDATA" / "TASKDATA.XML" for v, name in NAMES.items()}
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_a_second_reader_understands_it(files, version):
+    data, _ = isoxml_from_path(files[version])
+    model = {3: v3, 4: v4}[version]
+    assert isinstance(data, model.Iso11783TaskData)
+    (field,) = data.partfields
+    assert field.designator == NAME
+    customer = data.customers[0]
+    assert (customer.last_name if version == 4 else customer.designator) == "Müller & Söhne"
+    assert data.farms[0].designator == "Hof <Ost>"
+    assert data.farms[0].customer_id_ref == field.customer_id_ref == "CTR1"
+    dataset = make_dataset()
+    area = dataset.table("field").geometry.iloc[0].area
+    assert field.area == round(area)
+    kinds = [polygon.type.value for polygon in field.polygons]
+    assert sorted(map(int, kinds)) == [1, 6, 6, 6]
+    boundary = field.polygons[0]
+    assert [int(line.type.value) for line in boundary.line_strings] == [1, 2]
+    ring = [(float(p.east), float(p.north)) for p in boundary.line_strings[0].points]
+    expected = to_lonlat(dataset.table("field").geometry.to_numpy(), dataset.crs)[0]
+    outline = shapely.Polygon(ring)
+    assert shapely.hausdorff_distance(outline, shapely.Polygon(expected.exterior)) < 2e-9
+
+
+def test_guidance_of_version_4(files):
+    data, _ = isoxml_from_path(files[4])
+    groups = data.partfields[0].guidance_groups
+    patterns = [group.guidance_patterns for group in groups]
+    assert all(len(one) == 1 for one in patterns)
+    reference, *explicit = [one[0] for one in patterns]
+    dataset = make_dataset()
+    assert len(explicit) == len(dataset.table("segments"))
+    assert int(reference.propagation_direction.value) == 1
+    assert (reference.number_of_swaths_left, reference.number_of_swaths_right) == (11, 0)
+    geod = Geod(ellps="WGS84")
+    for pattern in explicit:
+        assert int(pattern.propagation_direction.value) == 4
+        assert int(pattern.extension.value) == 4
+        line = pattern.line_strings[0] if hasattr(pattern, "line_strings") else pattern.line_string
+        a, b = line.points
+        assert (int(a.type.value), int(b.type.value)) == (6, 7)
+        assert line.width == 5000
+        azimuth, _, _ = geod.inv(float(a.east), float(a.north), float(b.east), float(b.north))
+        assert abs((float(pattern.heading) - azimuth + 180) % 360 - 180) < 0.005
+
+
+def test_guidance_of_version_3_are_lines_of_the_field(files):
+    data, _ = isoxml_from_path(files[3])
+    lines = data.partfields[0].line_strings
+    assert len(lines) == len(make_dataset().table("segments"))
+    assert {int(line.type.value) for line in lines} == {5}
+    assert {int(point.type.value) for line in lines for point in line.points} == {2}
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_no_fault_by_the_rules(files, version):
+    assert [each for each in validate_file(files[version]) if each.level == "error"] == []
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_the_schema_itself(files, version):
+    folder = os.environ.get("ISOXML_XSD")
+    if folder is None:
+        pytest.skip("ISOXML_XSD names no folder with the schema files, which are not free")
+    import xmlschema
+
+    (schema,) = sorted(Path(folder).glob(f"ISO11783_TaskFile_V{version}-3.xsd"))
+    xmlschema.XMLSchema(schema).validate(files[version])
+
+
+BREAKS = [
+    ('C="35.07', 'C="95.07', "beyond 90 degrees"),
+    ('A="PFD1"', 'A="F1"', "is not PFD and digits"),
+    (f'C="{NAME}"', f'C="{"x" * 33}"', "33 of 32 characters"),
+    ('VersionMajor="4"', 'VersionMajor="7"', "not 3 or 4"),
+    ('E="CTR1"', 'E="CTR9"', "names nothing"),
+    ('<PNT A="7"', '<PNT A="2"', "an AB line is"),
+    ('D="6384"', 'D="6384.5"', "whole square metres"),
+    ('<PLN A="6"', '<PLN A="66"', "no code of this version"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), BREAKS)
+def test_broken_rules_are_found(files, tmp_path, old, new, message):
+    text = files[4].read_text(encoding="utf-8")
+    assert old in text
+    broken = tmp_path / "TASKDATA.XML"
+    broken.write_text(text.replace(old, new), encoding="utf-8")
+    assert any(message in each.message for each in validate_file(broken))
+
+
+def test_damaged_and_foreign_files(files, tmp_path):
+    broken = tmp_path / "TASKDATA.XML"
+    broken.write_bytes(files[4].read_bytes()[:5000])
+    with pytest.raises(FormatError, match="not well-formed"):
+        read_dataset(broken)
+    root = ET.parse(files[4]).getroot()
+    field = root.find("PFD")
+    root.append(field)
+    ET.ElementTree(root).write(broken)
+    with pytest.raises(FormatError, match="holds 2 fields"):
+        read_dataset(broken)
+
+
+def test_fields_in_a_file_of_their_own(files, tmp_path):
+    root = ET.parse(files[4]).getroot()
+    field = root.find("PFD")
+    root.remove(field)
+    ET.SubElement(root, "XFR", A="PFD00001", B="1")
+    outer = ET.Element("XFC")
+    outer.append(field)
+    ET.ElementTree(root).write(tmp_path / "TASKDATA.XML")
+    with pytest.raises(FormatError, match="lacks PFD00001"):
+        read_dataset(tmp_path)
+    ET.ElementTree(outer).write(tmp_path / "PFD00001.XML")
+    assert len(read_dataset(tmp_path).table("obstacles")) == 3
+
+
+def test_a_boundary_with_two_exterior_rings_is_two_outlines(tmp_path):
+    rings = "".join(
+        '<LSG A="1">'
+        + "".join(
+            f'<PNT A="2" C="{50 + y}" D="{10 + x}"/>'
+            for x, y in [(dx, 0), (dx + 0.001, 0), (dx + 0.001, 0.001), (dx, 0)]
+        )
+        + "</LSG>"
+        for dx in (0, 0.01)
+    )
+    (tmp_path / "TASKDATA.XML").write_text(
+        '<ISO11783_TaskData VersionMajor="4" VersionMinor="3" DataTransferOrigin="1">'
+        f'<PFD A="PFD1" C="Two" D="1"><PLN A="1">{rings}</PLN></PFD></ISO11783_TaskData>'
+    )
+    with pytest.raises(FormatError, match="holds 2 outlines"):
+        read_dataset(tmp_path)
