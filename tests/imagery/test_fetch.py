@@ -264,8 +264,15 @@ def test_holes_are_an_error_or_masked(tmp_path: Path) -> None:
     assert np.array_equal(
         scene.bands, np.where(there, expected(done.grid, level), 0).astype(np.uint8)
     )
+    from rio_cogeo import cog_validate
+
+    assert cog_validate(done.path, strict=True) == (True, [], [])
     with rasterio.open(done.path) as file:
         assert rasterio.enums.MaskFlags.per_dataset in file.mask_flag_enums[0]
+        assert file.overviews(1) == [2, 4]
+        # The overviews' mask is that of the picture.
+        coarse = file.dataset_mask(out_shape=(475, 475)) > 0
+    assert abs(coarse.mean() - there.mean()) < 0.01
 
 
 def test_tiles_that_never_come_whole_are_counted_as_failed(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ COG_OPTIONS: dict[str, Any] = {
     "BLOCKSIZE": 512,
     "COMPRESS": "DEFLATE",
     "PREDICTOR": "YES",
+    "LEVEL": 1,  # a third of the time of the default, for files 3 % larger
     "OVERVIEW_RESAMPLING": "AVERAGE",
     "BIGTIFF": "IF_SAFER",
 }
