@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from geofield.plan import Plan, read_plan
     from geofield.settings import Settings, load_settings
     from geofield.simulate import simulate_field, simulate_fields
-    from geofield.tracks import plan_tracks
+    from geofield.tracks import plan_route, plan_tracks
 
 _HOME = {
     "Field": "model",
@@ -41,6 +41,7 @@ _HOME = {
     "extract_field": "field",
     "load_settings": "settings",
     "plan_field": "pipeline",
+    "plan_route": "tracks",
     "plan_tracks": "tracks",
     "read_plan": "plan",
     "read_scene": "imagery",
@@ -63,6 +64,7 @@ __all__ = [
     "extract_field",
     "load_settings",
     "plan_field",
+    "plan_route",
     "plan_tracks",
     "read_plan",
     "read_scene",

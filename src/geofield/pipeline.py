@@ -158,12 +158,12 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
 
 def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
-    from geofield.tracks import plan_tracks
+    from geofield.tracks import plan_with_settings
 
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     obstacles = None if plan.obstacles is None else complete_review(plan.obstacles, plan.grid)
-    tracks = plan_tracks(
-        field.polygon, obstacles, crs=field.crs, grid=plan.grid, **settings.tracks.model_dump()
+    tracks = plan_with_settings(
+        field.polygon, obstacles, settings.tracks, crs=field.crs, grid=plan.grid
     )
     evidence = dict(plan.evidence)
     if field is not plan.field:

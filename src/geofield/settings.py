@@ -116,6 +116,52 @@ class TrackSettings(Section):
 
     spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
     step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
+    direction: str = Field(
+        "longest_edge",
+        description="Of the tracks: longest_edge, hough, fewest, fewest_turns, or a heading in "
+        "degrees clockwise from true north.",
+    )
+    ab_lonlat: tuple[float, float, float, float] | None = Field(
+        None, description="A-B line to follow: longitude and latitude of A, then of B."
+    )
+    through_lonlat: tuple[float, float] | None = Field(
+        None, description="Longitude and latitude of a place that a track passes through."
+    )
+    offset_m: float | None = Field(
+        None, description="Of the first track from its edge, metres; half the spacing by default."
+    )
+    last_strip: Literal["overrun", "leave", "shift", "spread"] = Field(
+        "overrun",
+        description="The rest at the far side: overrun the border, leave it, shift the last track "
+        "back, or spread all tracks evenly.",
+    )
+    headland_m: NonNegative = Field(
+        0.0, description="Width of the headland along the border, metres."
+    )
+    headland_holes: bool = Field(False, description="A headland around the field's holes too.")
+    min_segment_m: NonNegative = Field(0.0, description="Shorter segments are not driven, metres.")
+    clearance_m: NonNegative = Field(
+        0.0, description="Distance to keep from obstacles, on top of their margin, metres."
+    )
+    straight_tolerance_m: PositiveFloat = Field(
+        1.0, description="How far the vertices of a straight edge may stray, metres."
+    )
+    route: Literal["none", "boustrophedon", "skip", "shortest"] = Field(
+        "none", description="Order of work, with the ways between segments."
+    )
+    skip: int = Field(1, ge=0, description="Tracks left out at each turn of the route skip.")
+    turning_radius_m: PositiveFloat | None = Field(
+        None, description="Of the machine, metres: turns become curves."
+    )
+    curve: Literal["dubins", "reeds_shepp"] = Field(
+        "dubins", description="Turns forwards only, or with reversing."
+    )
+    margin_m: NonNegative = Field(
+        0.0, description="How far turns may reach beyond the border, metres."
+    )
+    start_lonlat: tuple[float, float] | None = Field(
+        None, description="Longitude and latitude of the place where the route begins."
+    )
 
 
 class ExportSettings(Section):

@@ -48,7 +48,7 @@ class TrackStatistics:
     area_ha : float
         The field without its holes; NaN where the outline is not known.
     worked_ha : float
-        Of the field within half a spacing of a segment, as a strip of the segment's length.
+        Of the field within half a spacing of a segment or headland track, as a strip of its length.
     coverage_percent : float
         Worked area, of the field's.
     overlap_percent : float
@@ -117,4 +117,13 @@ def _strips(tracks: Tracks) -> np.ndarray:
     corners = np.stack(
         (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
     )
-    return np.asarray(shapely.polygons(corners))
+    strips = np.asarray(shapely.polygons(corners))
+    if tracks.headland_tracks is None:
+        return strips
+    around = shapely.buffer(
+        tracks.headland_tracks.geometry.to_numpy(),
+        tracks.spacing_m / 2.0,
+        cap_style="flat",
+        join_style="mitre",
+    )
+    return np.concatenate((strips, around))

@@ -1,0 +1,432 @@
+"""Tracks as users ask for them: directions, layout, identity, causes, points, bad input."""
+
+from __future__ import annotations
+
+import pickle
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyproj import Geod, Transformer
+from shapely import Polygon
+
+from geofield import schema
+from geofield.errors import CRSError, CRSMismatchError, ObstacleError, TrackError, TrackWarning
+from geofield.grid import Grid
+from geofield.model.obstacles import circle_polygons
+from geofield.tracks import longest_edge, plan_tracks
+
+CRS = 32633
+X, Y = 500000.0, 5600000.0
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> Polygon:
+    return shapely.box(X + x0, Y + y0, X + x1, Y + y1)
+
+
+def circles(*rows: tuple[float, float, float]) -> gpd.GeoDataFrame:
+    """A table of the schema's obstacles: circles of x, y, radius with a margin of 1 m inside it."""
+    x, y, radius = np.array(rows).T
+    return schema.table(
+        schema.OBSTACLES,
+        {
+            "obstacle_no": np.arange(1, len(rows) + 1),
+            "kind": ["tree"] * len(rows),
+            "status": ["detected"] * len(rows),
+            "radius_m": radius - 1.0,
+            "buffer_m": np.ones(len(rows)),
+        },
+        circle_polygons(X + x, Y + y, radius),
+        CRS,
+    )
+
+
+def test_a_plain_field() -> None:
+    tracks = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0)
+    assert tracks.lines["track_no"].tolist() == list(range(1, 11))
+    assert tracks.segments["length_m"].tolist() == pytest.approx([100.0] * 10, abs=1e-9)
+    assert len(tracks.gaps) == 0
+    y = shapely.get_coordinates(tracks.segments.geometry.to_numpy())[::2, 1] - Y
+    assert sorted(y) == pytest.approx(np.arange(2.0, 40.0, 4.0), abs=1e-6)
+    figures = tracks.statistics
+    assert figures.length_m == pytest.approx(1000.0)
+    assert figures.coverage_percent == pytest.approx(100.0, abs=1e-6)
+    assert figures.overlap_percent == pytest.approx(0.0, abs=1e-6)
+    assert pickle.loads(pickle.dumps(tracks)).segments.equals(tracks.segments)
+
+
+def test_circles_are_cut_as_circles_and_named() -> None:
+    tracks = plan_tracks(box(0, 0, 100, 40), circles((50, 22, 7)), crs=CRS, spacing_m=4.0)
+    gaps = tracks.gaps
+    away = np.abs(shapely.get_coordinates(gaps.geometry.to_numpy())[::2, 1] - Y - 22.0)
+    assert gaps["length_m"].to_numpy() == pytest.approx(2.0 * np.sqrt(49.0 - away**2), abs=1e-6)
+    assert set(gaps["cause"]) == {"obstacle 1"}
+    assert gaps["obstacle_no"].tolist() == [1] * len(gaps)
+    (loss,) = tracks.statistics.losses
+    assert loss.length_m == pytest.approx(gaps["length_m"].sum())
+
+
+@pytest.mark.parametrize("edit", ["moved", "reshaped", "dented"])
+def test_a_persons_drawing_is_the_truth(edit: str) -> None:
+    table = circles((50, 22, 7))
+    circle = table.geometry.iloc[0]
+    drawn = {
+        "moved": shapely.transform(circle, lambda xy: xy + np.array((9.0, 0.0))),
+        "reshaped": box(40, 14, 63, 29),
+        # One corner pulled out by 0.8 m changes the area by half a percent.
+        "dented": Polygon([(X + 57.8, Y + 22.0), *list(circle.exterior.coords)[1:-1]]),
+    }[edit]
+    table = table.set_geometry(gpd.GeoSeries([drawn], crs=CRS))
+    tracks = plan_tracks(box(0, 0, 100, 40), table, crs=CRS, spacing_m=4.0)
+    through = tracks.segments.geometry.to_numpy()
+    assert not shapely.intersects(through, shapely.buffer(drawn, -0.01)).any()
+    assert shapely.distance(shapely.union_all(through), drawn) < 1e-6
+
+
+def test_rejected_obstacles_do_not_count() -> None:
+    table = circles((50, 20, 5), (20, 20, 5))
+    table.loc[0, "status"] = "rejected"
+    tracks = plan_tracks(box(0, 0, 100, 40), table, crs=CRS, spacing_m=4.0)
+    assert set(tracks.gaps["obstacle_no"]) == {2}
+
+
+def test_identity_survives_changes_of_obstacles() -> None:
+    field = shapely.difference(box(0, 0, 120, 80), box(50, 50, 60, 80))
+    before = plan_tracks(field, circles((30, 30, 6), (90, 60, 5)), crs=CRS, spacing_m=3.0)
+    after = plan_tracks(
+        field, circles((30, 30, 6), (90, 60, 5), (70, 20, 4)), crs=CRS, spacing_m=3.0
+    )
+    touched = set(after.gaps.loc[after.gaps["cause"].str.contains("3"), "track_no"])
+    assert touched
+    for name in ("segments", "gaps", "lines"):
+        one, two = getattr(before, name), getattr(after, name)
+        same_one = one[~one["track_no"].isin(touched)].reset_index(drop=True)
+        same_two = two[~two["track_no"].isin(touched)].reset_index(drop=True)
+        assert len(same_one)
+        assert same_one.equals(same_two)
+    # A track that nothing is left of keeps its number free.
+    blocked = plan_tracks(field, [box(-5, 5, 125, 9)], crs=CRS, spacing_m=3.0)
+    assert blocked.blocked_count == 1
+    assert blocked.lines["track_no"].tolist() == sorted({*before.lines["track_no"]} - {3})
+
+
+def test_gaps_name_every_cause() -> None:
+    field = shapely.difference(box(0, 0, 100, 40), box(40, 20, 50, 40))
+    obstacles = [box(48, 24, 55, 30), box(54, 24, 60, 30), box(10, 24, 14, 30)]
+    tracks = plan_tracks(field, obstacles, crs=CRS, spacing_m=4.0, direction=90.0)
+    causes = set(tracks.gaps["cause"])
+    assert "border, obstacles 1, 2" in causes
+    assert "border" in causes
+    assert "obstacle 3" in causes
+    border = tracks.gaps[tracks.gaps["cause"] == "border"]
+    assert border["obstacle_no"].isna().all()
+
+
+def test_tracks_keep_one_number_across_a_notch() -> None:
+    field = shapely.difference(box(0, 0, 100, 40), box(40, 9, 60, 40))
+    tracks = plan_tracks(field, crs=CRS, spacing_m=4.0)
+    assert tracks.lines["track_no"].tolist() == list(range(1, 11))
+    assert tracks.lines["segment_count"].tolist() == [1, 1] + [2] * 8
+    assert set(tracks.gaps["cause"]) == {"border"}
+
+
+# -- direction -----------------------------------------------------------------------------
+
+
+def test_headings_are_true_headings() -> None:
+    """At the edge of a zone grid north and true north differ by more than two degrees."""
+    to_utm = Transformer.from_crs(4326, CRS, always_xy=True)
+    x, y = to_utm.transform(17.9, 52.0)
+    field = shapely.box(x - 200, y - 150, x + 200, y + 150)
+    to_lonlat = Transformer.from_crs(CRS, 4326, always_xy=True)
+    for heading in (0.0, 30.0, 90.0, 135.0):
+        tracks = plan_tracks(field, crs=CRS, spacing_m=10.0, direction=heading)
+        assert tracks.heading_deg == pytest.approx(heading, abs=1e-9)
+        middle = tracks.segments.geometry.iloc[len(tracks.segments) // 2]
+        (a, b) = (to_lonlat.transform(*place) for place in middle.coords)
+        azimuth, _, _ = Geod(ellps="WGS84").inv(*a, *b)
+        apart = (azimuth - heading + 90.0) % 180.0 - 90.0
+        assert abs(apart) < 0.01
+    # The other way round is the same set of lines.
+    assert plan_tracks(
+        field, crs=CRS, spacing_m=10.0, direction=210.0
+    ).heading_deg == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("direction", ["longest_edge", "hough"])
+def test_the_longest_edge_is_found_through_noise(direction: str) -> None:
+    rng = np.random.default_rng(8)
+    along = np.linspace(0.0, 200.0, 60)
+    # The long edge has 60 vertices that stray by 0.3 m; the others have two each.
+    edge = np.column_stack((along, rng.normal(0.0, 0.15, 60).clip(-0.3, 0.3)))
+    ring = np.vstack((edge, [(200.0, 90.0), (110.0, 95.0), (0.0, 80.0)]))
+    turn = np.deg2rad(27.0)
+    ring = ring @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    tracks = plan_tracks(
+        Polygon(ring + np.array((X, Y))), crs=CRS, spacing_m=5.0, direction=direction
+    )
+    assert tracks.heading_deg == pytest.approx(
+        63.0, abs=0.3 if direction == "longest_edge" else 0.8
+    )
+    first = tracks.segments.geometry.iloc[0]
+    # Counted from that edge, half a spacing inside.
+    assert shapely.Point(X, Y).distance(first) == pytest.approx(2.5, abs=1.2)
+
+
+def test_longest_edge_of_simple_shapes() -> None:
+    assert longest_edge(box(0, 0, 100, 40)).length_m == pytest.approx(100.0)
+    many = shapely.segmentize(box(0, 0, 100, 40), 0.5)
+    assert longest_edge(many).length_m == pytest.approx(100.0, abs=1e-6)
+    tiny = box(0, 0, 0.6, 0.4)
+    assert longest_edge(tiny).length_m == pytest.approx(0.6)
+
+
+def test_fewest_is_the_narrow_way() -> None:
+    turn = np.deg2rad(33.0)
+    field = shapely.affinity.rotate(box(0, 0, 200, 60), 33.0)
+    few = plan_tracks(field, crs=CRS, spacing_m=5.0, direction="fewest")
+    assert len(few.lines) == 12
+    for heading in range(0, 180, 7):
+        other = plan_tracks(field, crs=CRS, spacing_m=5.0, direction=float(heading))
+        assert len(other.lines) >= 12
+    assert np.rad2deg(turn) == pytest.approx(33.0)
+
+
+def test_fewest_turns_counts_pieces() -> None:
+    comb = shapely.difference(
+        box(0, 0, 200, 60), shapely.union_all([box(x, 20, x + 10, 60) for x in range(20, 200, 40)])
+    )
+    tracks = plan_tracks(comb, crs=CRS, spacing_m=4.0, direction="fewest")
+    turns = plan_tracks(comb, crs=CRS, spacing_m=4.0, direction="fewest_turns")
+    assert len(tracks.lines) < len(turns.lines)
+    assert len(turns.segments) < len(tracks.segments)
+
+
+def test_ab_lines_are_tracks_themselves() -> None:
+    a, b = (X + 10.0, Y + 7.0), (X + 60.0, Y + 33.0)
+    tracks = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, direction=[a, b])
+    nearest = tracks.segments.distance(shapely.LineString([a, b]).centroid).min()
+    assert nearest < 1e-6
+    same = plan_tracks(
+        box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, direction=shapely.LineString([a, b])
+    )
+    assert same.segments.equals(tracks.segments)
+
+
+# -- layout --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("last_strip", "expected"),
+    [
+        ("overrun", [2.0, 6.0, 10.0, 14.0, 18.0]),
+        ("leave", [2.0, 6.0, 10.0, 14.0]),
+        ("shift", [2.0, 6.0, 10.0, 14.0, 17.0]),
+        ("spread", [1.9, 5.7, 9.5, 13.3, 17.1]),
+    ],
+)
+def test_last_strips(last_strip: str, expected: list[float]) -> None:
+    tracks = plan_tracks(box(0, 0, 100, 19), crs=CRS, spacing_m=4.0, last_strip=last_strip)
+    y = shapely.get_coordinates(tracks.segments.geometry.to_numpy())[::2, 1] - Y
+    y = y if y[0] < y[-1] else 19.0 - y
+    assert y == pytest.approx(expected, abs=1e-6)
+
+
+def test_offset_and_place() -> None:
+    first = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, offset_m=1.0).segments
+    distance = box(0, 0, 100, 40).exterior.distance(first.geometry.iloc[0])
+    assert distance == pytest.approx(0.0)
+    # From the first of two edges of equal length, which runs along the top or the bottom.
+    y = shapely.get_coordinates(first.geometry.iloc[0])[0, 1] - Y
+    assert min(y, 40.0 - y) == pytest.approx(1.0, abs=1e-6)
+    place = shapely.Point(X + 33.0, Y + 11.3)
+    tracks = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, through=place)
+    assert tracks.segments.distance(place).min() < 1e-6
+    border = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, offset_m=0.0)
+    assert len(border.lines) == 11
+
+
+def test_headland() -> None:
+    field = box(0, 0, 100, 60)
+    tracks = plan_tracks(field, circles((3, 30, 2)), crs=CRS, spacing_m=4.0, headland_m=8.0)
+    assert tracks.headland is not None
+    assert tracks.headland_tracks is not None
+    assert tracks.headland["area_ha"].iloc[0] == pytest.approx((6000 - 84 * 44) / 1e4)
+    inner = box(8, 8, 92, 52)
+    assert shapely.covers(shapely.buffer(inner, 1e-6), tracks.segments.geometry.to_numpy()).all()
+    assert len(tracks.lines) == 11
+    rings = tracks.headland_tracks
+    assert rings["pass_no"].tolist() == [1, 2]
+    assert rings["offset_m"].tolist() == [2.0, 6.0]
+    assert rings.geometry.iloc[1].is_closed
+    assert not rings.geometry.iloc[0].is_closed
+    assert rings["length_m"].iloc[1] == pytest.approx(2 * (88 + 48))
+    assert tracks.statistics.coverage_percent > 98.0
+
+
+def test_short_segments_join_the_gap() -> None:
+    obstacles = [box(40, -1, 45, 41), box(47, -1, 52, 41)]
+    tracks = plan_tracks(box(0, 0, 100, 40), obstacles, crs=CRS, spacing_m=4.0, min_segment_m=3.0)
+    assert set(tracks.gaps["cause"]) == {"obstacles 1, 2"}
+    assert tracks.gaps["length_m"].tolist() == pytest.approx([12.0] * 10)
+    assert tracks.lines["gap_count"].tolist() == [1] * 10
+
+
+# -- points --------------------------------------------------------------------------------
+
+
+def test_points_are_numbered_and_have_both_ends() -> None:
+    grid = Grid.web_mercator(lat=50.5, lon=15.0, zoom=18, width_px=400, height_px=400)
+    tracks = plan_tracks(
+        box(0, 0, 60.5, 8), [box(30, -1, 32, 9)], crs=CRS, spacing_m=4.0, step_m=2.0, grid=grid
+    )
+    points = tracks.points
+    assert points["point_no"].tolist() == list(range(1, len(points) + 1))
+    assert len(points) == tracks.lines["point_count"].sum()
+    for (track, segment), group in points.groupby(["track_no", "segment_no"]):
+        row = tracks.segments[
+            (tracks.segments["track_no"] == track) & (tracks.segments["segment_no"] == segment)
+        ].iloc[0]
+        places = shapely.get_coordinates(group.geometry.to_numpy())
+        ends = shapely.get_coordinates(row.geometry)
+        assert places[[0, -1]] == pytest.approx(ends, abs=1e-6)
+        steps = np.hypot(*np.diff(places, axis=0).T)
+        assert steps[:-1] == pytest.approx([2.0] * (len(steps) - 1))
+        assert 0.0 < steps[-1] <= 2.0 + 1e-6
+    lon, lat = grid.to_lonlat(points["x_px"].to_numpy(), points["y_px"].to_numpy())
+    assert lon == pytest.approx(points["lon"].to_numpy(), abs=1e-9)
+    assert lat == pytest.approx(points["lat"].to_numpy(), abs=1e-9)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-10, 110), st.floats(-10, 70), st.floats(1.5, 15)), max_size=8),
+    st.floats(0, 180),
+    st.floats(1.0, 12.0),
+)
+def test_no_point_lies_outside_or_in_a_buffer(
+    rows: list[tuple[float, float, float]], heading: float, spacing_m: float
+) -> None:
+    field = shapely.difference(box(0, 0, 100, 60), box(40, 30, 55, 60))
+    obstacles = circles(*rows) if rows else None
+    tracks = plan_tracks(field, obstacles, crs=CRS, spacing_m=spacing_m, direction=heading)
+    xy = shapely.get_coordinates(tracks.points.geometry.to_numpy())
+    assert shapely.distance(shapely.points(xy), field).max(initial=0.0) < 1e-6
+    for x, y, radius in rows:
+        away = np.hypot(xy[:, 0] - X - x, xy[:, 1] - Y - y)
+        assert away.min(initial=np.inf) > radius - 1e-6
+
+
+# -- what may go wrong ---------------------------------------------------------------------
+
+
+def test_obstacles_in_another_crs_and_of_other_kinds() -> None:
+    field = box(0, 0, 100, 40)
+    reference = plan_tracks(field, circles((50, 22, 7)), crs=CRS, spacing_m=4.0)
+    elsewhere = plan_tracks(field, circles((50, 22, 7)).to_crs(4326), crs=CRS, spacing_m=4.0)
+    assert elsewhere.gaps["length_m"].to_numpy() == pytest.approx(
+        reference.gaps["length_m"].to_numpy(), abs=1e-5
+    )
+    tree = gpd.GeoDataFrame({"radius_m": [7.0]}, geometry=[shapely.Point(X + 50, Y + 22)], crs=CRS)
+    point = plan_tracks(field, tree, crs=CRS, spacing_m=4.0)
+    assert point.gaps["length_m"].to_numpy() == pytest.approx(
+        reference.gaps["length_m"].to_numpy(), abs=1e-6
+    )
+    grown = plan_tracks(
+        field, [shapely.Point(X + 50, Y + 22)], crs=CRS, spacing_m=4.0, clearance_m=7.0
+    )
+    assert grown.gaps["length_m"].sum() == pytest.approx(reference.gaps["length_m"].sum(), abs=1e-4)
+    fence = shapely.LineString([(X + 50, Y - 5), (X + 50, Y + 45)])
+    cut = plan_tracks(field, [fence], crs=CRS, spacing_m=4.0, clearance_m=1.0)
+    assert cut.gaps["length_m"].tolist() == pytest.approx([2.0] * 10)
+    with pytest.raises(TrackError, match="without a radius"):
+        plan_tracks(field, [fence], crs=CRS, spacing_m=4.0)
+    nameless = gpd.GeoDataFrame(geometry=[shapely.box(15.0, 50.5, 15.001, 50.501)])
+    with pytest.raises(CRSMismatchError):
+        plan_tracks(field, nameless, crs=CRS, spacing_m=4.0)
+
+
+def test_an_obstacle_over_the_whole_field() -> None:
+    tracks = plan_tracks(box(0, 0, 100, 40), [box(-5, -5, 105, 45)], crs=CRS, spacing_m=4.0)
+    assert len(tracks.segments) == len(tracks.gaps) == len(tracks.lines) == len(tracks.points) == 0
+    assert tracks.blocked_count == 10
+    assert tracks.statistics.coverage_percent == 0.0
+    assert list(tracks.points.columns[:-1]) == schema.TRACK_POINTS.column_names
+
+
+def test_radii_that_are_not_numbers() -> None:
+    table = circles((50, 20, 5))
+    table["radius_m"] = np.nan
+    tracks = plan_tracks(box(0, 0, 100, 40), table, crs=CRS, spacing_m=4.0)
+    assert len(tracks.gaps) == 2
+    table["radius_m"] = np.inf
+    with pytest.raises(ObstacleError):
+        plan_tracks(box(0, 0, 100, 40), table, crs=CRS, spacing_m=4.0)
+
+
+def test_outlines_are_repaired_or_refused() -> None:
+    field = box(0, 0, 100, 40)
+    flat = plan_tracks(field, crs=CRS, spacing_m=4.0).segments
+    with pytest.warns(TrackWarning, match="Heights"):
+        high = plan_tracks(shapely.force_3d(field, 9.0), crs=CRS, spacing_m=4.0)
+    assert high.segments.equals(flat)
+    assert high.notes
+    corners = [(0, 0), (100, 0), (100, 40), (100, 60), (100, 40), (0, 40)]
+    spike = Polygon(np.array(corners) + np.array((X, Y)))
+    with pytest.warns(TrackWarning, match="repaired"):
+        assert plan_tracks(spike, crs=CRS, spacing_m=4.0).segments["length_m"].sum() == 1000.0
+    single = plan_tracks(shapely.MultiPolygon([field]), crs=CRS, spacing_m=4.0)
+    assert single.segments.equals(flat)
+    bow = Polygon([(X, Y), (X + 100, Y + 40), (X + 100, Y), (X, Y + 40)])
+    for wrong, match in (
+        (bow, "cannot be repaired"),
+        (Polygon(), "empty"),
+        (shapely.MultiPolygon([field, box(200, 0, 300, 40)]), "2 parts"),
+        (shapely.LineString([(0, 0), (1, 1)]), "must be a polygon"),
+        ("POLYGON", "shapely polygon"),
+        (Polygon([(X, Y), (X + 1, np.inf), (X + 2, Y)]), "finite"),
+    ):
+        with pytest.raises(TrackError, match=match):
+            plan_tracks(wrong, crs=CRS, spacing_m=4.0)
+
+
+def test_degrees_are_refused() -> None:
+    degrees = shapely.box(15.0, 50.5, 15.002, 50.501)
+    for crs in (4326, 3857, CRS):
+        with pytest.raises(CRSError):
+            plan_tracks(degrees, crs=crs, spacing_m=4.0)
+
+
+def test_spacing_wider_than_the_field() -> None:
+    with pytest.warns(TrackWarning, match="no track"):
+        tracks = plan_tracks(box(0, 0, 100, 10), crs=CRS, spacing_m=40.0)
+    assert tracks.segments["length_m"].tolist() == pytest.approx([100.0])
+    assert tracks.notes
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"spacing_m": 0.0},
+        {"spacing_m": float("nan")},
+        {"spacing_m": 4.0, "step_m": -1.0},
+        {"spacing_m": 4.0, "direction": "north"},
+        {"spacing_m": 4.0, "direction": float("inf")},
+        {"spacing_m": 4.0, "direction": [(X, Y), (X, Y)]},
+        {"spacing_m": 4.0, "direction": [(X, Y)]},
+        {"spacing_m": 4.0, "last_strip": "bend"},
+        {"spacing_m": 4.0, "headland_m": 50.0},
+        {"spacing_m": 4.0, "headland_m": -1.0},
+        {"spacing_m": 4.0, "offset_m": float("nan")},
+        {"spacing_m": 4.0, "offset_m": 1.0, "through": (X, Y)},
+        {"spacing_m": 4.0, "through": (X, float("nan"))},
+        {"spacing_m": 4.0, "clearance_m": -1.0},
+        {"spacing_m": 4.0, "obstacles": ["tree"]},
+    ],
+)
+def test_bad_settings_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(TrackError):
+        plan_tracks(box(0, 0, 100, 40), crs=CRS, **wrong)  # type: ignore[arg-type]

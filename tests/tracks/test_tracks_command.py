@@ -1,0 +1,100 @@
+"""``geofield tracks`` on any polygons, with obstacles from any file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import geopandas as gpd
+import pyogrio
+import pytest
+import shapely
+from click.testing import CliRunner
+
+from geofield import schema
+from geofield.cli.main import cli
+
+CRS = 32633
+
+
+def outlines(count: int) -> gpd.GeoDataFrame:
+    boxes = [
+        shapely.box(500000 + 300 * k, 5600000, 500200 + 300 * k, 5600080) for k in range(count)
+    ]
+    return gpd.GeoDataFrame(
+        {"name": [f"Field {k + 1}" for k in range(count)]}, geometry=boxes, crs=CRS
+    )
+
+
+def run(*arguments: str | Path) -> dict[str, object]:
+    result = CliRunner().invoke(cli, ["tracks", *map(str, arguments), "--json"])
+    assert result.exception is None, result.output
+    return json.loads(result.stdout)
+
+
+def test_one_polygon_with_trees(tmp_path: Path) -> None:
+    outlines(1).to_crs(4326).to_file(tmp_path / "parcel.geojson", driver="GeoJSON")
+    trees = gpd.GeoDataFrame(
+        {"radius_m": [3.0, 4.0, 5.0]},
+        geometry=gpd.points_from_xy([500050, 500120, 600000], [5600030, 5600050, 5600050]),
+        crs=CRS,
+    )
+    trees.to_file(tmp_path / "trees.shp")
+    out = tmp_path / "plan.gpkg"
+    report = run(
+        tmp_path / "parcel.geojson", "--obstacles", tmp_path / "trees.shp", "--spacing", "5",
+        "--headland", "10", "--route", "skip", "--turning-radius", "4", "-o", out,
+    )  # fmt: skip
+    (row,) = report["fields"]  # type: ignore[misc]
+    assert row["gap_count"] > 0
+    assert {loss["obstacle_no"] for loss in row["losses"]} == {1, 2}
+    assert row["turns_that_do_not_fit"] == 0
+    layers = set(pyogrio.list_layers(out)[:, 0])
+    assert {"field", "obstacles", "tracks", "segments", "gaps", "route", "turns"} <= layers
+    for name in ("segments", "route", "turns", "headland_tracks"):
+        table = pyogrio.read_dataframe(out, layer=name)
+        assert [c for c in table.columns if c != "geometry"] == schema.layer(name).column_names
+        assert len(table)
+
+    # The plan is read back, a person's rejection counts, and another layout replaces this one.
+    edited = pyogrio.read_dataframe(out, layer="obstacles")
+    assert edited["obstacle_no"].tolist() == [1, 2]
+    report = run(out, "--spacing", "8", "--direction", "30", "-o", out)
+    (row,) = report["fields"]  # type: ignore[misc]
+    assert row["heading_deg"] == pytest.approx(30.0)
+    assert "turn_count" not in row
+
+
+def test_many_polygons_make_many_plans(tmp_path: Path) -> None:
+    outlines(3).to_file(tmp_path / "parcels.shp")
+    report = run(tmp_path / "parcels.shp", "--spacing", "8", "-o", tmp_path / "plans")
+    rows = report["fields"]
+    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "Field 3"]  # type: ignore[attr-defined]
+    assert [row["length_m"] for row in rows] == pytest.approx([2000.0] * 3, abs=0.1)  # type: ignore[attr-defined]
+    assert sorted(p.name for p in (tmp_path / "plans").glob("*.gpkg")) == [
+        "Field_1.gpkg", "Field_2.gpkg", "Field_3.gpkg",
+    ]  # fmt: skip
+    again = CliRunner().invoke(
+        cli, ["tracks", str(tmp_path / "parcels.shp"), "-o", str(tmp_path / "one.gpkg")]
+    )
+    assert again.exit_code != 0
+
+
+def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    places = gpd.GeoDataFrame(geometry=[shapely.Point(15, 50)], crs=4326)
+    places.to_file(tmp_path / "places.geojson", driver="GeoJSON")
+    result = CliRunner().invoke(
+        cli, ["tracks", str(tmp_path / "places.geojson"), "-o", str(tmp_path / "x.gpkg")]
+    )
+    assert result.exit_code != 0
+    assert "no polygons" in str(result.exception or result.output)
+    outlines(1).to_file(tmp_path / "bare.shp")
+    (tmp_path / "bare.prj").unlink()
+    result = CliRunner().invoke(
+        cli, ["tracks", str(tmp_path / "bare.shp"), "-o", str(tmp_path / "x.gpkg")]
+    )
+    assert "CRS" in str(result.exception or result.output)
+    report = run(
+        tmp_path / "bare.shp", "--crs", "EPSG:32633", "--spacing", "8", "-o", tmp_path / "x.gpkg"
+    )
+    assert len(report["fields"]) == 1  # type: ignore[arg-type]
