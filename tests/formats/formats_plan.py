@@ -22,7 +22,7 @@ ORIGIN = np.array([X0, Y0])
 NAME = "Großer Acker Ñandú 田"
 
 
-def make_dataset(*, points: bool = True) -> Dataset:
+def make_dataset(*, points: bool = True, optional: bool = False) -> Dataset:
     """A field with a hole, four obstacles and 12 tracks with gaps of both causes."""
     outline = shapely.Polygon(
         [(0, 0), (120, 0), (120, 60), (80, 60), (80, 40), (40, 40), (40, 60), (0, 60)],
@@ -86,6 +86,7 @@ def make_dataset(*, points: bool = True) -> Dataset:
             "tracks": lines,
             "segments": segments,
             "gaps": gaps,
+            **(_optional(outline) if optional else {}),
         },
         UTM,
         NAME,
@@ -98,6 +99,36 @@ def make_dataset(*, points: bool = True) -> Dataset:
         grid,
         points=tracks.point_chunks if points else None,
     )
+
+
+def _optional(outline):
+    """Headland, its track, two steps of a route and a turn that does not fit."""
+    inner = outline.buffer(-4, join_style="mitre")
+    strip = outline.difference(inner)
+    ring = shapely.LineString(outline.buffer(-2, join_style="mitre").exterior.coords)
+    a, b, c = np.array([(10, 2.5), (50, 2.5), (50, 7.5)]) + ORIGIN
+    rows = {
+        "headland": ({"headland_no": [1], "width_m": [4.0], "area_ha": [strip.area / 1e4]}, strip),
+        "headland_tracks": (
+            {"pass_no": [1], "segment_no": [1], "offset_m": [2.0], "length_m": [ring.length]},
+            ring,
+        ),
+        "route": (
+            {"sequence": [1], "kind": ["work"], "direction": ["forward"], "track_no": [1]},
+            shapely.LineString([a, b]),
+        ),
+        "turns": (
+            {"turn_no": [1], "kind": ["dubins"], "direction": ["left"], "fits": ["no"]},
+            shapely.LineString([b, c]),
+        ),
+    }
+    tables = {}
+    for name, (data, shape) in rows.items():
+        layer = schema.layer(name)
+        many = layer.geometry == "MultiPolygon" and shape.geom_type == "Polygon"
+        whole = shapely.multipolygons([shape]) if many else shape
+        tables[name] = schema.table(layer, data, [whole], UTM)
+    return tables
 
 
 def _tracks(outline, obstacles):

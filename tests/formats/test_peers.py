@@ -85,10 +85,11 @@ def test_geopackage_tables(folder):
         assert bytes.fromhex(content.decode()) == (folder / "field.qgz").read_bytes()
         titles = dict(ask("SELECT column_name, title FROM gpkg_data_columns"))
         assert titles["radius_m"] == "Radius"
-        values = [row[0] for row in ask(
-            "SELECT value FROM gpkg_data_column_constraints WHERE constraint_name='status_values'"
-        )]  # fmt: skip
-        assert sorted(values) == sorted(schema.STATUSES)
+        values = ask(
+            "SELECT value FROM gpkg_data_column_constraints "
+            "WHERE constraint_name = 'obstacles_status'"
+        )
+        assert sorted(value for (value,) in values) == sorted(schema.STATUSES)
     connection.close()
 
 

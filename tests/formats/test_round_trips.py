@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+import tempfile
+from pathlib import Path
+
 import pytest
 import shapely
 from formats_compare import assert_same_table
-from formats_plan import NAME
+from formats_plan import NAME, make_dataset
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from geofield.formats import FORMATS, read_dataset, write_dataset
+from geofield.formats import FORMATS, read_dataset, validate_file, write_dataset
+from geofield.formats.names import cut_name
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 
@@ -98,3 +105,55 @@ def test_lossless_formats_keep_the_origin(dataset, tmp_path, name):
     assert back.provenance == dataset.provenance
     assert back.grid == dataset.grid
     assert back.crs == dataset.crs
+
+
+OPTIONAL = ("headland", "headland_tracks", "route", "turns")
+
+
+@pytest.mark.parametrize("name", ["gpkg", "geojson", "geoparquet", "flatgeobuf"])
+def test_layers_that_not_every_plan_has(tmp_path, name):
+    dataset = make_dataset(optional=True)
+    write_dataset(dataset, tmp_path, [name])
+    back = read_dataset(tmp_path / ("field.gpkg" if name == "gpkg" else name))
+    for layer in OPTIONAL:
+        assert_same_table(
+            dataset.table(layer),
+            back.table(layer),
+            precision_m=FORMATS[name].precision_m,
+            number_tolerance=1e-9,
+        )
+
+
+def test_terminals_get_the_headland(tmp_path):
+    dataset = make_dataset(optional=True)
+    write_dataset(dataset, tmp_path, ["isoxml", "shapefile"], options={"profile": "tracklead"})
+    text = (tmp_path / "isoxml" / "TASKDATA" / "TASKDATA.XML").read_text(encoding="utf-8")
+    assert text.count('<PLN A="10"') == 1
+    assert [f.level for f in validate_file(tmp_path / "isoxml") if f.level == "error"] == []
+    names = {path.name for path in (tmp_path / "shapefile").glob("*.shp")}
+    assert names == {
+        f"Grosser_Acker_Nandu_{kind}.shp"
+        for kind in ("boundary", "obstacles", "guidancepath", "headland")
+    }
+
+
+# Characters that XML has no way to write are refused (test_bad_input).
+TEXTS = st.text(
+    st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Cn"]), min_size=1, max_size=40
+)
+
+
+@given(TEXTS, st.sampled_from(["gpkg", "geojson", "shapefile", "isoxml", "kml", "geoparquet"]))
+@settings(max_examples=25, deadline=None)
+def test_any_name_survives(text, name):
+    name_there = text.strip() or "x"
+    dataset = make_dataset(points=False)
+    field = dataset.tables["field"].assign(name=name_there)
+    small = dataclasses.replace(dataset, tables={"field": field}, name=name_there)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        write_dataset(small, out, [name])
+        read = {"gpkg": "field.gpkg", "kml": "field.kml"}
+        back = read_dataset(out / read.get(name, name))
+    expected = cut_name(name_there, 32) if name == "isoxml" else name_there
+    assert back.name == expected

@@ -137,7 +137,7 @@ def _add_columns(connection: sqlite3.Connection, dataset: Dataset) -> None:
     for layer in dataset.layers():
         for column in layer.columns:
             unit = f"Unit (UCUM): {column.unit}" if column.unit else None
-            constraint = f"{column.name}_values" if column.values else None
+            constraint = f"{layer.name}_{column.name}" if column.values else None
             if constraint:
                 lists[constraint] = column.values
             connection.execute(

@@ -18,7 +18,7 @@ _GEOMETRY = {
     "MultiPolygon": "2",
 }
 #: What a person's newly drawn row starts with.
-_DEFAULTS = {"status": "'added'", "kind": "'other'"}
+_DEFAULTS = {("obstacles", "status"): "'added'", ("obstacles", "kind"): "'other'"}
 
 _LAT = "round(y(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
 _LON = "round(x(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
@@ -61,7 +61,7 @@ def style_elements(layer: Layer) -> list[ET.Element]:
             defaults,
             "default",
             field=column.name,
-            expression=_DEFAULTS.get(column.name, "") if column.values else "",
+            expression=_DEFAULTS.get((layer.name, column.name), ""),
             applyOnUpdate="0",
         )
     elements.append(defaults)

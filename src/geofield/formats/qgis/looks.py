@@ -216,17 +216,21 @@ LOOKS: dict[str, Look] = {
     "headland": Look(
         (Rule("Headland", "fill", (fill("255,214,10,40", "255,214,10,200", 0.25),)),),
         max_scale=REGION_SCALE,
-        tip="<b>Headland</b>",
+        tip='<b>Headland</b>, [% round("width_m", 1) %] m wide',
     ),
     "headland_tracks": Look(
         (Rule("Headland track", "line", (line("150,255,170,255", 0.3),)),),
         max_scale=REGION_SCALE,
-        tip="<b>Headland track</b>",
+        tip='<b>Headland pass [% "pass_no" %]</b>: [% round("length_m", 1) %] m',
     ),
     "turns": Look(
-        (Rule("Turn", "line", (line("255,255,255,230", 0.3),)),),
+        (
+            Rule("Turn", "line", (line("255,255,255,230", 0.3),), "\"fits\" = 'yes'"),
+            Rule("Turn that does not fit", "line", (line(_AVOID, 0.5),), "\"fits\" = 'no'"),
+        ),
         max_scale=5000,
-        tip="<b>Turn</b>",
+        tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
+        '[% "kind" %], fits: [% "fits" %]',
     ),
     "route": Look(
         (
@@ -238,7 +242,7 @@ LOOKS: dict[str, Look] = {
         ),
         max_scale=REGION_SCALE,
         visible=False,
-        tip="<b>Route</b>",
+        tip='<b>Route, step [% "sequence" %]</b>: [% "kind" %], after [% round("start_m", 0) %] m',
     ),
 }
 

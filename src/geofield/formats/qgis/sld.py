@@ -9,6 +9,7 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.layer_style import look_of
+from geofield.formats.qgis.looks import DOUBTFUL
 from geofield.formats.qgis.symbols import Rule, SymbolLayer
 from geofield.schema import Layer
 
@@ -61,25 +62,30 @@ def _add_rule(style: ET.Element, rule: Rule) -> None:
             _sub(graphic, "Size", f"{float(each.values['size']) / PIXEL_MM:.1f}")
 
 
-#: The rules of layer `obstacles` by their legend: status, and confidence below or above 0.5.
-_STATUS = {
-    "Confirmed": ("confirmed", None),
-    "Detected": ("detected", "PropertyIsGreaterThanOrEqualTo"),
-    "Detected, doubtful": ("detected", "PropertyIsLessThan"),
-    "Added by a person": ("added", None),
-    "Rejected by a person": ("rejected", None),
+_EQUAL, _LESS, _NOT_LESS = (
+    "PropertyIsEqualTo",
+    "PropertyIsLessThan",
+    "PropertyIsGreaterThanOrEqualTo",
+)
+#: The filters of the rules by their legend: what QGIS's expressions say.
+_CONDITIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
+    "Confirmed": ((_EQUAL, "status", "confirmed"),),
+    "Detected": ((_EQUAL, "status", "detected"), (_NOT_LESS, "confidence", str(DOUBTFUL))),
+    "Detected, doubtful": ((_EQUAL, "status", "detected"), (_LESS, "confidence", str(DOUBTFUL))),
+    "Added by a person": ((_EQUAL, "status", "added"),),
+    "Rejected by a person": ((_EQUAL, "status", "rejected"),),
+    "Turn": ((_EQUAL, "fits", "yes"),),
+    "Turn that does not fit": ((_EQUAL, "fits", "no"),),
 }
 
 
 def _add_filter(element: ET.Element, label: str) -> None:
-    status, comparison = _STATUS[label]
     root = ET.SubElement(element, f"{{{OGC}}}Filter")
-    if comparison is None:
-        _compare(root, "PropertyIsEqualTo", "status", status)
-        return
-    both = ET.SubElement(root, f"{{{OGC}}}And")
-    _compare(both, "PropertyIsEqualTo", "status", status)
-    _compare(both, comparison, "confidence", "0.5")
+    conditions = _CONDITIONS[label]
+    if len(conditions) > 1:
+        root = ET.SubElement(root, f"{{{OGC}}}And")
+    for condition in conditions:
+        _compare(root, *condition)
 
 
 def _compare(parent: ET.Element, kind: str, name: str, value: str) -> None:

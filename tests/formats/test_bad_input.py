@@ -1,0 +1,160 @@
+"""What a format cannot hold is refused before anything is written, with the next step."""
+
+from __future__ import annotations
+
+import dataclasses
+import sqlite3
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from formats_plan import make_dataset
+from hypothesis import given
+from hypothesis import strategies as st
+
+from geofield import schema
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats import FORMATS, read_dataset, shapefile, write_dataset
+from geofield.formats.names import safe_name
+from geofield.formats.shapefile_profiles import PROFILES
+
+pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+
+
+def renamed(dataset, name):
+    field = dataset.tables["field"].assign(name=name)
+    return dataclasses.replace(dataset, name=name, tables={**dataset.tables, "field": field})
+
+
+def test_shapefile_names_fit_and_do_not_collide():
+    for layer in schema.LAYERS:
+        names = list(shapefile.short_names(layer).values())
+        assert all(0 < len(name) <= 10 and name.isascii() for name in names)
+        assert len({name.lower() for name in names}) == len(names)
+
+
+def test_profiles_fit_too(dataset):
+    for profile in PROFILES.values():
+        for _, _, table in profile(dataset, "c", "f"):
+            assert all(len(name) <= 10 for name in table.column_names)
+
+
+def test_more_than_a_shapefile_holds_is_refused_before_writing(dataset, tmp_path, monkeypatch):
+    monkeypatch.setattr(shapefile, "FILE_BYTES", 1000)
+    with pytest.raises(FormatError, match=r"GB; 2 GB fit.*GeoPackage or FlatGeobuf"):
+        write_dataset(dataset, tmp_path / "out", ["shapefile"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_size_estimate_is_not_below_the_file(dataset, tmp_path):
+    written = write_dataset(dataset, tmp_path, ["shapefile"])
+    largest = max(path.stat().st_size for path in written)
+    for bytes_ in (largest - 1,):
+        shapefile_bytes, shapefile.FILE_BYTES = shapefile.FILE_BYTES, bytes_
+        try:
+            with pytest.raises(FormatError, match="GB"):
+                write_dataset(dataset, tmp_path / "again", ["shapefile"])
+        finally:
+            shapefile.FILE_BYTES = shapefile_bytes
+
+
+@pytest.mark.parametrize("name", ["kml", "gpx", "isoxml"])
+def test_characters_that_xml_cannot_carry(dataset, tmp_path, name):
+    with pytest.raises(FormatError, match=r"U\+0007.*Remove it from the name"):
+        write_dataset(renamed(dataset, "bell\x07"), tmp_path, [name])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["isoxml", "agopengps", "shapefile", "gpkg"])
+@pytest.mark.parametrize("field", ["../../etc/passwd", "CON", "a/b\\c:d", "田" * 300, " . "])
+def test_no_name_leads_out_of_the_folder(dataset, tmp_path, name, field):
+    if name == "shapefile" and len(field) > 84:
+        with pytest.raises(FormatError, match="254 fit"):
+            write_dataset(renamed(dataset, field), tmp_path / "out", [name])
+        return
+    for path in write_dataset(renamed(dataset, field), tmp_path / "out", [name]):
+        assert path.resolve().is_relative_to((tmp_path / "out").resolve())
+        assert len(path.name) < 100
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@given(st.text(max_size=60))
+def test_safe_names(text):
+    name = safe_name(text)
+    assert 0 < len(name) <= 41
+    assert name.isascii()
+    assert not set(name) & set('/\\:*?"<>|. ')
+    assert name.upper().rstrip("_") not in ("CON", "NUL") or name.endswith("_")
+
+
+def test_empty_layers_are_written_with_their_columns(dataset, tmp_path):
+    empty = {name: dataset.tables[name].iloc[:0] for name in dataset.tables if name != "field"}
+    bare = dataclasses.replace(
+        dataset, tables={"field": dataset.tables["field"], **empty}, points=None
+    )
+    names = [n for n in FORMATS if not FORMATS[n].writer.startswith("geofield.formats.rdf")]
+    write_dataset(bare, tmp_path, names)
+    info = pyogrio.read_info(tmp_path / "field.gpkg", layer="obstacles")
+    assert list(info["fields"]) == schema.OBSTACLES.column_names
+    assert info["geometry_type"] == "Polygon"
+    back = read_dataset(tmp_path / "field.gpkg")
+    assert len(back.table("obstacles")) == 0
+    assert list(back.table("obstacles").columns[:-1]) == schema.OBSTACLES.column_names
+
+
+@pytest.mark.parametrize("shape", [None, shapely.Polygon()])
+def test_missing_and_empty_geometries_are_refused(dataset, tmp_path, shape):
+    broken = dataset.tables["obstacles"].copy()
+    broken.loc[1, "geometry"] = shape
+    with pytest.raises(FormatError, match="row 2 has"):
+        write_dataset(
+            dataclasses.replace(dataset, tables={**dataset.tables, "obstacles": broken}),
+            tmp_path,
+            ["gpkg"],
+        )
+
+
+def test_rows_without_geometry_made_in_qgis_are_told(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    with sqlite3.connect(tmp_path / "field.gpkg") as connection:
+        # Its condition needs functions that only GDAL and QGIS bring along.
+        connection.execute('DROP TRIGGER "rtree_obstacles_geom_insert"')
+        connection.execute("INSERT INTO obstacles (status) VALUES ('added')")
+    connection.close()
+    with pytest.warns(FormatWarning, match="1 row.*no geometry"):
+        back = read_dataset(tmp_path / "field.gpkg")
+    assert len(back.table("obstacles")) == 4
+
+
+def test_two_formats_for_one_file(dataset, tmp_path):
+    with pytest.raises(FormatError, match="Two of the formats write"):
+        write_dataset(dataset, tmp_path, ["rdf", "rdf-study"])
+
+
+@pytest.mark.parametrize("name", ["isoxml", "agopengps"])
+def test_terminals_need_one_field(dataset, tmp_path, name):
+    none = dataclasses.replace(
+        dataset, tables={**dataset.tables, "field": dataset.tables["field"].iloc[:0]}
+    )
+    with pytest.raises(FormatError, match="one field; there are 0"):
+        write_dataset(none, tmp_path, [name])
+
+
+def test_a_reprojected_layer_is_told(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    path = tmp_path / "field.gpkg"
+    moved = dataset.table("obstacles").to_crs(3857)
+    moved.to_file(path, layer="obstacles", driver="GPKG")
+    with pytest.raises(FormatError, match="no longer in"):
+        read_dataset(path)
+
+
+def test_infinite_coordinates_are_found(tmp_path):
+    from geofield.formats.validation import check_dataset
+
+    dataset = make_dataset()
+    broken = dataset.tables["gaps"].copy()
+    broken.loc[0, "geometry"] = shapely.LineString([(0, 0), (np.inf, 1)])
+    broken_set = dataclasses.replace(dataset, tables={**dataset.tables, "gaps": broken})
+    assert any("not a number" in each.message for each in check_dataset(broken_set))

@@ -1,0 +1,126 @@
+"""The commands: export, import, validate, info, formats."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+from formats_plan import NAME, make_dataset
+
+from geofield.cli.export import export
+from geofield.cli.formats import formats
+from geofield.cli.import_ import import_
+from geofield.cli.info import info
+from geofield.cli.main import cli
+from geofield.cli.validate import validate
+from geofield.errors import FormatError
+from geofield.formats import FORMATS, read_dataset, write_dataset
+
+pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+
+
+@pytest.fixture
+def plan_file(tmp_path):
+    write_dataset(make_dataset(), tmp_path, ["gpkg"])
+    return tmp_path / "field.gpkg"
+
+
+def run(command, *arguments):
+    done = CliRunner().invoke(command, [str(a) for a in arguments], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def test_formats_lists_every_format():
+    listed = json.loads(run(formats, "--json").stdout)
+    assert [each["name"] for each in listed] == list(FORMATS)
+    text = run(formats).stdout
+    for name in FORMATS:
+        assert name in text
+    assert "settings and evidence" in text
+
+
+def test_export_and_import_and_validate(plan_file, tmp_path):
+    out = tmp_path / "export"
+    done = run(export, plan_file, "-f", "isoxml,kml", "-f", "agopengps", "--out", out, "--json")
+    files = json.loads(done.stdout)["files"]
+    assert len(files) == 6
+    for product in ("isoxml", "field.kml", "agopengps/Fields"):
+        run(validate, out / product)
+        back = tmp_path / f"back-{product.replace('/', '-')}.gpkg"
+        found = json.loads(run(import_, out / product, "-o", back, "--json").stdout)
+        assert found["name"] == NAME
+        assert found["rows"]["field"] == 1
+        assert read_dataset(back).name == NAME
+
+
+def test_export_options_reach_the_writer(plan_file, tmp_path):
+    out = tmp_path / "stick"
+    run(
+        export, plan_file, "-f", "shapefile", "--profile", "aggps", "--customer", "Ann Löw",
+        "--farm", "Nord", "--out", out,
+    )  # fmt: skip
+    assert (
+        out / "AgGPS" / "Data" / "Ann_Low" / "Nord" / "Grosser_Acker_Nandu" / "swaths.shp"
+    ).is_file()
+    run(export, plan_file, "-f", "shapefile", "--zip", "--out", tmp_path / "zip")
+    assert [p.name for p in (tmp_path / "zip").iterdir()] == ["field_shapefile.zip"]
+
+
+def test_export_never_replaces_its_input(plan_file):
+    with pytest.raises(FormatError, match="is an input"):
+        run(export, plan_file, "-f", "gpkg", "--out", plan_file.parent, "--overwrite")
+
+
+def test_info(plan_file):
+    facts = json.loads(run(info, plan_file, "--json").stdout)
+    assert facts["name"] == NAME
+    assert facts["rows"]["segments"] == 23
+    assert facts["obstacles"] == {"added": 1, "confirmed": 1, "detected": 1, "rejected": 1}
+    assert facts["origin"]["licence"] == "CC BY 4.0"
+    assert "0.6384" in run(info, plan_file).stdout
+
+
+def test_info_of_a_picture(sample):
+    facts = json.loads(run(info, sample / "field_1.tif", "--json").stdout)
+    assert facts["centre"]["lat"] == pytest.approx(35.075, abs=0.01)
+    assert facts["metres per pixel on the ground"] > 0
+
+
+def test_validate_finds_a_track_through_a_tree(tmp_path):
+    dataset = make_dataset()
+    dataset.tables["obstacles"].loc[2, "status"] = "confirmed"
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    done = CliRunner().invoke(validate, [str(tmp_path / "field.gpkg")])
+    assert done.exit_code == 1
+    assert "runs through obstacle 3" in done.output
+
+
+def test_import_says_when_the_crs_is_in_doubt(tmp_path):
+    import geopandas as gpd
+    import shapely
+
+    box = shapely.box(5e5, 5.5e6, 5e5 + 100, 5.5e6 + 100)
+    gpd.GeoDataFrame(geometry=[box], crs=32633).to_file(tmp_path / "a.shp")
+    (tmp_path / "a.prj").unlink()
+    with pytest.raises(FormatError, match="does not say its CRS"):
+        run(import_, tmp_path / "a.shp", "-o", tmp_path / "a.gpkg")
+    run(
+        import_, tmp_path / "a.shp", "-o", tmp_path / "a.gpkg", "--crs", "EPSG:32633", "--name", "A"
+    )
+    assert read_dataset(tmp_path / "a.gpkg").name == "A"
+
+
+def test_bad_options_are_usage_errors(plan_file, tmp_path):
+    done = CliRunner().invoke(
+        export, [str(plan_file), "-f", "kml", "--out", str(tmp_path), "--option", "x"]
+    )
+    assert done.exit_code == 2
+    assert "NAME=VALUE" in done.output
+
+
+@pytest.mark.parametrize("name", ["export", "import", "validate", "info", "formats"])
+def test_help_ends_with_an_example(name):
+    text = run(cli, name, "--help").output
+    assert f"geofield {name}" in text.partition("Options")[2]
