@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
@@ -9,19 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px
 from geofield.model.scene import Scene
 from geofield.obstacles.accumulator import otsu_threshold
+from geofield.obstacles.auto import WORKING_RESOLUTION_M
 from geofield.obstacles.checks import (
     GREY_LIMIT,
     dark_enough,
+    disc_means,
     first_of_duplicates,
     inside,
     relative_grey_limit,
 )
-from geofield.obstacles.circles import checked_range
+from geofield.obstacles.circles import Circles, checked_range
 from geofield.obstacles.edges import EdgeMethod
 from geofield.obstacles.phase_code import CircleMethod, find_circles
 from geofield.obstacles.strategies import (
@@ -31,6 +34,9 @@ from geofield.obstacles.strategies import (
     ThresholdRange,
     run_strategy,
 )
+from geofield.obstacles.verifier import load_verifier
+from geofield.obstacles.windows import detect_trees, variant_of
+from geofield.obstacles.working import working_factor
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -50,6 +56,7 @@ STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
 GreyCheck = Literal["absolute", "relative"]
 Progress = Callable[[int, int, str], None]
 
+MIN_RADIUS_PX = 2.0
 STUDY_RADIUS_PX = (4.0, 18.0)
 STUDY_SMOOTHED_RADIUS_PX = (4.0, 16.0)
 STUDY_EDGE_THRESHOLD = 0.27
@@ -62,6 +69,8 @@ def detect_obstacles(
     strategy: Strategy = "auto",
     radius_m: tuple[float, float] = (2.0, 9.0),
     buffer_m: float = 1.0,
+    polarity: Literal["dark", "bright", "both"] = "both",
+    min_confidence: float | None = None,
     edge_method: EdgeMethod | None = None,
     threshold: float | None = None,
     threshold_range: ThresholdRange | None = None,
@@ -86,6 +95,11 @@ def detect_obstacles(
         Radii to look for, metres on the ground.
     buffer_m : float
         Safety margin added around each footprint, metres.
+    polarity : {"dark", "bright", "both"}
+        ``auto``: keep only crowns that are darker, or brighter, than their surroundings.
+    min_confidence : float, optional
+        ``auto``: the confidence from which a detection is an obstacle; default the one with
+        the best F1 in cross-validation. Lower it to miss less.
     edge_method : str, optional
         Edge method of the study's strategies; see :func:`run_strategy`.
     threshold : float, optional
@@ -127,14 +141,17 @@ def detect_obstacles(
     radius_px = (low_m / resolution, high_m / resolution)
     grey = filled(scene.grey, scene.valid)
 
-    if strategy in ("auto", "study_listing"):
-        if strategy == "study_listing":
-            radius_px = STUDY_RADIUS_PX
+    confidence: NDArray[np.float64] | None = None
+    if strategy == "auto":
+        circles, confidence = _auto(
+            scene, region, (low_m, high_m), polarity, min_confidence, detection, notes, progress
+        )
+    elif strategy == "study_listing":
         circles = find_circles(
             grey / 255,
-            radius_px,
+            STUDY_RADIUS_PX,
             polarity="dark",
-            sensitivity=sensitivity if strategy == "study_listing" else 0.93,
+            sensitivity=sensitivity,
             method=circle_method,
             warn=False,
         )
@@ -146,7 +163,7 @@ def detect_obstacles(
             grey, region, strategy, radius_px, edge_method, threshold, threshold_range,
             circle_method, sensitivity, min_share, progress,
         )  # fmt: skip
-        circles = result.circles
+        circles, confidence = result.circles, result.share
         detection |= {
             "method": result.method,
             "threshold": result.threshold,
@@ -154,7 +171,9 @@ def detect_obstacles(
         }
     if grey_check is not None:
         limit = _grey_limit(grey_check, grey, region)
-        circles = circles.take(dark_enough(grey, circles, limit, scene.valid))
+        dark = dark_enough(grey, circles, limit, scene.valid)
+        circles = circles.take(dark)
+        confidence = None if confidence is None else confidence[dark]
         detection["grey_limit"] = limit
     order = np.lexsort((circles.x_px, circles.y_px))
     circles = circles.take(order)
@@ -165,11 +184,65 @@ def detect_obstacles(
         circles.radius_px,
         scene.grid,
         buffer_m=buffer_m,
+        confidence=None if confidence is None else confidence[order],
         crs=crs,
     )
     detection["notes"] = notes
     table.attrs["detection"] = detection
     return table
+
+
+def _auto(  # noqa: PLR0917
+    scene: Scene,
+    region: NDArray[np.bool_],
+    radius_m: tuple[float, float],
+    polarity: str,
+    min_confidence: float | None,
+    detection: dict[str, Any],
+    notes: list[str],
+    progress: Progress | None,
+) -> tuple[Circles, NDArray[np.float64]]:
+    """Run the default detector; circles in pixel-index coordinates of the scene."""
+    if polarity not in ("dark", "bright", "both"):
+        raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark, bright or both.")
+    if min_confidence is not None and not 0 <= min_confidence <= 1:
+        raise ObstacleError(f"The confidence {min_confidence:g} is outside 0 to 1.")
+    variant = variant_of(scene)
+    verifier = load_verifier(variant)
+    least = verifier.threshold if min_confidence is None else min_confidence
+    resolution = scene.grid.ground_resolution_m
+    detection |= {"method": f"evidence_{variant}", "threshold": least}
+    if radius_m[0] / resolution < MIN_RADIUS_PX:
+        message = (
+            f"The picture is coarse ({resolution:.2f} m per pixel) for radii from "
+            f"{radius_m[0]:g} m: small trees span too few pixels to be seen."
+        )
+        notes.append(message)
+        warnings.warn(message, ObstacleWarning, stacklevel=3)
+    factor = working_factor(resolution, WORKING_RESOLUTION_M)
+    if factor != 1.0:
+        notes.append(f"Resampled from {resolution:.2f} m to {resolution * factor:.2f} m per pixel.")
+    trees = detect_trees(
+        scene, region, verifier, factor=factor, min_confidence=least, progress=progress
+    )
+    found = Circles(trees.x_px, trees.y_px, trees.radius_px, trees.confidence)
+    # A crown measured a little outside the range is still the tree that was asked for.
+    measured_m = found.radius_px * resolution
+    keep = (measured_m >= 0.6 * radius_m[0]) & (measured_m <= 1.4 * radius_m[1])
+    if polarity != "both":
+        keep &= _is_bright(scene, found) == (polarity == "bright")
+    keep &= inside(found, region)
+    found = found.take(keep)
+    radius = np.clip(found.radius_px * resolution, *radius_m) / resolution
+    return Circles(found.x_px, found.y_px, radius, found.strength), found.strength
+
+
+def _is_bright(scene: Scene, circles: Circles) -> NDArray[np.bool_]:
+    """Return which discs are brighter than the ring around them."""
+    grey = scene.grey
+    inner = disc_means(grey, circles, scene.valid)
+    wide = Circles(circles.x_px, circles.y_px, 1.6 * circles.radius_px, circles.strength)
+    return inner > disc_means(grey, wide, scene.valid)
 
 
 def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:

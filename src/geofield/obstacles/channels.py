@@ -1,0 +1,181 @@
+"""What the picture says about trees: brightness, greenness, texture, and evidence from both.
+
+All pictures here are float32 (rows, cols) on the working grid (about 0.6 m per pixel).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+Image = NDArray[np.float32]
+Variant = Literal["nir", "rgb", "grey"]
+VARIANTS: tuple[Variant, ...] = ("nir", "rgb", "grey")
+
+_Z_LIMIT = 4.0
+_MIN_MAD_DARK = 6.0
+_MIN_MAD_GREEN = 4.0
+_COARSE = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Channels:
+    """The pictures that candidates and features are taken from.
+
+    Attributes
+    ----------
+    variant : {"nir", "rgb", "grey"}
+        Which bands there were.
+    maps : dict of str to float32 array
+        ``luma`` (0..255), ``texture`` (local deviation of luma); with colour ``exg``
+        (255 (2G - R - B) / (R + G + B + 30)), ``rg`` and ``gb`` (normalised differences);
+        with near infrared ``ndvi`` (255 (N - R) / (N + R + 30)) and ``nir``.
+    dark, green : float32 arrays
+        Robust z-scores against the local background, clipped to +-4: darkness, and
+        greenness by the best index there is (zero without colour).
+    evidence : float32 array
+        (dark + green) / sqrt 2; darkness alone without colour.
+    """
+
+    variant: Variant
+    maps: dict[str, Image]
+    dark: Image
+    green: Image
+    evidence: Image
+
+    @property
+    def index(self) -> Image | None:
+        """The best greenness index there is, None for a grey picture."""
+        return self.maps.get("ndvi", self.maps.get("exg"))
+
+
+def channels(
+    luma: Image,
+    rgb: tuple[Image, Image, Image] | None,
+    nir: Image | None,
+    *,
+    window_px: float,
+) -> Channels:
+    """Compute the channels of a picture.
+
+    Parameters
+    ----------
+    luma : float32 array, 0..255
+    rgb : three float32 arrays, 0..255, or None
+    nir : float32 array, 0..255, or None
+        Only used together with ``rgb``.
+    window_px : float
+        Side of the window whose median is the background: about five of the largest radii.
+    """
+    maps: dict[str, Image] = {"luma": luma, "texture": _texture(luma)}
+    dark = -background_score(luma, window_px, _MIN_MAD_DARK)
+    if rgb is None:
+        return Channels("grey", maps, dark, np.zeros_like(dark), dark)
+    red, green_band, blue = rgb
+    maps["exg"] = 255 * (2 * green_band - red - blue) / (red + green_band + blue + 30)
+    maps["rg"] = 255 * (green_band - red) / (green_band + red + 30)
+    maps["gb"] = 255 * (green_band - blue) / (green_band + blue + 30)
+    variant: Variant = "rgb"
+    if nir is not None:
+        maps["ndvi"] = 255 * (nir - red) / (nir + red + 30)
+        maps["nir"] = nir
+        variant = "nir"
+    green = background_score(maps["ndvi" if nir is not None else "exg"], window_px, _MIN_MAD_GREEN)
+    evidence = (dark + green) / np.float32(np.sqrt(2.0))
+    return Channels(variant, maps, dark, green, evidence)
+
+
+def background_score(image: Image, window_px: float, min_mad: float) -> Image:
+    """Return (image - local median) / max(local deviation, min_mad), clipped to +-4.
+
+    The medians run on a picture eight times coarser: the background has no detail to lose.
+    Both are local, so that a part of a picture gives the same as the whole.
+    """
+    coarse = shrink(image, _COARSE)
+    size = max(round(window_px / _COARSE) | 1, 3)
+    background = enlarge(ndimage.median_filter(coarse, size=size), _COARSE, image.shape)
+    difference = image - background
+    spread = ndimage.median_filter(shrink(np.abs(difference), _COARSE), size=size)
+    # The mean absolute deviation of a normal distribution is 0.8 of the standard one.
+    spread = enlarge(1.25 * spread, _COARSE, image.shape)
+    score = difference / np.maximum(spread, np.float32(min_mad))
+    return np.clip(score, -_Z_LIMIT, _Z_LIMIT)
+
+
+def shrink(image: Image, factor: int) -> Image:
+    """Return block means, the last row and column repeated to fill the last blocks."""
+    if factor == 1:
+        return image
+    rows, cols = image.shape
+    pad = ((0, -rows % factor), (0, -cols % factor))
+    padded = np.pad(image, pad, mode="edge") if any(p[1] for p in pad) else image
+    shape = (padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
+    return cast("Image", padded.reshape(shape).mean(axis=(1, 3), dtype=np.float32))
+
+
+def enlarge(image: Image, factor: int, shape: tuple[int, ...]) -> Image:
+    """Return a shrunk picture at its old size, bilinear between block centres."""
+    rows = _bilinear(image.shape[0], factor, shape[0])
+    cols = _bilinear(image.shape[1], factor, shape[1])
+    tall = image[rows[0]] * (1 - rows[2])[:, None] + image[rows[1]] * rows[2][:, None]
+    return cast(
+        "Image", tall[:, cols[0]] * (1 - cols[2])[None, :] + tall[:, cols[1]] * cols[2][None, :]
+    )
+
+
+def _bilinear(
+    count: int, factor: int, size: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
+    position = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0, count - 1)
+    low = np.floor(position).astype(np.intp)
+    high = np.minimum(low + 1, count - 1)
+    return low, high, (position - low).astype(np.float32)
+
+
+def gaussian(image: Image, sigma_px: float) -> Image:
+    """Smooth by a Gaussian; wide ones on a coarser picture, at a fraction of the time."""
+    factor = 1 if sigma_px < 3 else 2 if sigma_px < 6 else 4
+    if factor == 1:
+        return _gaussian(image, sigma_px)
+    # Block means have a variance of their own, (f^2 - 1) / 12 of a pixel squared.
+    rest = np.sqrt(max(sigma_px**2 - (factor**2 - 1) / 6, 0.25)) / factor
+    return enlarge(_gaussian(shrink(image, factor), float(rest)), factor, image.shape)
+
+
+def sample_gaussian(
+    image: Image, sigma_px: float, rows: NDArray[np.intp], cols: NDArray[np.intp]
+) -> NDArray[np.float32]:
+    """Return a smoothed picture at some pixels, without enlarging the coarse picture first."""
+    factor = 1 if sigma_px < 2 else 2 if sigma_px < 6 else 4
+    if factor == 1:
+        return _gaussian(image, sigma_px)[rows, cols]
+    rest = np.sqrt(max(sigma_px**2 - (factor**2 - 1) / 6, 0.25)) / factor
+    coarse = _gaussian(shrink(image, factor), float(rest))
+    y = np.clip((rows + 0.5) / factor - 0.5, 0, coarse.shape[0] - 1)
+    x = np.clip((cols + 0.5) / factor - 0.5, 0, coarse.shape[1] - 1)
+    return bilinear(coarse, x, y)
+
+
+def bilinear(image: Image, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Sample a picture between its pixels; positions must lie within their centres."""
+    x0, y0 = x.astype(np.intp), y.astype(np.intp)
+    x1, y1 = np.minimum(x0 + 1, image.shape[1] - 1), np.minimum(y0 + 1, image.shape[0] - 1)
+    fx, fy = (x - x0).astype(np.float32), (y - y0).astype(np.float32)
+    top = image[y0, x0] * (1 - fx) + image[y0, x1] * fx
+    bottom = image[y1, x0] * (1 - fx) + image[y1, x1] * fx
+    return cast("NDArray[np.float32]", top * (1 - fy) + bottom * fy)
+
+
+def _gaussian(image: Image, sigma_px: float) -> Image:
+    return cast("Image", ndimage.gaussian_filter(image, sigma_px, mode="nearest", truncate=3.0))
+
+
+def _texture(luma: Image) -> Image:
+    """Return the standard deviation of luma in 5 x 5 pixels."""
+    mean = ndimage.uniform_filter(luma, 5, mode="nearest")
+    square = ndimage.uniform_filter(luma * luma, 5, mode="nearest")
+    return cast("Image", np.sqrt(np.maximum(square - mean * mean, 0)))
