@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from geofield.errors import GeofieldError, GeofieldWarning
+    from geofield.evaluation import evaluate
     from geofield.field import extract_field
     from geofield.grid import Grid
     from geofield.imagery import read_scene, write_scene
@@ -38,6 +39,7 @@ _HOME = {
     "Settings": "settings",
     "Tracks": "model",
     "detect_obstacles": "obstacles",
+    "evaluate": "evaluation",
     "extract_field": "field",
     "load_settings": "settings",
     "plan_field": "pipeline",
@@ -61,6 +63,7 @@ __all__ = [
     "Tracks",
     "__version__",
     "detect_obstacles",
+    "evaluate",
     "extract_field",
     "load_settings",
     "plan_field",

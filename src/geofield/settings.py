@@ -103,12 +103,38 @@ class ObstacleSettings(Section):
 
     strategy: str = Field(
         "auto",
-        description="How obstacles are found: auto, single, t_range, max_of_all, dlc, consensus.",
+        description="How obstacles are found: auto, single, t_range, max_of_all, dlc, consensus, "
+        "study_text, study_listing, study_dlc.",
     )
     radius_m: tuple[PositiveFloat, PositiveFloat] = Field(
         (2.0, 9.0), description="Smallest and largest crown radius, metres."
     )
     buffer_m: NonNegative = Field(1.0, description="Safety margin around each obstacle, metres.")
+    min_confidence: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="auto: confidence from which a detection is an obstacle; lower it to miss "
+        "less. The fitted one by default.",
+    )
+    polarity: Literal["dark", "bright", "both"] = Field(
+        "both", description="auto: crowns darker or brighter than what is around them."
+    )
+    others: bool = Field(
+        True, description="auto: find what is not round, too: ponds, huts, clumps."
+    )
+    edge_method: Literal["sobel", "prewitt", "roberts", "canny"] | None = Field(
+        None, description="The study's strategies: edge method."
+    )
+    threshold: NonNegative | None = Field(None, description="single: edge threshold.")
+    circle_method: Literal["phase_code", "two_stage"] = Field(
+        "phase_code", description="The study's strategies: circle transform."
+    )
+    sensitivity: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.85, description="The study's strategies: of the circle transform."
+    )
+    grey_check: Literal["none", "absolute", "relative"] = Field(
+        "none",
+        description="Drop discs brighter than 127.37 (absolute) or than the field (relative).",
+    )
 
 
 class TrackSettings(Section):

@@ -30,6 +30,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "formats": ("geofield.cli.formats:formats", "List the formats and what each carries."),
     "sources": ("geofield.cli.sources:sources", "List imagery sources and their terms."),
     "cache": ("geofield.cli.cache:cache", "Look at the tile cache, or clear it."),
+    "evaluate": ("geofield.cli.evaluate:evaluate", "Compare obstacles with a truth."),
     "doctor": ("geofield.cli.doctor:doctor", "Show versions and what looks wrong."),
     "simulate": ("geofield.cli.simulate:simulate", "Make synthetic fields with known truth."),
 }

@@ -7,15 +7,17 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from geofield import schema
 from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.model.field import Field
-from geofield.model.obstacles import from_circles_px
+from geofield.model.obstacles import from_circles_px, from_polygons
 from geofield.model.scene import Scene
 from geofield.obstacles.accumulator import otsu_threshold
-from geofield.obstacles.auto import WORKING_RESOLUTION_M
+from geofield.obstacles.auto import WORKING_RESOLUTION_M, picture_channels
 from geofield.obstacles.checks import (
     GREY_LIMIT,
     dark_enough,
@@ -27,6 +29,7 @@ from geofield.obstacles.checks import (
 from geofield.obstacles.circles import Circles, checked_range
 from geofield.obstacles.edges import EdgeMethod
 from geofield.obstacles.phase_code import CircleMethod, find_circles
+from geofield.obstacles.shapes import footprints
 from geofield.obstacles.strategies import (
     EdgeCircles,
     StrategyResult,
@@ -36,7 +39,7 @@ from geofield.obstacles.strategies import (
 )
 from geofield.obstacles.verifier import load_verifier
 from geofield.obstacles.windows import detect_trees, variant_of
-from geofield.obstacles.working import working_factor
+from geofield.obstacles.working import working_factor, working_picture
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -53,7 +56,7 @@ Strategy = Literal[
     "study_dlc",
 ]
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
-GreyCheck = Literal["absolute", "relative"]
+GreyCheck = Literal["none", "absolute", "relative"]
 Progress = Callable[[int, int, str], None]
 
 MIN_RADIUS_PX = 2.0
@@ -71,6 +74,7 @@ def detect_obstacles(
     buffer_m: float = 1.0,
     polarity: Literal["dark", "bright", "both"] = "both",
     min_confidence: float | None = None,
+    others: bool = True,
     edge_method: EdgeMethod | None = None,
     threshold: float | None = None,
     threshold_range: ThresholdRange | None = None,
@@ -100,6 +104,9 @@ def detect_obstacles(
     min_confidence : float, optional
         ``auto``: the confidence from which a detection is an obstacle; default the one with
         the best F1 in cross-validation. Lower it to miss less.
+    others : bool
+        ``auto`` in a field: also return what is in the field, not field and not round, as
+        polygons of kind `other`.
     edge_method : str, optional
         Edge method of the study's strategies; see :func:`run_strategy`.
     threshold : float, optional
@@ -109,7 +116,7 @@ def detect_obstacles(
     circle_method : {"phase_code", "two_stage"}
     sensitivity : float
         Of the circle search, 0..1.
-    grey_check : {"absolute", "relative"} or float, optional
+    grey_check : {"none", "absolute", "relative"} or float, optional
         Drop discs brighter than 127.37, than the field's mean, or than a grey level.
     min_share : float
         ``consensus``: the share of the settings that must see a circle.
@@ -142,10 +149,13 @@ def detect_obstacles(
     grey = filled(scene.grey, scene.valid)
 
     confidence: NDArray[np.float64] | None = None
+    shapes: list[shapely.Polygon] = []
     if strategy == "auto":
         circles, confidence = _auto(
             scene, region, (low_m, high_m), polarity, min_confidence, detection, notes, progress
         )
+        if field is not None and others:
+            shapes = _others(scene, field, circles)
     elif strategy == "study_listing":
         circles = find_circles(
             grey / 255,
@@ -169,7 +179,7 @@ def detect_obstacles(
             "threshold": result.threshold,
             "counts": {name: [list(row) for row in rows] for name, rows in result.counts.items()},
         }
-    if grey_check is not None:
+    if grey_check is not None and grey_check != "none":
         limit = _grey_limit(grey_check, grey, region)
         dark = dark_enough(grey, circles, limit, scene.valid)
         circles = circles.take(dark)
@@ -187,12 +197,14 @@ def detect_obstacles(
         confidence=None if confidence is None else confidence[order],
         crs=crs,
     )
+    if shapes:
+        table = _with_shapes(table, shapes, scene, buffer_m)
     detection["notes"] = notes
     table.attrs["detection"] = detection
     return table
 
 
-def _auto(  # noqa: PLR0917
+def _auto(
     scene: Scene,
     region: NDArray[np.bool_],
     radius_m: tuple[float, float],
@@ -235,6 +247,49 @@ def _auto(  # noqa: PLR0917
     found = found.take(keep)
     radius = np.clip(found.radius_px * resolution, *radius_m) / resolution
     return Circles(found.x_px, found.y_px, radius, found.strength), found.strength
+
+
+def _others(scene: Scene, field: Field, circles: Circles) -> list[shapely.Polygon]:
+    """Return footprints of what is not round, pixel coordinates with the corner as origin."""
+    outline = field.polygon_px(scene.grid).bounds
+    margin = 8
+    # Only the field counts here; a crop of it keeps memory bounded on large pictures.
+    c0, r0 = (max(int(v) - margin, 0) for v in outline[:2])
+    width = min(int(outline[2]) + margin, scene.grid.width_px) - c0
+    height = min(int(outline[3]) + margin, scene.grid.height_px) - r0
+    if width < 1 or height < 1:
+        return []
+    part = scene.crop(c0, r0, width, height)
+    resolution = scene.grid.ground_resolution_m
+    factor = working_factor(resolution, WORKING_RESOLUTION_M)
+    picture = working_picture(part, search_region(part, field), factor)
+    found = picture_channels(picture.luma, picture.rgb, picture.nir)
+    near = Circles(
+        (circles.x_px - c0 + 0.5) / factor - 0.5,
+        (circles.y_px - r0 + 0.5) / factor - 0.5,
+        circles.radius_px / factor,
+        circles.strength,
+    )
+    polygons = footprints(found, picture.region, near, resolution * factor)
+    return [shapely.transform(p, lambda c: c * factor + np.array([c0, r0])) for p in polygons]
+
+
+def _with_shapes(
+    table: gpd.GeoDataFrame, shapes: list[shapely.Polygon], scene: Scene, buffer_m: float
+) -> gpd.GeoDataFrame:
+    """Append polygons of kind `other`, numbered on in the order of their rows."""
+    import pandas as pd
+
+    crs = table.crs
+
+    def to_metric(c: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack(scene.grid.to_crs(c[:, 0], c[:, 1], crs))
+
+    order = sorted(shapes, key=lambda shape: (shape.centroid.y, shape.centroid.x))
+    metric = shapely.transform(np.asarray(order, dtype=object), to_metric)
+    rows = from_polygons(metric, crs, buffer_m=buffer_m, grid=scene.grid, first_no=len(table) + 1)
+    joined = pd.concat([table, rows]) if len(table) else rows
+    return schema.conform(schema.OBSTACLES, joined)
 
 
 def _is_bright(scene: Scene, circles: Circles) -> NDArray[np.bool_]:

@@ -310,7 +310,7 @@ def _figures(hits: float, detected: float, truth: float) -> tuple[float, float, 
     return float(precision), float(recall), float(f1)
 
 
-def _intervals(  # noqa: PLR0917
+def _intervals(
     hits: NDArray[np.int64],
     detected: NDArray[np.int64],
     truth: NDArray[np.int64],

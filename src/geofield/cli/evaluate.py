@@ -1,0 +1,77 @@
+"""``geofield evaluate``: detected obstacles against a truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from geofield.cli.console import echo_json, say
+
+
+@click.command(
+    epilog="""\b
+Example (on the project's own sample):
+  geofield evaluate detected.gpkg truth.gpkg --distance 6 --picture hits.png --scene scene.tif
+"""
+)
+@click.argument("detected", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("truth", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--distance",
+    "distance_m",
+    type=click.FloatRange(min=0, min_open=True),
+    default=6.0,
+    show_default=True,
+    help="Distance between centres within which a detection is a hit, metres.",
+)
+@click.option("--layer", default="obstacles", show_default=True, help="Layer of DETECTED.")
+@click.option("--truth-layer", help="Layer of TRUTH; its first one when not given.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option(
+    "--picture",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="PNG to write: hits, misses and false detections.",
+)
+@click.option(
+    "--scene",
+    "scene_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Picture to draw them on.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
+def evaluate(
+    detected: Path,
+    truth: Path,
+    distance_m: float,
+    layer: str,
+    truth_layer: str | None,
+    seed: int,
+    picture: Path | None,
+    scene_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.
+
+    Matching is one to one. Prints precision, recall, F1 and the error of the radii with
+    95 % intervals.
+    """
+    from geofield.evaluation import draw_matches, read_obstacles
+    from geofield.evaluation import evaluate as compare
+
+    found = read_obstacles(detected, layer, metric=True)
+    true = read_obstacles(truth, truth_layer)
+    result = compare(found, true, distance_m=distance_m, seed=seed)
+    score = result.pooled
+    if picture is not None:
+        draw_matches(found, true, result, picture, scene_file)
+        say(f"Drawn to {picture}: hits green, missed blue, false red.")
+    if as_json:
+        echo_json({"distance_m": distance_m, **score.as_dict()})
+        return
+    say(f"{score.hits} hits of {score.detected} detected and {score.truth} true obstacles")
+    for name in ("precision", "recall", "f1", "radius_bias"):
+        low, high = score.interval.get(name, (float("nan"), float("nan")))
+        unit = " m" if name == "radius_bias" else ""
+        label = name.replace("_", " ")
+        say(f"  {label:12s} {getattr(score, name):6.3f}{unit}  ({low:.3f} to {high:.3f})")

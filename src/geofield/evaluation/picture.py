@@ -1,0 +1,172 @@
+"""Reading and drawing for an evaluation: hits, misses and false detections on the picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from geofield.errors import CRSError, ObstacleError
+from geofield.evaluation.matching import Evaluation, reliability
+from geofield.model.scene import Scene
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+HIT, MISSED, FALSE = (40, 200, 90), (60, 150, 255), (235, 60, 50)
+_SIDE_PX = 1200
+
+
+def read_obstacles(
+    path: Path, layer: str | None = None, *, metric: bool = False
+) -> gpd.GeoDataFrame:
+    """Read a table of obstacles or of a truth from any vector file.
+
+    Parameters
+    ----------
+    path : path
+    layer : str, optional
+        The first layer when not given or when the file has one layer only.
+    metric : bool
+        Reproject to the UTM zone where the file is in degrees.
+
+    Raises
+    ------
+    ObstacleError
+        When the file cannot be read or has no such layer.
+    CRSError
+        When it has no CRS.
+    """
+    import geopandas as gpd
+    import pyogrio
+
+    from geofield.crs import is_metric
+
+    try:
+        layers = [str(name) for name in pyogrio.list_layers(path)[:, 0]]
+        if layer is not None and layer not in layers:
+            if len(layers) > 1:
+                raise ObstacleError(
+                    f"{path.name} has no layer {layer!r}.", hint=f"Layers: {', '.join(layers)}."
+                )
+            layer = None
+        frame = gpd.read_file(path, layer=layer or layers[0])
+    except pyogrio.errors.DataSourceError as error:
+        raise ObstacleError(f"{path.name} cannot be read: {error}.") from None
+    if frame.crs is None:
+        raise CRSError(f"{path.name} has no CRS.", hint="Set it in QGIS: Set layer CRS.")
+    if metric and len(frame) and not is_metric(frame.crs):
+        frame = frame.to_crs(frame.estimate_utm_crs())
+    return frame
+
+
+def draw_matches(
+    detected: gpd.GeoDataFrame,
+    truth: gpd.GeoDataFrame,
+    result: Evaluation,
+    path: Path,
+    scene: Scene | Path | None = None,
+) -> None:
+    """Write a PNG of hits (green), misses (blue) and false detections (red).
+
+    Parameters
+    ----------
+    detected, truth : GeoDataFrame
+        What was evaluated, one picture without an area.
+    result : Evaluation
+    path : path
+        PNG to write.
+    scene : Scene or path, optional
+        Picture to draw on; white ground when not given.
+    """
+    from PIL import Image, ImageDraw
+
+    if isinstance(scene, Path):
+        from geofield.imagery import read_scene
+
+        scene = read_scene(scene)
+    if "status" in detected.columns:
+        detected = detected[detected["status"] != "rejected"]
+    match = next(iter(result.matches.values()))
+    crs = detected.crs
+    truth = truth.to_crs(crs)
+    if scene is not None:
+        scale = max(min(_SIDE_PX / max(scene.grid.shape), 4.0), 0.05)
+        size = (round(scene.grid.width_px * scale), round(scene.grid.height_px * scale))
+        canvas = Image.fromarray(scene.rgb).resize(size)
+        grid = scene.grid
+
+        def place(c: NDArray[np.float64]) -> NDArray[np.float64]:
+            x, y = grid.from_crs(c[:, 0], c[:, 1], crs)
+            return np.column_stack([x, y]).astype(float) * scale
+    else:
+        west, south, east, north = shapely.total_bounds(
+            np.concatenate([detected.geometry.to_numpy(), truth.geometry.to_numpy()])
+        )
+        extent = max(east - west, north - south, 10.0) * 1.1
+        centre = np.array([(west + east) / 2, (south + north) / 2])
+        canvas = Image.new("RGB", (_SIDE_PX, _SIDE_PX), "white")
+
+        def place(c: NDArray[np.float64]) -> NDArray[np.float64]:
+            turned = (c - centre) * np.array([1.0, -1.0])
+            return np.asarray(turned * (_SIDE_PX / extent) + _SIDE_PX / 2, dtype=np.float64)
+
+    pen = ImageDraw.Draw(canvas)
+    hit = np.isin(np.arange(match.detected_count), match.detected_index)
+    for shape, good in zip(detected.geometry.to_numpy(), hit, strict=True):
+        for part in shapely.get_parts(shape):
+            ring = place(shapely.get_coordinates(part))
+            pen.line([tuple(p) for p in ring], fill=HIT if good else FALSE, width=2)
+    met = np.isin(np.arange(match.truth_count), match.truth_index)
+    centres = place(shapely.get_coordinates(shapely.centroid(truth.geometry.to_numpy())))
+    for (x, y), good in zip(centres, met, strict=True):
+        pen.rectangle([x - 3, y - 3, x + 3, y + 3], fill=HIT if good else MISSED)
+    canvas.save(path)
+
+
+def draw_reliability(confidence: ArrayLike, hit: ArrayLike, path: Path) -> float:
+    """Write a PNG of how far confidences keep their word; return the calibration error.
+
+    Parameters
+    ----------
+    confidence : array (n,)
+        0 to 1.
+    hit : bool array (n,)
+    path : path
+        PNG to write.
+
+    Returns
+    -------
+    float
+        Expected calibration error over ten bins.
+    """
+    from PIL import Image, ImageDraw
+
+    mean, share, count, error = reliability(confidence, hit)
+    side, edge = 480, 50
+    canvas = Image.new("RGB", (side + 2 * edge, side + 2 * edge), "white")
+    pen = ImageDraw.Draw(canvas)
+
+    def at(p: float, s: float) -> tuple[float, float]:
+        return edge + p * side, edge + (1 - s) * side
+
+    pen.rectangle([*at(0, 1), *at(1, 0)], outline="black")
+    pen.line([at(0, 0), at(1, 1)], fill=(170, 170, 170), width=2)
+    most = max(int(count.max()), 1)
+    points = []
+    for k, (m, s, n) in enumerate(zip(mean, share, count, strict=True)):
+        if not n:
+            continue
+        # Grey bars: how many detections there are at this confidence.
+        pen.rectangle([*at(k / 10 + 0.01, 0.2 * n / most), *at(k / 10 + 0.09, 0)], fill="lightgray")
+        points.append(at(float(m), float(s)))
+    pen.line(points, fill=(30, 90, 200), width=3)
+    for x, y in points:
+        pen.ellipse([x - 5, y - 5, x + 5, y + 5], fill=(30, 90, 200))
+    pen.text((edge, side + edge + 12), "confidence, 0 to 1", fill="black")
+    pen.text((edge, 14), f"share of hits, 0 to 1; calibration error {error:.3f}", fill="black")
+    canvas.save(path)
+    return error

@@ -1,0 +1,213 @@
+"""The default detector on simulated fields with known truth, and on bad input."""
+
+import numpy as np
+import pytest
+import shapely
+from affine import Affine
+
+import geofield as gf
+from geofield import schema
+from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.model.scene import Scene
+from geofield.obstacles.detect import STRATEGIES
+from geofield.obstacles.features import FeatureTable
+from geofield.obstacles.forest import Forest
+from geofield.obstacles.verifier import load_verifier, strongest
+from geofield.simulate import SimulationSettings, simulate_field
+
+
+@pytest.fixture(scope="module")
+def detected(simulated):
+    return gf.detect_obstacles(simulated.scene, simulated.field)
+
+
+def without(scene, *roles):
+    """The same picture with fewer bands."""
+    keep = [i for i, role in enumerate(scene.roles) if role not in roles]
+    return Scene(scene.grid, scene.bands[keep], tuple(scene.roles[i] for i in keep), scene.valid)
+
+
+def test_the_trees_of_a_field_are_found(simulated, detected):
+    score = gf.evaluate(detected, simulated.obstacles, distance_m=3.6).pooled
+    assert score.f1 > 0.9
+    assert abs(score.radius_bias) < 0.3
+
+
+def test_the_table_is_complete(simulated, detected):
+    assert list(detected.columns) == [*schema.OBSTACLES.column_names, "geometry"]
+    assert detected.crs == simulated.field.crs
+    trees = detected[detected["kind"] == "tree"]
+    assert detected["obstacle_no"].tolist() == list(range(1, len(detected) + 1))
+    assert trees["confidence"].between(0, 1).all()
+    assert trees["radius_m"].between(2, 9).all()
+    assert set(detected["status"]) == {"detected"}
+    order = trees[["y_px", "x_px"]].to_numpy()
+    assert order.tolist() == sorted(order.tolist())
+    area = shapely.area(trees.geometry.to_numpy())
+    full = np.pi * (trees["radius_m"] + trees["buffer_m"]).to_numpy() ** 2
+    assert area == pytest.approx(full, rel=0.01)
+    told = detected.attrs["detection"]
+    assert told["strategy"] == "auto"
+    assert told["method"] == "evidence_nir"
+
+
+@pytest.mark.parametrize("missing", [("nir",), ("nir", "red", "blue")])
+def test_fewer_bands_still_find_trees(simulated, missing):
+    scene = without(simulated.scene, *missing)
+    found = gf.detect_obstacles(scene, simulated.field)
+    assert gf.evaluate(found, simulated.obstacles, distance_m=3.6).pooled.recall > 0.7
+
+
+def test_a_hole_in_the_outline_is_searched_too(simulated):
+    tree = simulated.obstacles.geometry.iloc[0].buffer(2)
+    cut = gf.Field(simulated.field.polygon.difference(tree), simulated.field.crs)
+    found = gf.detect_obstacles(simulated.scene, cut)
+    assert found.geometry.intersects(tree.centroid).any()
+
+
+def test_results_do_not_depend_on_the_window(simulated):
+    from geofield.obstacles.windows import detect_trees
+
+    verifier = load_verifier("nir")
+    region = np.ones(simulated.scene.grid.shape, bool)
+    whole = detect_trees(simulated.scene, region, verifier, factor=1.0, min_confidence=0.4)
+    parts = detect_trees(
+        simulated.scene, region, verifier, factor=1.0, min_confidence=0.4, core_px=160
+    )
+    assert len(whole) == len(parts) > 5
+    a = np.sort(np.round(whole.x_px, 3))
+    assert a == pytest.approx(np.sort(np.round(parts.x_px, 3)), abs=0.01)
+
+
+def test_a_finer_picture_gives_the_same_trees():
+    base = SimulationSettings(width_px=300, height_px=300, obstacles=6, climate="temperate")
+    fine = SimulationSettings(
+        width_px=600, height_px=600, resolution_m=0.3, obstacles=6, climate="temperate"
+    )
+    for settings in (base, fine):
+        field = simulate_field(5, settings)
+        found = gf.detect_obstacles(field.scene, field.field)
+        score = gf.evaluate(found, field.obstacles, distance_m=3.6).pooled
+        assert score.recall >= 0.8
+    assert "Resampled" in found.attrs["detection"]["notes"][0]
+
+
+def test_a_field_without_trees_gives_an_empty_table():
+    field = simulate_field(21, SimulationSettings(width_px=256, height_px=256, obstacles=0))
+    found = gf.detect_obstacles(field.scene, field.field)
+    assert len(found) <= 1
+    assert list(found.columns) == [*schema.OBSTACLES.column_names, "geometry"]
+
+
+def blank(simulated, value=120, size=64, valid=True):
+    grid = simulated.scene.grid.crop(0, 0, size, size)
+    bands = np.full((4, size, size), value, np.uint8)
+    mask = np.full((size, size), valid)
+    return Scene(grid, bands, simulated.scene.roles, mask)
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+@pytest.mark.parametrize(("size", "valid"), [(64, True), (3, True), (1, True), (40, False)])
+def test_pictures_without_content_give_no_circle(simulated, strategy, size, valid):
+    scene = blank(simulated, size=size, valid=valid)
+    found = gf.detect_obstacles(scene, strategy=strategy, threshold_range=(0.0, 0.1, 0.05))
+    assert len(found) == 0
+    assert found["obstacle_no"].dtype == "Int64"
+
+
+def test_holes_without_data_add_nothing(simulated):
+    scene = simulated.scene
+    valid = scene.valid.copy()
+    valid[100:160, 100:160] = False
+    bands = scene.bands.copy()
+    bands[:, ~valid] = 0
+    holed = Scene(scene.grid, bands, scene.roles, valid)
+    found = gf.detect_obstacles(holed, simulated.field)
+    rows, cols = found["y_px"].to_numpy().astype(int), found["x_px"].to_numpy().astype(int)
+    assert valid[rows, cols].all()
+
+
+def test_a_coarse_picture_warns(simulated):
+    scene = simulated.scene
+    grid = scene.grid.resized(scene.grid.width_px // 4, scene.grid.height_px // 4)
+    coarse = Scene(grid, scene.bands[:, ::4, ::4], scene.roles, scene.valid[::4, ::4])
+    with pytest.warns(ObstacleWarning, match="coarse"):
+        found = gf.detect_obstacles(coarse)
+    assert "coarse" in found.attrs["detection"]["notes"][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        ({"radius_m": (9, 2)}, "radius range"),
+        ({"radius_m": (0, 2)}, "radius range"),
+        ({"strategy": "best"}, "strategy"),
+        ({"buffer_m": -1}, "margin"),
+        ({"polarity": "grey"}, "polarity"),
+        ({"min_confidence": 2}, "confidence"),
+        ({"strategy": "single", "edge_method": "laplace"}, "edge method"),
+        ({"grey_check": "bright"}, "grey check"),
+    ],
+)
+def test_bad_arguments_are_refused(simulated, arguments, match):
+    with pytest.raises(ObstacleError, match=match):
+        gf.detect_obstacles(simulated.scene, **arguments)
+
+
+def test_polarity_chooses(simulated):
+    dark = gf.detect_obstacles(simulated.scene, simulated.field, polarity="dark", others=False)
+    bright = gf.detect_obstacles(simulated.scene, simulated.field, polarity="bright", others=False)
+    both = gf.detect_obstacles(simulated.scene, simulated.field, others=False)
+    assert len(dark) + len(bright) == len(both)
+    assert len(dark) > len(bright)
+
+
+def test_a_pond_becomes_a_polygon():
+    field = simulate_field(
+        33, SimulationSettings(width_px=360, height_px=360, obstacles=3, climate="temperate")
+    )
+    scene = field.scene
+    x, y = (float(v) for v in scene.grid.from_lonlat(field.lon, field.lat))
+    yy, xx = np.mgrid[:360, :360]
+    pond = (np.abs(xx - x) < 14) & (np.abs(yy - y) < 6)
+    bands = scene.bands.copy()
+    bands[:, pond] = np.array([40, 60, 90, 15], np.uint8)[:, None]
+    found = gf.detect_obstacles(
+        Scene(scene.grid, bands, scene.roles, scene.valid), field.field, buffer_m=0
+    )
+    other = found[found["kind"] == "other"]
+    assert len(other) == 1
+    truth = shapely.transform(shapely.box(x - 14, y - 6, x + 14, y + 6), scene.grid.to_metric_array)
+    shape = other.geometry.iloc[0]
+    assert shape.intersection(truth).area / shape.union(truth).area > 0.7
+    assert np.isnan(other["radius_m"].iloc[0])
+
+
+def test_a_forest_says_what_its_table_says():
+    table = {
+        "features": ["a", "b"],
+        "base": 0.5,
+        "trees": [
+            {"nodes": [[0, 1.0, 1, -3], [1, 2.0, -1, -2]], "leaves": [1.0, 10.0, 100.0]},
+            {"nodes": [], "leaves": [0.25]},
+        ],
+    }
+    values = np.array([[0, 0], [0, 3], [2, 0], [1.0, 2.0]], np.float32)
+    measured = FeatureTable(("b", "a"), values[:, ::-1])
+    assert Forest.read(table).evaluate(measured).tolist() == [1.75, 10.75, 100.75, 1.75]
+    with pytest.raises(ObstacleError, match="unknown feature"):
+        Forest.read(table).evaluate(FeatureTable(("a",), values[:, :1]))
+
+
+def test_the_strongest_suppress_within_their_reach():
+    x, y = np.array([0.0, 3, 5, 20]), np.zeros(4)
+    keep = strongest(x, y, np.array([0.9, 0.8, 0.7, 0.1]), np.array([4.0, 9, 9, 1]))
+    assert keep.tolist() == [0, 2, 3]
+
+
+def test_pixel_transform_is_that_of_the_grid(simulated, detected):
+    grid = simulated.scene.grid
+    assert isinstance(grid.transform, Affine)
+    row = detected.iloc[0]
+    lon, lat = grid.to_lonlat(row["x_px"], row["y_px"])
+    assert (row["lon"], row["lat"]) == pytest.approx((lon, lat))

@@ -1,0 +1,143 @@
+"""Evaluation: one-to-one matching and the figures that follow from it."""
+
+import geopandas as gpd
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+from shapely import Point, box
+
+import geofield as gf
+from geofield.errors import CRSError, ObstacleError
+from geofield.evaluation import draw_reliability, match_points, reliability
+
+UTM = "EPSG:32636"
+
+
+def table(points, radius=None, crs=UTM):
+    radius = np.full(len(points), 3.0) if radius is None else np.asarray(radius, float)
+    shapes = [Point(p).buffer(r + 1) for p, r in zip(points, radius, strict=True)]
+    return gpd.GeoDataFrame({"radius_m": radius}, geometry=shapes, crs=crs)
+
+
+def test_a_truth_is_matched_once():
+    match = match_points([[0, 0], [1, 0]], [[0.4, 0]], 5)
+    assert match.truth_index.tolist() == [0]
+    assert match.detected_index.tolist() == [0]
+    assert match.false_index.tolist() == [1]
+
+
+def test_as_many_hits_as_possible_come_before_short_distances():
+    # The nearest pair (1, 0) would leave the other two apart.
+    match = match_points([[0.0, 0], [3.0, 0]], [[2.0, 0], [6.0, 0]], 3.5)
+    assert len(match.truth_index) == 2
+
+
+@given(
+    arrays(float, st.tuples(st.integers(0, 12), st.just(2)), elements=st.floats(0, 40)),
+    arrays(float, st.tuples(st.integers(0, 12), st.just(2)), elements=st.floats(0, 40)),
+)
+def test_matching_is_one_to_one_and_symmetric(a, b):
+    match = match_points(a, b, 6)
+    assert len(set(match.detected_index)) == len(match.detected_index)
+    assert len(set(match.truth_index)) == len(match.truth_index)
+    assert np.all(match.distance <= 6)
+    assert len(match_points(b, a, 6).truth_index) == len(match.truth_index)
+    assert len(match.missed_index) + len(match.truth_index) == len(b)
+
+
+def test_figures_of_a_hand_made_case():
+    found = table([(0, 0), (20, 0), (40, 0)], [3.5, 2.5, 3])
+    truth = table([(1, 0), (20, 2), (80, 0), (90, 0)], [3, 3, 3, 3])
+    score = gf.evaluate(found, truth, distance_m=6).pooled
+    assert (score.hits, score.detected, score.truth) == (2, 3, 4)
+    assert score.precision == pytest.approx(2 / 3)
+    assert score.recall == pytest.approx(0.5)
+    assert score.f1 == pytest.approx(4 / 7)
+    assert score.radius_bias == pytest.approx(0)
+    assert score.radius_error == pytest.approx(0.5)
+    assert score.distance == pytest.approx(1.5)
+    low, high = score.interval["f1"]
+    assert low < score.f1 < high
+
+
+def test_truth_may_be_points_or_boxes_in_degrees():
+    found = table([(500_000, 4_000_000), (500_050, 4_000_000)])
+    points = gpd.GeoDataFrame(
+        geometry=[Point(500_001, 4_000_000), Point(500_052, 4_000_000)], crs=UTM
+    )
+    boxes = gpd.GeoDataFrame(
+        geometry=[box(499_997, 3_999_997, 500_003, 4_000_003)], crs=UTM
+    ).to_crs(4326)
+    by_points = gf.evaluate(found, points.to_crs(4326)).pooled
+    assert by_points.f1 == 1
+    assert np.isnan(by_points.radius_bias)
+    by_boxes = gf.evaluate(found, boxes).pooled
+    assert (by_boxes.hits, by_boxes.detected) == (1, 2)
+    assert by_boxes.radius_bias == pytest.approx(3 - 6 / np.sqrt(np.pi), abs=0.05)
+
+
+def test_rejected_rows_and_rows_outside_the_area_do_not_count():
+    found = table([(0, 0), (20, 0), (200, 0)])
+    found["status"] = ["detected", "rejected", "detected"]
+    truth = table([(0, 0), (20, 0)])
+    score = gf.evaluate(found, truth, area=box(-5, -5, 50, 5)).pooled
+    assert (score.hits, score.detected, score.truth) == (1, 1, 2)
+
+
+def test_several_pictures_are_pooled():
+    found = {str(k): table([(0, 0), (30, 0)]) for k in range(6)}
+    truth = {str(k): table([(0, 0)] * (k > 0)) for k in range(6)}
+    result = gf.evaluate(found, truth)
+    assert result.pooled.hits == 5
+    assert result.images["0"].hits == 0
+    assert np.isnan(result.images["0"].recall)
+    assert result.pooled.as_dict()["detected"] == 12
+
+
+def test_nothing_against_nothing():
+    score = gf.evaluate(table([]), table([])).pooled
+    assert score.detected == score.truth == 0
+    assert score.as_dict()["f1"] is None
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(ObstacleError, match="distance"):
+        gf.evaluate(table([]), table([]), distance_m=0)
+    with pytest.raises(CRSError, match="metric"):
+        gf.evaluate(table([(1, 1)], crs=4326), table([(1, 1)]))
+    with pytest.raises(CRSError, match="need a CRS"):
+        gf.evaluate(table([], crs=None), table([]))
+    with pytest.raises(ObstacleError, match="not both"):
+        gf.evaluate({"a": table([])}, {"b": table([])})
+
+
+def test_reliability_of_honest_and_boastful_confidences(tmp_path):
+    rng = np.random.default_rng(3)
+    p = rng.random(20_000)
+    hit = rng.random(p.size) < p
+    assert reliability(p, hit)[3] < 0.02
+    assert reliability(np.sqrt(p), hit)[3] > 0.1
+    error = draw_reliability(p, hit, tmp_path / "reliability.png")
+    assert error < 0.02
+    with Image.open(tmp_path / "reliability.png") as picture:
+        assert picture.size == (580, 580)
+
+
+def test_the_command_prints_figures_and_draws(tmp_path, capsys):
+    from geofield.cli import main
+
+    base = (500_000, 4_000_000)
+    found = table([base, (base[0] + 40, base[1])])
+    truth = table([base, (base[0], base[1] + 60)])
+    found.to_file(tmp_path / "found.gpkg", layer="obstacles")
+    truth.to_crs(4326).to_file(tmp_path / "truth.geojson")
+    arguments = [str(tmp_path / "found.gpkg"), str(tmp_path / "truth.geojson")]
+    main(["evaluate", *arguments, "--json", "--picture", str(tmp_path / "hits.png")])
+    out = capsys.readouterr().out
+    assert '"hits": 1' in out
+    with Image.open(tmp_path / "hits.png") as picture:
+        colours = {c for _, c in picture.getcolors(10_000)}
+    assert {(40, 200, 90), (60, 150, 255), (235, 60, 50)} <= colours
