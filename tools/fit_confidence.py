@@ -23,7 +23,6 @@ import numpy as np
 import pandas as pd
 import rasterio
 from scipy import ndimage
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from geofield.obstacles.auto import measure, picture_channels
@@ -228,11 +227,14 @@ def forest_table(model: lgb.Booster, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def hits(xy: np.ndarray, truth: np.ndarray, limit: float) -> np.ndarray:
+    """Match the strongest first: whether it is a hit must not depend on weaker ones."""
     hit = np.zeros(len(xy), dtype=bool)
-    if len(xy) and len(truth):
-        distance = np.hypot(*(xy[:, None] - truth[None]).transpose(2, 0, 1))
-        a, b = linear_sum_assignment(np.where(distance <= limit, distance, 1e4))
-        hit[a[distance[a, b] <= limit]] = True
+    free = np.ones(len(truth), dtype=bool)
+    for i, point in enumerate(xy):
+        distance = np.where(free, np.hypot(*(truth - point).T), np.inf) if len(truth) else [np.inf]
+        nearest = int(np.argmin(distance))
+        if distance[nearest] <= limit:
+            hit[i], free[nearest] = True, False
     return hit
 
 
@@ -297,48 +299,9 @@ def fit(variant: Variant, data: list[Any], fields: list[Any]) -> None:
         score[fold == k] = a.predict(sample.values[fold == k], raw_score=True)
         print(f"  fold {k} after {time.time() - start:.0f} s", flush=True)
         spacing[fold == k] = b.predict(sample.values[fold == k])
-    np.savez_compressed(
-        f"/tmp/lab/oof_{variant}.npz",
-        score=score,
-        spacing=spacing,
-        xy=sample.xy,
-        picture=sample.picture,
-        real=sample.real,
-    )
     print(f"  cross-validated after {time.time() - start:.0f} s", flush=True)
 
-    reach = np.clip(SPACING_SHARE * spacing, *SPACING_PX)
-    kept: list[tuple[np.ndarray, np.ndarray, np.ndarray, bool]] = []
-    for picture, truth in enumerate(sample.truth):
-        rows = np.flatnonzero((sample.picture == picture) & (score > -3.5))
-        rows = rows[strongest(*sample.xy[rows].T, score[rows], reach[rows])]
-        xy = sample.xy[rows]
-        kept.append((score[rows], hits(xy, truth, HIT_PX), hits(xy, truth, 6), picture))
-    real = [item for item in kept if sample.real[item[3]]]
-    table["calibration"] = calibrate(real)
-    slope, offset = table["calibration"]
-    labels = sum(len(sample.truth[item[3]]) for item in real)
-    s = np.concatenate([item[0] for item in real])
-    h10 = np.concatenate([item[1] for item in real])
-    h6 = np.concatenate([item[2] for item in real])
-    p = 1 / (1 + np.exp(-(slope * s + offset)))
-    grid = np.arange(0.2, 0.6, 0.01)
-    f1 = [2 * h10[p >= t].sum() / ((p >= t).sum() + labels) for t in grid]
-    best = int(np.argmax(f1))
-    table["threshold"] = round(float(grid[best]), 2)
-    f6 = 2 * h6[p >= grid[best]].sum() / ((p >= grid[best]).sum() + labels)
-    sims = [item for item in kept if not is_chip[item[3]]]
-    st = grid[best]
-    found = sum(((1 / (1 + np.exp(-(slope * i[0] + offset)))) >= st).sum() for i in sims)
-    good = sum(i[1][(1 / (1 + np.exp(-(slope * i[0] + offset)))) >= st].sum() for i in sims)
-    trees = sum(len(sample.truth[i[3]]) for i in sims)
-    figures = {
-        "f1_10px": round(float(f1[best]), 3),
-        "f1_6px": round(float(f6), 3),
-        "f1_10px_simulated": round(float(2 * good / max(found + trees, 1)), 3),
-        "expected_calibration_error": round(calibration_error(p, h10), 3),
-        "sites": len(data),
-    }
+    figures = judge(table, sample, score, spacing, len(fields))
     print(f"  threshold {table['threshold']}: {figures}", flush=True)
 
     a, b = train(np.ones(len(near), dtype=bool))
@@ -355,10 +318,50 @@ def fit(variant: Variant, data: list[Any], fields: list[Any]) -> None:
     write(table, TABLES / f"verifier_{variant}.json")
 
 
-def calibrate(kept: list[Any]) -> list[float]:
+def judge(
+    table: dict[str, Any], sample: Any, score: np.ndarray, spacing: np.ndarray, fields: int
+) -> dict[str, float]:
+    """Calibrate on held-out scores, choose the threshold, return the figures."""
+    reach = np.clip(SPACING_SHARE * spacing, *SPACING_PX)
+    scores: list[np.ndarray] = []
+    near: list[np.ndarray] = []
+    close: list[np.ndarray] = []
+    kind: list[np.ndarray] = []
+    count = len(sample.truth)
+    for picture, truth in enumerate(sample.truth):
+        rows = np.flatnonzero((sample.picture == picture) & (score > -3.5))
+        rows = rows[strongest(*sample.xy[rows].T, score[rows], reach[rows])]
+        scores.append(score[rows])
+        near.append(hits(sample.xy[rows], truth, HIT_PX))
+        close.append(hits(sample.xy[rows], truth, 6))
+        name = 0 if sample.real[picture] else 1 if picture < count - fields else 2
+        kind.append(np.full(len(rows), name))
+    s, h10, h6, k = (np.concatenate(part) for part in (scores, near, close, kind))
+    real = k == 0
+    table["calibration"] = calibrate(s[real], h10[real])
+    slope, offset = table["calibration"]
+    p = 1 / (1 + np.exp(-(slope * s + offset)))
+    labels = sum(len(t) for t, r in zip(sample.truth, sample.real, strict=True) if r)
+    trees = sum(len(t) for t in sample.truth[count - fields :])
+    grid = np.arange(0.2, 0.6, 0.01)
+
+    def f1(hit: np.ndarray, rows: np.ndarray, truth: int) -> float:
+        return float(2 * hit[rows].sum() / max(rows.sum() + truth, 1))
+
+    best = max(grid, key=lambda t: f1(h10, real & (p >= t), labels))
+    table["threshold"] = round(float(best), 2)
+    return {
+        "f1_10px": round(f1(h10, real & (p >= best), labels), 3),
+        "f1_6px": round(f1(h6, real & (p >= best), labels), 3),
+        "f1_10px_simulated": round(f1(h10, (k == 2) & (p >= best), trees), 3),
+        "expected_calibration_error": round(calibration_error(p[real], h10[real]), 3),
+        "sites": int(np.sum(sample.real)),
+    }
+
+
+def calibrate(s: np.ndarray, hit: np.ndarray) -> list[float]:
     """Fit the logistic curve from score to the share of hits (J. Platt, 1999)."""
-    s = np.concatenate([item[0] for item in kept])
-    y = np.concatenate([item[1] for item in kept]).astype(float)
+    y = hit.astype(float)
     w = np.zeros(2)
     z = np.column_stack([s, np.ones_like(s)])
     for _ in range(30):
