@@ -95,7 +95,7 @@ class FetchSettings(Section):
 class FieldSettings(Section):
     """Stage 2: the outline."""
 
-    method: str = Field("study", description="How the outline is found: auto, study.")
+    method: str = Field("auto", description="How the outline is found: auto, study.")
 
 
 class ObstacleSettings(Section):
