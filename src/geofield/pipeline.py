@@ -7,7 +7,7 @@ what a person has edited since: a moved outline, a confirmed, rejected or added 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, MutableMapping
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -67,7 +67,12 @@ def plan_field(
     with _timed("picture", timings, tell):
         picture = scene if isinstance(scene, Scene) else open_scene(scene, lat, lon, settings)
     with _timed("field", timings, tell):
-        plan = run_field(picture, lat=lat, lon=lon, settings=settings, previous=previous)
+        # A window of a size that was asked for may grow: the stage reads it itself.
+        whole = isinstance(scene, Scene) or settings.imagery.size_m is None
+        plan = run_field(
+            picture if whole else scene, lat=lat, lon=lon, settings=settings, previous=previous
+        )
+        picture = plan.scene or picture
     with _timed("obstacles", timings, tell):
         plan = run_obstacles(plan, picture, settings=settings)
     with _timed("tracks", timings, tell):
@@ -94,30 +99,50 @@ def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
 
 
 def run_field(
-    scene: Scene,
+    picture: Scene | str | Path,
     *,
     lat: float,
     lon: float,
     settings: Settings,
     previous: Plan | None = None,
+    regions: Sequence[int] = (),
+    boundary: Field | None = None,
 ) -> Plan:
-    """Stage 2: find the outline, unless a person drew it."""
-    from geofield.field import extract_field
+    """Stage 2: find the outline, unless a person drew it.
 
+    Parameters
+    ----------
+    picture : Scene or path
+        Of a path, a wider window is read when the outline touches the window's edge.
+    lat, lon : float
+        A point in the field, degrees, WGS 84.
+    settings : Settings
+    previous : Plan, optional
+        An earlier plan of the same field.
+    regions : sequence of int
+        Numbered regions of the study's method that a person chose.
+    boundary : Field, optional
+        The user's own outline; nothing is extracted then.
+    """
+    scene = picture if isinstance(picture, Scene) else open_scene(picture, lat, lon, settings)
     if previous is not None and not _holds(previous, lat=lat, lon=lon):
         _refuse_to_forget(previous, lat, lon)
         previous = None
-    if previous is not None and keeps_outline(previous):
-        field = replace(previous.field, method="drawn", quality=None)
+    if previous is not None and keeps_outline(previous) and boundary is None:
+        kept = "drawn" if previous.outline_edited else previous.field.method
+        field = replace(previous.field, method=kept, quality=None)
     else:
-        field = extract_field(scene, lat=lat, lon=lon, **settings.field.model_dump())
+        if boundary is None:
+            field, scene = _find(picture, scene, lat, lon, settings, regions)
+        else:
+            field = boundary
         field = replace(
             field,
             imagery=scene.source.name,
             imagery_date=scene.source.date,
             licence=scene.source.licence,
         )
-        if previous is not None:
+        if previous is not None and boundary is None:
             # The same field, found again: its names are the user's to keep.
             field = replace(field, field_id=previous.field.field_id, name=previous.field.name)
     evidence: dict[str, Any] = {"point": {"lat": lat, "lon": lon}, "field": _field_evidence(field)}
@@ -132,6 +157,36 @@ def run_field(
         grid=scene.grid,
         evidence=evidence,
         scene=scene,
+    )
+
+
+def _find(
+    picture: Scene | str | Path,
+    scene: Scene,
+    lat: float,
+    lon: float,
+    settings: Settings,
+    regions: Sequence[int],
+) -> tuple[Field, Scene]:
+    """The field, in a window as wide as it needs."""
+    from geofield.field import extract_field, grow_field
+
+    options = settings.field.model_dump()
+    if regions:
+        options["method"] = "study"
+    if isinstance(picture, Scene) or regions or settings.imagery.size_m is None:
+        # Numbers of regions, and a picture that is used as a whole, do not change.
+        return extract_field(scene, lat=lat, lon=lon, regions=regions, **options), scene
+
+    def read(size_m: float) -> Scene:
+        if size_m == settings.imagery.size_m:
+            return scene
+        wider = settings.imagery.model_copy(update={"size_m": size_m})
+        return open_scene(picture, lat, lon, settings.model_copy(update={"imagery": wider}))
+
+    size_m = settings.imagery.size_m
+    return grow_field(
+        read, lat=lat, lon=lon, size_m=size_m, largest_m=max(6400.0, size_m), **options
     )
 
 

@@ -95,7 +95,28 @@ class FetchSettings(Section):
 class FieldSettings(Section):
     """Stage 2: the outline."""
 
-    method: str = Field("auto", description="How the outline is found: auto, study.")
+    method: Literal["auto", "study"] = Field(
+        "auto",
+        description="How the outline is found: auto (colour, near infrared, edges) or study "
+        "(brightness threshold).",
+    )
+    holes: Literal["fill", "keep"] | None = Field(
+        None,
+        description="What becomes of crowns, huts and ponds inside: fill (the way of auto) or "
+        "keep as holes (the way of study).",
+    )
+    min_hole_m2: NonNegative = Field(
+        20.0,
+        description="Holes below this size are filled, square metres.",
+        json_schema_extra={"option": "--min-hole"},
+    )
+    tolerance_px: NonNegative = Field(
+        1.5,
+        description="How far the straightened outline may leave the pixels; 0 keeps them all.",
+    )
+    smooth: Literal["none", "diffusion"] = Field(
+        "none", description="Smoothing of the picture first; diffusion is anisotropic."
+    )
 
 
 class ObstacleSettings(Section):

@@ -12,6 +12,7 @@ from shapely import Polygon
 
 from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.auto import segment
+from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
 from geofield.field.quality import judge
 from geofield.field.segmentation import Segmentation, fill_holes, part_at
@@ -19,6 +20,7 @@ from geofield.field.study import study_pictures
 from geofield.model import Field, Scene
 
 Holes = Literal["fill", "keep"]
+Smoothing = Literal["none", "diffusion"]
 _Method = Callable[[Scene, float, float, Sequence[int]], Segmentation]
 
 
@@ -32,6 +34,7 @@ def extract_field(
     holes: Holes | None = None,
     min_hole_m2: float = 20.0,
     tolerance_px: float = 1.5,
+    smooth: Smoothing = "none",
     name: str = "",
 ) -> Field:
     """Find the outline of the field around a point.
@@ -53,6 +56,9 @@ def extract_field(
         Holes below this size are always filled, square metres on the ground.
     tolerance_px : float
         How far the straightened outline may leave the mask's border; 0 keeps the staircase.
+    smooth : {"none", "diffusion"}
+        Smoothing of the picture first: anisotropic diffusion keeps borders and evens
+        surfaces.
     name : str
 
     Returns
@@ -84,8 +90,11 @@ def extract_field(
         raise SettingsError(f"Unknown choice {holes!r} for holes.", hint="Use fill or keep.")
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
+    if smooth not in ("none", "diffusion"):
+        raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
     x_px, y_px = scene.pixel_of(lat=lat, lon=lon)
-    found = METHODS[method](scene, x_px, y_px, tuple(regions))
+    picture = diffused(scene) if smooth == "diffusion" else scene
+    found = METHODS[method](picture, x_px, y_px, tuple(regions))
     keep = holes == "keep" or (holes is None and method == "study")
     resolution = scene.grid.ground_resolution_m
     smallest = min_hole_m2 / resolution**2 if keep else None

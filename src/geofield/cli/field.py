@@ -1,0 +1,243 @@
+"""``geofield field``: stage 2 alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.options import point_options, section_options, section_values, settings_option
+from geofield.errors import FieldError
+
+if TYPE_CHECKING:
+    from geofield.model import Field, Scene
+    from geofield.settings import Settings
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 -o field.gpkg
+  geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --list
+  geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
+      --region 2 --region 3 -o field.gpkg
+"""
+)
+@click.argument("imagery", type=click.Path(path_type=str))
+@point_options
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="GeoPackage to write; an outline that a person drew in it is kept.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace the output where it exists.")
+@click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
+@click.option(
+    "--list",
+    "list_regions",
+    is_flag=True,
+    help="Show the study's numbered regions instead of extracting; draws them with --pictures.",
+)
+@click.option(
+    "--region",
+    "regions",
+    type=int,
+    multiple=True,
+    help="Take this numbered region of the study's method; repeat to join several.",
+)
+@click.option(
+    "--pictures",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the study's pictures: grey, binary, numbered regions, reconstruction.",
+)
+@click.option(
+    "--boundary",
+    type=click.Path(exists=True, path_type=Path),
+    help="Your own parcels (any vector file, any CRS): take the one that contains the point.",
+)
+@click.option("--boundary-layer", help="Layer of --boundary, where it has several.")
+@click.option("--boundary-name", help="Take the parcel of this name or id instead.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
+@settings_option
+@section_options("imagery")
+@section_options("field")
+def field(
+    imagery: str,
+    lat: float,
+    lon: float,
+    output: Path | None,
+    overwrite: bool,
+    fresh: bool,
+    list_regions: bool,
+    regions: tuple[int, ...],
+    pictures: Path | None,
+    boundary: Path | None,
+    boundary_layer: str | None,
+    boundary_name: str | None,
+    as_json: bool,
+    settings_file: str | None,
+    **options: Any,
+) -> None:
+    """Find the outline of the field around a point.
+
+    IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline
+    touches the window's edge, the window grows as far as the picture reaches.
+    """
+    from geofield.cli.imagery_tools import as_picture
+    from geofield.pipeline import open_scene
+    from geofield.settings import load_settings
+
+    if boundary is not None and (regions or list_regions):
+        raise click.UsageError("--boundary takes a parcel as it is: leave --list and --region out.")
+    if not list_regions and output is None:
+        raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
+    settings = load_settings(settings_file, section_values(options))
+    with (
+        progress_bar(quiet=as_json) as progress,
+        as_picture(imagery, settings, lat=lat, lon=lon, progress=progress) as picture,
+    ):
+        if list_regions or regions or pictures is not None:
+            scene = open_scene(picture, lat, lon, settings)
+            _study(scene, lat, lon, regions, pictures, tell=list_regions, as_json=as_json)
+        if output is not None:
+            _extract(
+                picture,
+                lat,
+                lon,
+                settings,
+                output,
+                overwrite=overwrite,
+                fresh=fresh,
+                regions=regions,
+                parcel=None
+                if boundary is None
+                else _parcel(boundary, boundary_layer, boundary_name, lat, lon),
+                as_json=as_json,
+            )
+
+
+def _extract(
+    picture: str,
+    lat: float,
+    lon: float,
+    settings: Settings,
+    output: Path,
+    *,
+    overwrite: bool,
+    fresh: bool,
+    regions: tuple[int, ...],
+    parcel: Field | None,
+    as_json: bool,
+) -> None:
+    from geofield.cli.plan_files import save_plan
+    from geofield.pipeline import run_field
+    from geofield.plan import read_plan
+
+    previous = read_plan(output) if output.is_file() and not fresh else None
+    if output.is_file() and not overwrite:
+        from geofield.errors import OutputExistsError
+
+        raise OutputExistsError(
+            f"{output} is there already.",
+            hint="Choose another name, or --overwrite: an outline drawn by hand is then kept.",
+        )
+    plan = run_field(
+        picture,
+        lat=lat,
+        lon=lon,
+        settings=settings,
+        previous=previous,
+        regions=regions,
+        boundary=parcel,
+    )
+    save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
+    found = plan.field
+    if as_json:
+        echo_json(
+            {
+                "file": str(output),
+                "field_id": found.field_id,
+                "name": found.name,
+                "method": found.method,
+                "area_ha": found.area_ha,
+                "perimeter_m": found.perimeter_m,
+                "vertices": len(found.polygon.exterior.coords) - 1,
+                "holes": len(found.polygon.interiors),
+                "crs": found.crs.to_string(),
+                "evidence": dict(plan.evidence.get("field", {})),
+            }
+        )
+        return
+    say(
+        f"Field      {found.area_ha:.2f} ha, perimeter {found.perimeter_m:.0f} m, "
+        f"{len(found.polygon.exterior.coords) - 1} corners ({found.method})"
+    )
+    if found.quality is not None:
+        say(f"Trust      {found.quality.score:.0%}")
+        for reason in found.quality.reasons:
+            say(f"           {reason}")
+    say(f"File       {output}")
+
+
+def _parcel(path: Path, layer: str | None, name: str | None, lat: float, lon: float) -> Field:
+    """The user's own parcel from any vector file."""
+    import geopandas as gpd
+    from pyogrio.errors import DataLayerError, DataSourceError
+
+    from geofield.field import field_from_boundary
+
+    try:
+        table = gpd.read_file(path, layer=layer)
+    except (DataSourceError, DataLayerError) as error:
+        raise FieldError(
+            f"The boundary file {path} cannot be read: {error}",
+            hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
+        ) from None
+    return field_from_boundary(table, lat=lat, lon=lon, name=name)
+
+
+def _study(
+    scene: Scene,
+    lat: float,
+    lon: float,
+    regions: tuple[int, ...],
+    folder: Path | None,
+    *,
+    tell: bool,
+    as_json: bool,
+) -> None:
+    """Print and draw the study's numbered regions."""
+    from geofield.field import study_pictures
+
+    study = study_pictures(scene.grey, scene.valid)
+    here = study.region_at(*scene.pixel_of(lat=lat, lon=lon))
+    square_m = scene.grid.ground_resolution_m**2
+    # Specks are numbered, too, but no list is read that shows thousands of them.
+    shown = [i for i, count in enumerate(study.counts, 1) if count * square_m >= 100.0 or i == here]
+    rows = [
+        {
+            "region": number,
+            "pixels": int(study.counts[number - 1]),
+            "area_ha": round(float(study.counts[number - 1]) * square_m / 1e4, 4),
+            "at_point": number == here,
+        }
+        for number in shown
+    ]
+    if tell and as_json:
+        echo_json({"threshold": study.threshold, "regions": rows})
+    elif tell:
+        click.echo("region    pixels   area_ha")
+        for row in rows:
+            mark = "  <- the point" if row["at_point"] else ""
+            click.echo(f"{row['region']:6d} {row['pixels']:9d} {row['area_ha']:9.3f}{mark}")
+        say(f"{len(study.counts)} regions, {len(rows)} of them of at least 100 m2")
+    if folder is not None:
+        from geofield.mapping_study import draw_study
+
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, image in draw_study(study, regions or (here,), shown).items():
+            image.save(folder / f"{name}.png")
+            say(f"Picture    {folder / name}.png")

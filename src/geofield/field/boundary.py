@@ -1,0 +1,109 @@
+"""Boundary: the user's own parcel instead of an extracted outline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from shapely import Polygon
+
+from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.errors import CRSError, FieldError
+from geofield.model import Field, FieldQuality
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: Columns that name a parcel, in the order they are looked for.
+_NAME_COLUMNS = ("name", "Name", "NAME", "field_name", "field_id", "id", "fid")
+
+
+def field_from_boundary(
+    parcels: gpd.GeoDataFrame, *, lat: float, lon: float, name: str | None = None
+) -> Field:
+    """The parcel that contains a point, or the one of a name.
+
+    Parameters
+    ----------
+    parcels : GeoDataFrame
+        Polygons in any CRS; other geometries are passed over.
+    lat, lon : float
+        A point in the field, degrees, WGS 84.
+    name : str, optional
+        Take the parcel with this value in any column instead.
+
+    Returns
+    -------
+    Field
+        Method ``boundary``, in the metric CRS of the point.
+
+    Raises
+    ------
+    CRSError
+        When the parcels have no CRS.
+    FieldError
+        When no parcel, or more than one of different outline, fits.
+    """
+    if parcels.crs is None:
+        raise CRSError(
+            "The boundary file has no coordinate reference system.",
+            hint="Assign one, for instance with `ogr2ogr -a_srs EPSG:25832`.",
+        )
+    own = CRS(parcels.crs)
+    rows = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)].explode()
+    rows = rows[rows.geometry.geom_type == "Polygon"]
+    if rows.empty:
+        raise FieldError("The boundary file holds no polygon.")
+    if name is not None:
+        chosen = rows[_named(rows, name)]
+        what = f"is named {name!r}"
+    else:
+        x, y = transformer(LONLAT, own).transform(lon, lat)
+        chosen = rows[rows.geometry.intersects(shapely.Point(x, y))]
+        what = f"contains lat {lat}, lon {lon}"
+    if chosen.empty:
+        raise FieldError(
+            f"None of the {len(rows)} polygons in the boundary file {what}.",
+            hint="Check the point and the file's CRS, or name a parcel with --boundary-name.",
+        )
+    if len(chosen) > 1:
+        if name is not None and len(chosen.index.unique()) == 1:
+            raise FieldError(f"The parcel {name!r} has {len(chosen)} parts; a field is one.")
+        # Nested or overlapping parcels: the smallest is the most exact statement.
+        chosen = chosen.iloc[[int(np.argmin(shapely.area(chosen.geometry.to_numpy())))]]
+    return _field(chosen, own, lat, lon)
+
+
+def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
+    target = metric_crs(lon, lat, own=own)
+    project = transformer(own, target)
+    polygon = shapely.force_2d(row.geometry.iloc[0])
+    reasons: tuple[str, ...] = ()
+    if not polygon.is_valid:
+        why = shapely.is_valid_reason(polygon)
+        parts = shapely.get_parts(shapely.make_valid(polygon))
+        polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
+        reasons = (f"the boundary was not valid ({why}) and was repaired",)
+    # Long sides bend in another projection: points between keep them where they are.
+    if own != target and own.is_geographic:
+        polygon = shapely.segmentize(polygon, 0.001)
+    polygon = shapely.transform(
+        polygon, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
+    )
+    label = ""
+    for column in _NAME_COLUMNS:
+        if column in row.columns and row[column].notna().iloc[0]:
+            label = str(row[column].iloc[0])
+            break
+    quality = FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons)
+    return Field(polygon, target, name=label, method="boundary", quality=quality)
+
+
+def _named(rows: gpd.GeoDataFrame, name: str) -> np.ndarray:
+    columns = [column for column in rows.columns if column != rows.geometry.name]
+    hit = np.zeros(len(rows), bool)
+    for column in columns:
+        hit |= (rows[column].astype(str) == name).to_numpy()
+    return hit

@@ -1,0 +1,65 @@
+"""Anisotropic diffusion: smooths surfaces and keeps their borders (Perona and Malik 1990).
+
+The study named non-linear diffusion as the smoothing it lacked.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import SettingsError
+from geofield.model import Scene
+
+#: Largest time step at which the explicit scheme with four neighbours is stable.
+_STEP = 0.2
+
+
+def diffuse(
+    band: NDArray[np.generic], *, iterations: int = 12, kappa: float = 12.0
+) -> NDArray[np.float32]:
+    """One band after diffusion.
+
+    Parameters
+    ----------
+    band : array (rows, columns)
+        Grey levels, 0..255.
+    iterations : int
+        Steps; details of about ``sqrt(iterations / 2)`` pixels vanish.
+    kappa : float
+        Difference of grey levels that counts as a border. The conductance is Perona and
+        Malik's first, ``exp(-(difference / kappa)**2)``, which favours strong borders.
+
+    Notes
+    -----
+    Nothing flows over the picture's edge, so that the mean stays the same.
+    """
+    if iterations < 0 or not kappa > 0:
+        raise SettingsError("Diffusion takes iterations of at least 0 and a kappa above 0.")
+    value = band.astype(np.float32)
+    for _ in range(iterations):
+        change = np.zeros_like(value)
+        for axis in (0, 1):
+            difference = np.diff(value, axis=axis)
+            flow = difference * np.exp(-np.square(difference / kappa))
+            low = [slice(None), slice(None)]
+            high = [slice(None), slice(None)]
+            low[axis], high[axis] = slice(None, -1), slice(1, None)
+            change[tuple(low)] += flow
+            change[tuple(high)] -= flow
+        value += np.float32(_STEP) * change
+    return value
+
+
+def diffused(scene: Scene) -> Scene:
+    """A scene with every band diffused."""
+    bands = np.stack([np.rint(diffuse(band)).clip(0, 255) for band in scene.bands])
+    return Scene(
+        scene.grid,
+        bands.astype(np.uint8),
+        scene.roles,
+        scene.valid,
+        scene.source,
+        scene.scaling,
+        scene.notes,
+    )

@@ -1,0 +1,81 @@
+"""Grow: widen the window until the field's outline no longer touches it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from geofield.errors import FieldWarning, SettingsError
+from geofield.field.extract import extract_field
+from geofield.model import Field, Scene
+
+#: Share of the outline on the window's edge from which the field is taken to go on outside.
+TOUCHING_SHARE = 0.02
+
+
+def grow_field(
+    read: Callable[[float], Scene],
+    *,
+    lat: float,
+    lon: float,
+    size_m: float = 400.0,
+    largest_m: float = 6400.0,
+    **options: Any,
+) -> tuple[Field, Scene]:
+    """Extract a field of unknown size.
+
+    Parameters
+    ----------
+    read : callable
+        Reads the picture around the point in a window of a given side, metres.
+    lat, lon : float
+        A point in the field, degrees, WGS 84.
+    size_m, largest_m : float
+        Side of the first window, which doubles, and of the last one, metres.
+    **options
+        For `extract_field`.
+
+    Returns
+    -------
+    (Field, Scene)
+        The outline and the window it was found in. Where the picture ends before the field
+        does, `field.quality` says so.
+
+    Warns
+    -----
+    FieldWarning
+        When the outline should not be trusted unseen.
+    """
+    if not 0 < size_m <= largest_m:
+        raise SettingsError(f"The window must grow from {size_m} m to {largest_m} m.")
+    covered: tuple[float, ...] | None = None
+    while True:
+        scene = read(size_m)
+        bounds = _extent(scene)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            field = extract_field(scene, lat=lat, lon=lon, **options)
+        ended = covered is not None and bounds == covered
+        if not touches_edge(field) or ended or size_m >= largest_m:
+            break
+        covered = bounds
+        size_m = min(2 * size_m, largest_m)
+    for warning in caught:
+        if not issubclass(warning.category, FieldWarning):
+            warnings.warn_explicit(
+                warning.message, warning.category, warning.filename, warning.lineno
+            )
+        else:
+            warnings.warn(str(warning.message), FieldWarning, stacklevel=2)
+    return field, scene
+
+
+def touches_edge(field: Field) -> bool:
+    """Whether an extracted outline runs along the edge of its picture."""
+    figures = dict(field.quality.figures) if field.quality is not None else {}
+    return figures.get("edge_share", 0.0) > TOUCHING_SHARE
+
+
+def _extent(scene: Scene) -> tuple[float, ...]:
+    return (*scene.grid.transform[:6], scene.grid.width_px, scene.grid.height_px)

@@ -1,0 +1,65 @@
+"""The user's own parcel instead of extraction."""
+
+import geopandas as gpd
+import pytest
+import shapely
+
+from geofield.errors import CRSError, FieldError
+from geofield.field import field_from_boundary
+
+LAT, LON = 50.0, 10.0
+A = shapely.box(9.999, 49.999, 10.001, 50.001)
+B = shapely.box(10.002, 49.999, 10.004, 50.001)
+
+
+def parcels(crs="EPSG:4326"):
+    return gpd.GeoDataFrame({"name": ["A", "B"], "id": [7, 8]}, geometry=[A, B], crs=crs)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:25832", "EPSG:3857", "EPSG:3035"])
+def test_the_parcel_at_the_point_in_any_crs(crs):
+    field = field_from_boundary(parcels().to_crs(crs), lat=LAT, lon=LON)
+    assert field.name == "A"
+    assert field.method == "boundary"
+    assert field.crs.utm_zone == "32N"
+    truth = parcels().to_crs(32632).geometry.iloc[0]
+    assert field.area_ha * 1e4 == pytest.approx(truth.area, rel=1e-3)
+
+
+def test_a_parcel_by_name_or_number():
+    assert field_from_boundary(parcels(), lat=LAT, lon=LON, name="B").name == "B"
+    assert field_from_boundary(parcels(), lat=LAT, lon=LON, name="8").name == "B"
+    with pytest.raises(FieldError, match="named 'C'"):
+        field_from_boundary(parcels(), lat=LAT, lon=LON, name="C")
+
+
+def test_the_smallest_of_overlapping_parcels():
+    nested = parcels()
+    nested.loc[1, "geometry"] = shapely.box(9.9995, 49.9995, 10.0005, 50.0005)
+    assert field_from_boundary(nested, lat=LAT, lon=LON).name == "B"
+
+
+def test_clear_refusals():
+    with pytest.raises(FieldError, match="contains lat 51"):
+        field_from_boundary(parcels(), lat=51.0, lon=LON)
+    with pytest.raises(CRSError, match="no coordinate reference system"):
+        field_from_boundary(parcels(None), lat=LAT, lon=LON)
+    points = gpd.GeoDataFrame(geometry=[shapely.Point(LON, LAT)], crs=4326)
+    with pytest.raises(FieldError, match="no polygon"):
+        field_from_boundary(points, lat=LAT, lon=LON)
+
+
+def test_an_invalid_parcel_is_repaired_and_flagged():
+    bow = shapely.Polygon([(9.999, 49.999), (10.001, 50.001), (10.001, 49.999), (9.999, 50.0005)])
+    table = gpd.GeoDataFrame({"name": ["bow"]}, geometry=[bow], crs=4326)
+    field = field_from_boundary(table, lat=49.9998, lon=10.0008)
+    assert field.polygon.is_valid
+    assert field.quality is not None
+    assert not field.quality.trusted
+
+
+def test_holes_and_parts_are_kept():
+    ring = A.difference(shapely.box(9.9999, 49.9999, 10.0001, 50.0001))
+    table = gpd.GeoDataFrame({"name": ["x"]}, geometry=[shapely.MultiPolygon([ring, B])], crs=4326)
+    field = field_from_boundary(table, lat=50.0005, lon=10.0005)
+    assert len(list(field.polygon.interiors)) == 1
