@@ -190,7 +190,9 @@ class Plan:
         from geofield.tracks.direction import find_baseline
 
         one = self.field
-        baseline = find_baseline(one.polygon, "longest_edge", one.crs, spacing_m=1.0)
+        baseline = find_baseline(
+            one.polygon, "longest_edge", one.crs, spacing_m=1.0, grid=self.grid
+        )
         edge_m = baseline.edge.length_m if baseline.edge else None
         heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
         return schema.table(

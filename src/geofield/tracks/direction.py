@@ -17,6 +17,7 @@ from shapely import LineString, Polygon
 
 from geofield.crs import grid_north_deg
 from geofield.errors import TrackError
+from geofield.grid import Grid
 from geofield.tracks.fewest import fewest_direction
 from geofield.tracks.hough import hough_edge
 from geofield.tracks.longest_edge import StraightRun, longest_edge
@@ -50,7 +51,13 @@ class Baseline:
 
 
 def find_baseline(
-    polygon: Polygon, direction: Any, crs: CRS, *, spacing_m: float, tolerance_m: float = 1.0
+    polygon: Polygon,
+    direction: Any,
+    crs: CRS,
+    *,
+    spacing_m: float,
+    tolerance_m: float = 1.0,
+    grid: Grid | None = None,
 ) -> Baseline:
     """Turn the user's choice of a direction into a baseline.
 
@@ -66,6 +73,8 @@ def find_baseline(
         Needed by ``fewest``.
     tolerance_m : float
         Half the width of the band within which an edge counts as straight.
+    grid : Grid, optional
+        Of the picture that the outline was found in: its frame is no edge of the field.
 
     Raises
     ------
@@ -76,7 +85,8 @@ def find_baseline(
     north = grid_north_deg(crs, centre.x, centre.y)
     if isinstance(direction, str):
         if direction == "longest_edge":
-            return _from_edge(longest_edge(polygon, tolerance_m=tolerance_m), north)
+            frame = None if grid is None else picture_frame(grid, crs)
+            return _from_edge(longest_edge(polygon, tolerance_m=tolerance_m, frame=frame), north)
         if direction == "hough":
             return _from_edge(hough_edge(polygon), north)
         if direction in ("fewest", "fewest_turns"):
@@ -92,6 +102,13 @@ def find_baseline(
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
     return _from_ab(direction, north)
+
+
+def picture_frame(grid: Grid, crs: CRS) -> Polygon:
+    """The four sides of a picture, in a CRS."""
+    w, h = grid.width_px, grid.height_px
+    x, y = grid.to_crs([0.0, w, w, 0.0], [0.0, 0.0, h, h], crs)
+    return Polygon(np.column_stack([x, y]))
 
 
 def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:

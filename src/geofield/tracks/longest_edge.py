@@ -12,9 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.tracks.frame import FloatArray
+
+#: An outline of which less than this is not the picture's frame has no edge of its own.
+_REAL_SHARE = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +42,9 @@ class StraightRun:
         return float(np.hypot(self.x1 - self.x0, self.y1 - self.y0))
 
 
-def longest_edge(polygon: Polygon, *, tolerance_m: float = 1.0) -> StraightRun:
+def longest_edge(
+    polygon: Polygon, *, tolerance_m: float = 1.0, frame: Polygon | None = None
+) -> StraightRun:
     """Find the longest straight run of a polygon's outer ring.
 
     Parameters
@@ -48,6 +54,9 @@ def longest_edge(polygon: Polygon, *, tolerance_m: float = 1.0) -> StraightRun:
     tolerance_m : float
         How far a vertex may lie from the line. The default is that of outlines digitised from
         imagery of half a metre per pixel.
+    frame : shapely.Polygon, optional
+        The picture that the outline was found in. Where the outline runs along it, the field goes
+        on outside: that is no edge of the field, and nobody drives along it.
 
     Returns
     -------
@@ -58,7 +67,13 @@ def longest_edge(polygon: Polygon, *, tolerance_m: float = 1.0) -> StraightRun:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
         ring = shapely.simplify(ring, tolerance_m / 4.0)
     xy = shapely.get_coordinates(ring)[:-1]
-    first, count = _longest_run(xy, tolerance_m)
+    barred = np.zeros(len(xy), dtype=bool)
+    if frame is not None:
+        barred = _along_frame(xy, frame, 2.0 * tolerance_m)
+        lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
+        if lengths[~barred].sum() < _REAL_SHARE * lengths.sum():
+            barred[:] = False
+    first, count = _longest_run(xy, tolerance_m, barred)
     run = xy[np.arange(first, first + count + 1) % len(xy)]
     return fit_run(run)
 
@@ -85,8 +100,20 @@ def fit_run(run: FloatArray) -> StraightRun:
     return StraightRun(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
 
 
-def _longest_run(xy: FloatArray, tolerance_m: float) -> tuple[int, int]:
-    """First vertex and number of edges of the longest run of a ring without its closing vertex."""
+def _along_frame(xy: FloatArray, frame: Polygon, tolerance_m: float) -> NDArray[np.bool_]:
+    """Which edges of a ring run along one side of the frame."""
+    corners = shapely.get_coordinates(frame.exterior)
+    sides = np.asarray(shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1)))
+    points = np.asarray(shapely.points(xy))
+    near = shapely.distance(points[:, None], sides[None, :]) <= tolerance_m
+    return np.asarray((near & np.roll(near, -1, axis=0)).any(axis=1))
+
+
+def _longest_run(xy: FloatArray, tolerance_m: float, barred: NDArray[np.bool_]) -> tuple[int, int]:
+    """First vertex and number of edges of the longest run of a ring without its closing vertex.
+
+    No run goes over an edge that is barred.
+    """
     n = len(xy)
     start = np.arange(n)
     axis = np.zeros(n)
@@ -95,6 +122,7 @@ def _longest_run(xy: FloatArray, tolerance_m: float) -> tuple[int, int]:
     best_length, best_first, best_count = -1.0, 0, 1
     active = start
     for step in range(1, n):
+        active = active[~barred[(active + step - 1) % n]]
         if not len(active):
             break
         offset = xy[(active + step) % n] - xy[active]
@@ -127,5 +155,5 @@ def _longest_run(xy: FloatArray, tolerance_m: float) -> tuple[int, int]:
     if best_length < 0.0:
         # A field smaller than the tolerance: its longest single edge.
         lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
-        return int(np.argmax(lengths)), 1
+        return int(np.argmax(np.where(barred, -1.0, lengths))), 1
     return best_first, best_count

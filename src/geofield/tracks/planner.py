@@ -89,7 +89,8 @@ def plan_tracks(
     straight_tolerance_m : float
         How far the vertices of a straight edge may stray, for ``longest_edge``.
     grid : Grid, optional
-        Of the picture: gives the track points their pixels.
+        Of the picture: gives the track points their pixels; where the outline runs along the
+        picture's frame, that is no edge for ``longest_edge``.
 
     Returns
     -------
@@ -109,7 +110,12 @@ def plan_tracks(
         warnings.warn(note, TrackWarning, stacklevel=2)
     wanted_m = spacing_m
     baseline = find_baseline(
-        outline, direction, metric_crs, spacing_m=spacing_m, tolerance_m=straight_tolerance_m
+        outline,
+        direction,
+        metric_crs,
+        spacing_m=spacing_m,
+        tolerance_m=straight_tolerance_m,
+        grid=grid,
     )
     centre = outline.centroid
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left)
