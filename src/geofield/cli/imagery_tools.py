@@ -23,6 +23,7 @@ from geofield.cli.console import Progress, say
 if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Where
     from geofield.imagery.sources import Source, SourceEntry
+    from geofield.model.scene import Scene
     from geofield.settings import Settings
 
 
@@ -137,10 +138,11 @@ def as_picture(
     lon: float,
     acknowledged: bool = False,
     progress: Progress | None = None,
-) -> Iterator[str]:
-    """A path that `read_scene` reads: the user's own picture, or one fetched for the moment."""
-    from geofield.imagery import Where, acquire
+) -> Iterator[Scene | str]:
+    """What `plan_field` takes: the user's own picture, or one fetched for the moment."""
+    from geofield.imagery import Where, acquire, read_scene, with_provenance
     from geofield.imagery.sources import PictureSource
+    from geofield.imagery.terms import check_terms
 
     if "{" not in what and Path(what).exists() and Path(what).suffix.lower() != ".mbtiles":
         yield what
@@ -148,7 +150,9 @@ def as_picture(
     options = fetch_options(settings, cache_dir_of(settings))
     source = resolve(what, settings, point=(lon, lat), proxy=options.proxy)
     if isinstance(source, PictureSource):
-        yield source.path
+        check_terms(source.name, source.terms, acknowledged=acknowledged)
+        scene = read_scene(source.path, lat=lat, lon=lon, **settings.imagery.model_dump())
+        yield with_provenance(scene, source)
         return
     size_m = settings.imagery.size_m
     where = Where(lat=lat, lon=lon, size_m=size_m, size_px=None if size_m else 1024)

@@ -17,6 +17,7 @@ Examples:
   geofield sources --json
   geofield tiles switzerland --lat 46.95 --lon 7.44 -o bern.tif
 
+\b
 A source of your own, in geofield.toml:
   [fetch.sources.county]
   url = "https://tiles.example.org/ortho/{z}/{x}/{y}.jpg?token={key}"

@@ -1,6 +1,6 @@
 """Stage 1: from a GPS point to a georeferenced picture."""
 
-from geofield.imagery.acquire import Acquired, FetchOptions, Where, acquire
+from geofield.imagery.acquire import Acquired, FetchOptions, Where, acquire, with_provenance
 from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.scene import read_scene
@@ -16,5 +16,6 @@ __all__ = [
     "find_source",
     "open_reader",
     "read_scene",
+    "with_provenance",
     "write_scene",
 ]

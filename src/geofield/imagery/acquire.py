@@ -23,7 +23,7 @@ from geofield.imagery.tags import source_tags
 from geofield.imagery.terms import check_terms
 from geofield.imagery.tiling import Block
 from geofield.imagery.write import replacing, write_scene
-from geofield.model.scene import ImagerySource
+from geofield.model.scene import ImagerySource, Scene
 
 Zoom = int | Literal["max", "fit"] | None
 
@@ -321,9 +321,15 @@ def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite
         size_px=place.size_px if place.size_m is None else None,
         bands=source.bands,
     )
-    terms = source.terms
-    known = scene.source
-    provenance = replace(
+    scene = with_provenance(scene, source)
+    write_scene(scene, path, overwrite=overwrite)
+    return Acquired(Path(path), scene.grid, scene.source, FetchReport())
+
+
+def with_provenance(scene: Scene, source: PictureSource) -> Scene:
+    """The scene with what the source's owner says of it beside what its file says."""
+    terms, known = source.terms, scene.source
+    merged = replace(
         known,
         date=source.date or known.date,
         attribution=terms.attribution or known.attribution,
@@ -331,8 +337,7 @@ def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite
         may_derive=terms.may_derive and known.may_derive,
         may_cache=terms.may_cache and known.may_cache,
     )
-    write_scene(replace(scene, source=provenance), path, overwrite=overwrite)
-    return Acquired(Path(path), scene.grid, provenance, FetchReport())
+    return replace(scene, source=merged)
 
 
 def _remove_siblings(temporary: Path) -> None:

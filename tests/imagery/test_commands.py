@@ -1,0 +1,207 @@
+"""The commands `tiles`, `sources` and `cache`, as a user runs them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+import rasterio.warp
+from shapely.geometry import box
+
+from geofield.cli import main
+from geofield.imagery import read_scene
+
+from .test_fetch import expected
+from .tile_server import Handler, first_time, hole, serving, status_500
+
+POINT = ["--lat", "35.075373", "--lon", "33.531142"]
+
+
+@pytest.fixture(autouse=True)
+def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*arguments: object) -> int:
+    try:
+        main([str(each) for each in arguments])
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def test_tiles_from_an_address(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with serving(first_time(status_500, 0.7)) as server:
+        code = run("tiles", server.template, *POINT, "--zoom", 18, "--size", 640, "-o", "a.tif")
+        shown = capsys.readouterr()
+        assert code == 0
+        assert shown.out == ""
+        assert "640 x 640 px, 0.49 m per pixel" in shown.err
+        assert "zoom 18, EPSG:3857" in shown.err
+        assert "faults met and survived" in shown.err
+        asked = len(server.paths)
+        code = run(
+            "tiles", server.template, *POINT, "--zoom", 18, "-o", "b.tif", "--json", "--offline"
+        )
+        assert code == 0
+        assert len(server.paths) == asked
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["zoom"] == 18
+    assert facts["tiles"]["cached"] == facts["tiles"]["wanted"]
+    scene = read_scene("a.tif", lat=35.075373, lon=33.531142)
+    assert np.array_equal(scene.bands, expected(scene.grid, 18))
+    assert Path("a.tif").read_bytes() == Path("b.tif").read_bytes()
+    assert run("cache", "info", "--json") == 0
+    kept = json.loads(capsys.readouterr().out)
+    assert kept[0]["tiles"] == facts["tiles"]["wanted"]
+    assert run("cache", "info") == 0
+    assert "tiles" in capsys.readouterr().out
+    assert run("cache", "clear", "nothing") == 1
+    assert "holds nothing of 'nothing'" in capsys.readouterr().err
+    assert run("cache", "clear", "--yes") == 0
+    assert list((tmp_path / "home").rglob("*.mbtiles")) == []
+
+
+def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import geopandas as gpd
+
+    area = gpd.GeoDataFrame(geometry=[box(33.52, 35.07, 33.53, 35.08)], crs="EPSG:4326")
+    area.to_crs("EPSG:32636").to_file("farm.gpkg", driver="GPKG")
+    with serving(hole) as server:
+        arguments = ["tiles", server.template, "--area", "farm.gpkg", "--zoom", 17, "-o", "a.tif"]
+        assert run(*arguments) == 1
+        assert "--missing mask" in capsys.readouterr().err
+        assert not Path("a.tif").exists()
+        assert run(*arguments, "--missing", "mask") == 0
+        assert "are no-data in the picture" in capsys.readouterr().err
+    with rasterio.open("a.tif") as file:
+        assert not file.dataset_mask().all()
+        west, south, east, north = rasterio.warp.transform_bounds(file.crs, 4326, *file.bounds)
+    assert west <= 33.52 <= 33.53 <= east
+    assert south <= 35.07 <= 35.08 <= north
+    assert max(33.52 - west, east - 33.53, 35.07 - south, north - 35.08) < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["tiles", "naipp", *POINT, "-o", "a.tif"], 1, "Did you mean 'naip'"),
+        (["tiles", "none.tif", *POINT, "-o", "a.tif"], 1, "There is no picture none.tif"),
+        (["tiles", "naip", "-o", "a.tif"], 2, "--lat and --lon, or --area"),
+        (["tiles", "naip", *POINT, "--size", "9", "--size-m", "9", "-o", "a"], 2, "not both"),
+        (["tiles", "naip", *POINT, "--zoom", "deep", "-o", "a.tif"], 2, "a number, max or fit"),
+        (["tiles", "naip", *POINT, "--zoom", "21", "-o", "a.tif"], 1, "no zoom 21"),
+        (["tiles", "https://h/{z}/{x}", *POINT, "-o", "a.tif"], 1, "lacks {y}"),
+        (["tiles", "google", *POINT, "-o", "a.tif"], 1, "GEOFIELD_KEY_GOOGLE"),
+        (["tiles", "naip", *POINT, "-o", "no/a.tif"], 1, "folder exists"),
+        (["tiles", "naip", *POINT, "-o", "a.tif", "--offline"], 1, "not in the cache"),
+        (["tiles", "naip", *POINT, "-o", "a.tif", "--offline", "--no-cache"], 1, "needs a cache"),
+    ],
+)
+def test_what_goes_wrong_is_said(
+    arguments: list[str], code: int, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == code
+    shown = capsys.readouterr().err
+    assert message in shown
+    assert "Traceback" not in shown
+    assert not Path("a.tif").exists()
+
+
+def test_terms_are_refused_until_acknowledged(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("GEOFIELD_KEY_GOOGLE", "hush-hush")
+    assert run("tiles", "google", *POINT, "-o", "a.tif") == 1
+    shown = capsys.readouterr().err
+    assert "--acknowledge-terms" in shown
+    assert "hush-hush" not in shown
+
+
+def test_sources_of_ones_own(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def keyed(handler: Handler, query: dict[str, str]) -> None:
+        zoom, column, rest = handler.path.partition("?")[0].strip("/").split("/")[-3:]
+        if query.get("t") == "s3cret" and handler.headers.get("Referer") == "https://farm":
+            tile = (int(zoom), int(column), int(rest))
+            handler.reply(200, handler.server.body(tile), "image/png")
+        else:
+            handler.reply(403, b"no", "text/plain")
+
+    with serving() as server:
+        server.routes["/own"] = keyed
+        Path("geofield.toml").write_text(
+            f'[fetch.sources.county]\nurl = "{server.address}/own/{{z}}/{{x}}/{{y}}?t={{key}}"\n'
+            'attribution = "Example County"\nlicence = "CC BY 4.0"\nmay_derive = true\n'
+            'max_zoom = 19\ndate = "2024-06"\n'
+            '[fetch.sources.county.headers]\nReferer = "https://farm"\n'
+        )
+        assert run("tiles", "county", *POINT, "-o", "a.tif") == 1
+        assert "GEOFIELD_KEY_COUNTY" in capsys.readouterr().err
+        monkeypatch.setenv("GEOFIELD_KEY_COUNTY", "s3cret")
+        assert run("tiles", "county", *POINT, "--zoom", "max", "-o", "a.tif") == 0
+        shown = capsys.readouterr()
+        assert "Example County; CC BY 4.0" in shown.err
+        assert run("sources", "--json") == 0
+        rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+    assert rows["county"]["has_key"] is True
+    assert rows["google"]["may_derive"] is False
+    scene = read_scene("a.tif")
+    assert (scene.source.zoom, scene.source.date) == (19, "2024-06")
+    assert b"s3cret" not in Path("a.tif").read_bytes()
+    assert run("sources") == 0
+    shown_list = capsys.readouterr().out
+    assert "deriving geodata: FORBIDDEN" in shown_list
+    assert "s3cret" not in shown_list
+
+
+def test_a_wrong_settings_file_does_not_show_its_keys(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("geofield.toml").write_text('[fetch.sources.county]\nkey = "s3cret"\nmax_zoom = 99\n')
+    assert run("sources") == 1
+    shown = capsys.readouterr().err
+    assert "fetch.sources.county.url" in shown
+    assert "s3cret" not in shown
+
+
+def test_ctrl_c_from_a_terminal(tmp_path: Path) -> None:
+    def slow(handler: Any, tile: tuple[int, int, int], attempt: int) -> bool:
+        time.sleep(0.1)
+        return False
+
+    with serving(slow) as server:
+        process = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "geofield", "tiles", server.template, *POINT),
+                *("--zoom", "18", "--size", "5000", "-o", str(tmp_path / "a.tif")),
+            ],
+            env={**os.environ, "XDG_CACHE_HOME": str(tmp_path / "home")},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(600):
+            if len(server.asked) > 60:
+                break
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, shown = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "Stopped" in shown
+    assert "Traceback" not in shown
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["home"]
+
+
+def test_help_ends_with_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in (["tiles"], ["sources"], ["cache"], ["cache", "info"], ["cache", "clear"]):
+        assert run(*command, "--help") == 0
+        assert "geofield " + command[0] in capsys.readouterr().out.partition("Example")[2]
