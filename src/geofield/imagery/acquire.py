@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -172,7 +172,8 @@ def acquire(
         fetcher = _fetcher(source, options, stack)
         staging = Staging(temporary.with_suffix(".rows.tif"), block)
         stack.callback(_remove_siblings, temporary)
-        staging.fill(fetcher.rows(block, progress))
+        # Closed before the cache is: what has arrived when the work stops is still kept.
+        staging.fill(stack.enter_context(closing(fetcher.rows(block, progress))))
         report = fetcher.report
         if report.absent and (options.missing == "error" or report.absent == report.wanted):
             raise absence_error(source.name, report, offline=options.offline)

@@ -7,7 +7,7 @@ progress. A few rows are under way at a time, so memory does not grow with the b
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
@@ -97,7 +97,7 @@ class TileFetcher:
 
     def rows(
         self, block: Block, progress: Progress | None = None
-    ) -> Iterator[tuple[int, NDArray[np.uint8], NDArray[np.bool_] | None]]:
+    ) -> Generator[tuple[int, NDArray[np.uint8], NDArray[np.bool_] | None], None, None]:
         """The rows of tiles, north to south.
 
         Yields
