@@ -23,7 +23,6 @@ from geofield.cli.console import Progress, say
 if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Where
     from geofield.imagery.sources import Source, SourceEntry
-    from geofield.model.scene import Scene
     from geofield.settings import Settings
 
 
@@ -138,9 +137,9 @@ def as_picture(
     lon: float,
     acknowledged: bool = False,
     progress: Progress | None = None,
-) -> Iterator[Scene | str]:
-    """What `plan_field` takes: the user's own picture, or one fetched for the moment."""
-    from geofield.imagery import Where, acquire, read_scene, with_provenance
+) -> Iterator[str]:
+    """A path that `read_scene` reads: the user's own picture, or one fetched for the moment."""
+    from geofield.imagery import Where, acquire, read_scene, with_provenance, write_scene
     from geofield.imagery.sources import PictureSource
     from geofield.imagery.terms import check_terms
 
@@ -151,8 +150,13 @@ def as_picture(
     source = resolve(what, settings, point=(lon, lat), proxy=options.proxy)
     if isinstance(source, PictureSource):
         check_terms(source.name, source.terms, acknowledged=acknowledged)
-        scene = read_scene(source.path, lat=lat, lon=lon, **settings.imagery.model_dump())
-        yield with_provenance(scene, source)
+        if settings.imagery.bands or source.terms.attribution + source.terms.licence == "":
+            yield source.path
+            return
+        # What the settings say of its terms must travel with it: as a file that says so.
+        scene = read_scene(source.path, lat=lat, lon=lon, size_m=settings.imagery.size_m)
+        with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
+            yield str(write_scene(with_provenance(scene, source), Path(folder) / "scene.tif"))
         return
     size_m = settings.imagery.size_m
     where = Where(lat=lat, lon=lon, size_m=size_m, size_px=None if size_m else 1024)
