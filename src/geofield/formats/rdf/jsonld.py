@@ -53,7 +53,7 @@ class JsonLd(Serialiser):
         """The end of the graph."""
         return "\n]\n}\n"
 
-    def stream(self, groups: Iterable[Group]) -> Iterator[bytes]:
+    def stream(self, groups: Iterable[Group]) -> Iterator[bytes | memoryview]:
         """The document; commas stand before all rows but the first."""
         yield self.head().encode()
         first = True

@@ -123,12 +123,13 @@ def join_values(columns: Sequence[Any], separator: str) -> Any:
     return lists
 
 
-def text_of(rows: Any) -> bytes:
-    """A string column's rows, one after the other, as UTF-8."""
-    if isinstance(rows, pa.ChunkedArray):
-        return b"".join(text_of(chunk) for chunk in rows.chunks)
-    offsets = np.frombuffer(rows.buffers()[1], np.int32)[rows.offset : rows.offset + len(rows) + 1]
-    return memoryview(rows.buffers()[2])[offsets[0] : offsets[-1]].tobytes() if len(rows) else b""
+def text_of(rows: Any) -> memoryview:
+    """A string column's rows, one after the other, as UTF-8: a view, nothing is copied."""
+    if not len(rows):
+        return memoryview(b"")
+    _, offsets, characters = rows.buffers()
+    bounds = np.frombuffer(offsets, np.int32)[[rows.offset, rows.offset + len(rows)]]
+    return memoryview(characters)[bounds[0] : bounds[1]]
 
 
 # -- single nodes, for the few descriptions that are not tables --------------------------------

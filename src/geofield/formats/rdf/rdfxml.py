@@ -43,7 +43,7 @@ class RdfXml(Serialiser):
         """The end of the root element."""
         return "</rdf:RDF>\n"
 
-    def stream(self, groups: Iterable[Group]) -> Iterator[bytes]:
+    def stream(self, groups: Iterable[Group]) -> Iterator[bytes | memoryview]:
         """The document; nodes that are members of another are nested in its description."""
         yield self.head().encode()
         inside = ""

@@ -48,7 +48,7 @@ class Serialiser(ABC):
         """What comes after the last node."""
         return ""
 
-    def stream(self, groups: Iterable[Group]) -> Iterator[bytes]:
+    def stream(self, groups: Iterable[Group]) -> Iterator[bytes | memoryview]:
         """The whole document, in pieces."""
         yield self.head().encode()
         for piece in pieces(groups):

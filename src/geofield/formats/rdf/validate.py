@@ -15,13 +15,16 @@ from rdflib.namespace import RDF, SH
 from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
 from geofield.formats.rdf.layers import all_terms, layer_maps
-from geofield.formats.rdf.namespaces import GML, SCHEMA_PREFIXES, STRING, STUDY_TREE, expand
+from geofield.formats.rdf.namespaces import GEO, GML, SCHEMA_PREFIXES, STRING, STUDY_TREE, expand
 from geofield.formats.rdf.parse import Graph, parse
 from geofield.formats.rdf.problem import Problem
 from geofield.formats.rdf.publish import SHAPES, resource
 from geofield.formats.validation import Finding
 
 _BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
+
+_GEOMETRY_LINKS = frozenset({GEO + "hasGeometry", GEO + "hasDefaultGeometry"})
+_TRIPLES_AT_ONCE = 20_000
 
 
 def validate(path: Path) -> list[Problem]:
@@ -76,11 +79,38 @@ def _distinct(problems: list[Problem]) -> list[Problem]:
 
 
 def _shape_problems(quads: list[ox.Quad]) -> Iterator[Problem]:
+    for batch in _batches(quads):
+        data = rdflib.Graph()
+        for quad in batch:
+            data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
+        yield from _run_shapes(data)
+
+
+def _batches(quads: list[ox.Quad]) -> Iterator[list[ox.Quad]]:
+    """Triples in parts that can be checked on their own: features with their geometries.
+
+    No shape looks further than from a feature to its geometry, and rdflib needs a kilobyte
+    for each triple: a large plan would not fit into memory at once.
+    """
+    owners = {
+        quad.object: quad.subject for quad in quads if quad.predicate.value in _GEOMETRY_LINKS
+    }
+    parts: dict[Any, list[ox.Quad]] = {}
+    for quad in quads:
+        parts.setdefault(owners.get(quad.subject, quad.subject), []).append(quad)
+    batch: list[ox.Quad] = []
+    for part in parts.values():
+        batch += part
+        if len(batch) >= _TRIPLES_AT_ONCE:
+            yield batch
+            batch = []
+    if batch:
+        yield batch
+
+
+def _run_shapes(data: rdflib.Graph) -> Iterator[Problem]:
     import pyshacl
 
-    data = rdflib.Graph()
-    for quad in quads:
-        data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
     conforms, report, _ = pyshacl.validate(
         data, shacl_graph=_shapes(), inference="none", meta_shacl=False, advanced=False
     )
