@@ -12,6 +12,8 @@ from typing import Any
 
 import click
 
+from linked_data import ontology_page, queries_page
+
 REPOSITORY_NOTE = "This page is generated from the code it describes."
 
 
@@ -21,6 +23,8 @@ def generated_pages(root: Path) -> dict[str, str | bytes]:
         "reference/cli.md": command_line(),
         "reference/settings.md": settings(),
         "reference/layers.md": layers(),
+        "reference/ontology.md": ontology_page(),
+        "reference/queries.md": queries_page(),
         "reference/changes.md": changes(root / "CHANGES.md"),
         "benchmarks.md": benchmarks(root / "benchmarks" / "results"),
     }
