@@ -97,8 +97,9 @@ def term_rule(term: Term, cls: str, label: str) -> Rule:
         constraints.append(("sh:minCount", "1"))
     if term.name not in MANY_VALUES:
         constraints.append(("sh:maxCount", "1"))
-    words = [f"{_article(label)} {'needs' if needed else 'may have'}"]
-    words.append(f"one {_lower(term.label)} ({term.name}):")
+    many = term.name in MANY_VALUES
+    count = ("at least one" if many else "exactly one") if needed else "any number" if many else ""
+    words = [f"{term.label} ({term.name}) of {_article(label)}:", f"{count or 'one or none'},"]
     if term.is_object:
         constraints.append(("sh:nodeKind", "sh:IRI"))
         allowed = _code_list(term.range)
@@ -112,8 +113,9 @@ def term_rule(term: Term, cls: str, label: str) -> Rule:
         constraints.append(("sh:datatype", term.range))
         words.append(_DATATYPE_WORDS.get(term.range, f"a {term.range}"))
     constraints += _bounds(term)
-    words.append(_bounds_words(term))
-    return Rule(term.name, " ".join(w for w in words if w) + ".", tuple(constraints))
+    bounds = _bounds_words(term)
+    message = " ".join(words) + (f", {bounds}" if bounds else "") + "."
+    return Rule(term.name, message, tuple(constraints))
 
 
 _DATATYPE_WORDS = {
@@ -279,11 +281,7 @@ def _shape_name(cls: str) -> str:
 
 
 def _article(label: str) -> str:
-    return f"{'An' if label[0] in 'AEIOU' else 'A'} {_lower(label)}"
-
-
-def _lower(label: str) -> str:
-    return label[0].lower() + label[1:]
+    return f"{'an' if label[0] in 'AEIOU' else 'a'} {label[0].lower()}{label[1:]}"
 
 
 __all__ = ["REQUIRED", "Rule", "class_rules", "shapes_turtle", "value_iri"]

@@ -130,6 +130,9 @@ TERMS: tuple[Term, ...] = (
     Term("gf:outsideInMetres", "xsd:double", "Outside",
          "Length of the way outside the area allowed for turning.",
          ("gf:Turn",), unit="unit:M", minimum=0),
+    Term("gf:skippedInMetres", "xsd:double", "Track left out",
+         "Length of track that is not driven, for the turn to fit.",
+         ("gf:Turn",), unit="unit:M", minimum=0),
     Term("gf:fits", "xsd:boolean", "Fits", "Whether the machine can drive it there.",
          ("gf:Turn",)),
     # -- links
