@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import resource
 import statistics
 import subprocess
@@ -27,6 +26,7 @@ import shapely
 from affine import Affine
 from pyproj import CRS
 
+from common import machine, write_page
 from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.formats import FORMATS, write_dataset
@@ -179,6 +179,7 @@ def main() -> None:
         "| product | seconds (median, min to max) | MB written | MB before | peak MB |",
         "| --- | --- | --- | --- | --- |",
     ]
+    medians: dict[str, float] = {}
     for name in names:
         few = 5 if name in ("gpkg:no points", "peer") else 1
         runs = []
@@ -198,6 +199,7 @@ def main() -> None:
             continue
         seconds = [run["seconds"] for run in runs]
         last = runs[-1]
+        medians[name] = statistics.median(seconds)
         spread = f" ({min(seconds):.2f} to {max(seconds):.2f})" if len(seconds) > 1 else ""
         title = {"peer": "geopandas `to_file`, GeoPackage, no points"}.get(name, name)
         rows.append(
@@ -205,19 +207,22 @@ def main() -> None:
             f"| {last['before_mb']:.0f} | {last['peak_mb']:.0f} |"
         )
         print(rows[-1], file=sys.stderr)
-    import geopandas
-    import pyogrio
-
-    head = (
-        f"{platform.machine()}, Python {platform.python_version()}, geopandas "
-        f"{geopandas.__version__}, pyogrio {pyogrio.__version__}, GDAL "
-        f"{pyogrio.__gdal_version_string__}"
-    )
-    text = f"# Writing a very large plan\n\n{head}\n\n" + "\n".join(rows) + "\n"
-    print(text)
-    target = Path(__file__).parent / "results" / "formats.md"
-    target.parent.mkdir(exist_ok=True)
-    target.write_text(text, encoding="utf-8")
+    notes = [
+        *machine("geopandas", "pyogrio", "pyarrow"),
+        "",
+        "Plan: 1500 tracks, 38 000 segments, 36 500 gaps, 10 000 obstacles, 3.6 million points. "
+        "One process per run; `MB before` is the memory of the plan before it is written.",
+        "",
+        *rows,
+    ]
+    if "gpkg:no points" in medians and "peer" in medians:
+        ratio = medians["gpkg:no points"] / medians["peer"]
+        notes += [
+            "",
+            f"GeoPackage without points, with styles, project, origin: {ratio:.2f} times the time "
+            "of geopandas' `to_file` for the bare tables.",
+        ]
+    write_page("formats", "Writing a very large plan", notes)
 
 
 if __name__ == "__main__":

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import pytest
 import shapely
+from click.testing import CliRunner
 from formats_plan import ORIGIN, make_dataset
 
-from geofield.cli.plan_files import save_plan
+from geofield.cli.tracks import tracks
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Field, Provenance
-from geofield.pipeline import run_tracks
-from geofield.plan import outline_digest, read_plan
-from geofield.settings import Settings
-
-SETTINGS = Settings.model_validate({"tracks": {"spacing_m": 5.0}})
+from geofield.plan import outline_digest
 
 
 def placed(*xy):
@@ -22,8 +19,11 @@ def placed(*xy):
 
 
 def plan_again(path):
-    plan = run_tracks(read_plan(path), settings=SETTINGS)
-    save_plan(plan, path, read_from=path)
+    """As a person does it: `geofield tracks field.gpkg --spacing 5 -o field.gpkg`."""
+    done = CliRunner().invoke(
+        tracks, [str(path), "--spacing", "5", "-o", str(path)], catch_exceptions=False
+    )
+    assert done.exit_code == 0, done.output
     return read_dataset(path)
 
 

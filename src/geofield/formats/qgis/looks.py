@@ -151,7 +151,7 @@ LOOKS: dict[str, Look] = {
     ),
     "tracks": Look(
         (
-            Rule("Track", "line", (line(_DRIVE, 0.25),), min_scale=2500),
+            Rule("Track", "line", (line(_DRIVE, 0.22),), min_scale=1000),
             Rule(
                 "Track with direction",
                 "line",
@@ -160,7 +160,7 @@ LOOKS: dict[str, Look] = {
                     line(_DRIVE, 0.35),
                     arrows(_DRIVE, every_m=20, size_m=1.8),
                 ),
-                max_scale=2500,
+                max_scale=1000,
             ),
         ),
         (
