@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import tempfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from formats_plan import NAME, make_dataset
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from geofield.errors import FormatError
 from geofield.formats import FORMATS, read_dataset, validate_file, write_dataset
 from geofield.formats.names import cut_name
 
@@ -157,3 +160,59 @@ def test_any_name_survives(text, name):
         back = read_dataset(out / read.get(name, name))
     expected = cut_name(name_there, 32) if name == "isoxml" else name_there
     assert back.name == expected
+
+
+@pytest.mark.parametrize("profile", ["tracklead", "aggps"])
+def test_what_terminals_hold_can_be_imported(dataset, tmp_path, profile):
+    written = write_dataset(dataset, tmp_path, ["shapefile"], options={"profile": profile})
+    back = read_dataset(written[0].parent)
+    assert (
+        back.table("field")
+        .geometry.iloc[0]
+        .symmetric_difference(dataset.table("field").geometry.iloc[0])
+        .area
+        < 0.01
+    )
+    kept = dataset.table("obstacles").set_index("obstacle_no").geometry
+    found = back.table("obstacles")
+    assert len(found) == 3
+    for shape in found.geometry:
+        nearest = min(kept, key=lambda other: other.centroid.distance(shape.centroid))
+        if profile == "aggps" or len(nearest.interiors) == 0:
+            assert nearest.symmetric_difference(shape).area < 0.01
+    assert len(back.table("segments")) == len(dataset.table("segments"))
+
+
+@pytest.mark.parametrize("name", ["shapefile", "isoxml", "gpkg"])
+def test_archives_are_read(dataset, tmp_path, name):
+    write_dataset(dataset, tmp_path / "there", [name])
+    whole = shutil.make_archive(str(tmp_path / "stick"), "zip", tmp_path / "there")
+    back = read_dataset(whole)
+    assert back.name == NAME
+    assert len(back.table("obstacles")) == (3 if name == "isoxml" else 4)
+    if name == "gpkg":
+        assert len(back.table("track_points")) == len(dataset.table("track_points"))
+    assert [f for f in validate_file(whole) if f.level == "error"] == []
+
+
+def test_own_zipped_shapefiles(dataset, tmp_path):
+    (path,) = write_dataset(dataset, tmp_path, ["shapefile"], options={"zip": True})
+    assert len(read_dataset(path).table("segments")) == len(dataset.table("segments"))
+
+
+def test_archives_that_lead_out_of_their_folder(tmp_path):
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w") as archive:
+        archive.writestr("../../evil.shp", b"x")
+    with pytest.raises(FormatError, match="leads out"):
+        read_dataset(tmp_path / "bad.zip")
+    (tmp_path / "broken.zip").write_bytes(b"PK not really")
+    with pytest.raises(FormatError, match="cannot be unpacked"):
+        read_dataset(tmp_path / "broken.zip")
+
+
+def test_options_for_one_format_alone(dataset, tmp_path):
+    options = {"shapefile": {"profile": "tracklead"}, "customer": "Ann"}
+    write_dataset(dataset, tmp_path, ["shapefile", "isoxml"], options=options)
+    assert list((tmp_path / "shapefile").glob("*_guidancepath.shp"))
+    with pytest.raises(FormatError, match="Did you mean 'profile'"):
+        write_dataset(dataset, tmp_path / "x", ["shapefile"], options={"shapefile": {"profil": 1}})

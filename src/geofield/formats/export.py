@@ -43,7 +43,8 @@ def write_dataset(
     overwrite : bool
         Whether products that are there already may be replaced.
     options : mapping, optional
-        Options of the writers (see `Format.options`); each writer gets those it knows.
+        Options of the writers (see `Format.options`); each writer gets those it knows. Under
+        a format's name stands a mapping of options for it alone.
     inputs : iterable of Path
         Files that were read for this dataset: they are never replaced.
     tell_drops : bool
@@ -74,6 +75,7 @@ def write_dataset(
         for each in chosen:
             write = each.load_writer()
             own = {key: value for key, value in given.items() if key in each.options}
+            own |= given.get(each.name, {})
             for path in write(dataset, staging, stem=stem, options=own):
                 place = target / path.relative_to(staging)
                 if place in written:
@@ -124,8 +126,10 @@ def _present(dataset: Dataset, when: str) -> bool:
 
 def _check_options(chosen: list[Format], given: Mapping[str, Any]) -> None:
     known = {key for each in chosen for key in each.options}
-    for key in given:
-        if key not in known:
+    own = {each.name: each.options for each in chosen}
+    inner = [(key, own[name]) for name in own for key in given.get(name, {})]
+    for key, options in [*((key, {*known, *own}) for key in given), *inner]:
+        if key not in options:
             near = difflib.get_close_matches(key, sorted(known), n=1)
             raise FormatError(
                 f"No chosen format knows the option {key!r}.",

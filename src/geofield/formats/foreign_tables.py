@@ -48,7 +48,8 @@ def numbers_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> np.ndarray:
     if series is None:
         return np.full(len(frame), np.nan)
     numeric = pd.to_numeric(series, errors="coerce")
-    return np.asarray(numeric.to_numpy(dtype="float64", na_value=np.nan))
+    # A copy: what pandas hands out may be read-only.
+    return np.array(numeric.to_numpy(dtype="float64", na_value=np.nan))
 
 
 def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:

@@ -12,7 +12,8 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
-from geofield.formats.registry import detect
+from geofield.formats.registry import detect, product_file
+from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 
 
@@ -22,7 +23,7 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
     Parameters
     ----------
     path : Path
-        Of any format with a reader, recognised by suffix and content.
+        Of any format with a reader, recognised by suffix and content; also in a ZIP archive.
     crs : CRS or str, optional
         Of the coordinates, for files that do not say it (a Shapefile without ``.prj``).
 
@@ -32,13 +33,24 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
         When the file is not there, not known or damaged, or its CRS is in doubt.
     """
     place = Path(path)
+    if place.suffix.lower() == ".zip" and place.is_file():
+        with unpacked(place) as folder:
+            inside = read_dataset(folder, crs=crs)
+            return inside if inside.points is None else _with_points_in_memory(inside)
     found = detect(place)
+    place = product_file(place, found)
     reader = found.load_reader()
     if crs is None:
         return reader(place)
     if not found.asks_crs:
         raise FormatError(f"{found.title} files say their CRS themselves.", hint="Leave out --crs.")
     return reader(place, crs=parse_crs(crs))
+
+
+def _with_points_in_memory(dataset: Dataset) -> Dataset:
+    """The same where the file of the points will be gone."""
+    points = {schema.TRACK_POINTS.name: dataset.table(schema.TRACK_POINTS.name)}
+    return replace(dataset, tables={**dataset.tables, **points}, points=None)
 
 
 def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:

@@ -77,6 +77,8 @@ class Format:
         The options its writer understands.
     asks_crs : bool
         Whether its reader takes a ``crs`` for files that do not say theirs.
+    reads_folders : bool
+        Whether its reader takes a folder of files; else a folder must hold just one.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -95,6 +97,7 @@ class Format:
     options: tuple[str, ...] = ()
     asks_crs: bool = False
     validator: str | None = None
+    reads_folders: bool = False
 
     def load_writer(self) -> Writer:
         """The writer, imported."""
@@ -159,6 +162,7 @@ _FORMATS = (
         precision_m=0.012,
         asks_crs=True,
         validator="geofield.formats.checks.geojson:check",
+        reads_folders=True,
     ),
     Format(
         "shapefile",
@@ -173,6 +177,7 @@ _FORMATS = (
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
         validator="geofield.formats.checks.shapefile:check",
+        reads_folders=True,
     ),
     Format(
         "geoparquet",
@@ -184,6 +189,7 @@ _FORMATS = (
         suffixes=(".parquet",),
         precision_m=0.0,
         crs="metric",
+        reads_folders=True,
     ),
     Format(
         "flatgeobuf",
@@ -196,6 +202,7 @@ _FORMATS = (
         drops=(Drop("settings and evidence", "provenance"),),
         precision_m=0.0,
         crs="metric",
+        reads_folders=True,
     ),
     Format(
         "kml",
@@ -219,6 +226,7 @@ _FORMATS = (
             Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
             Drop("settings and evidence", "provenance"),
         ),
+        validator="geofield.formats.checks.gdal:check",
     ),
     Format(
         "csv",
@@ -248,6 +256,7 @@ _FORMATS = (
             Drop("settings and evidence", "provenance"),
         ),
         crs="metric",
+        validator="geofield.formats.checks.gdal:check",
     ),
     Format(
         "isoxml",
@@ -260,6 +269,7 @@ _FORMATS = (
         precision_m=0.0002,
         options=("customer", "farm"),
         validator="geofield.formats.checks.isoxml:check",
+        reads_folders=True,
     ),
     Format(
         "isoxml-v3",
@@ -272,6 +282,7 @@ _FORMATS = (
         precision_m=0.0002,
         options=("customer", "farm"),
         validator="geofield.formats.checks.isoxml:check",
+        reads_folders=True,
     ),
     Format(
         "agopengps",
@@ -290,6 +301,7 @@ _FORMATS = (
         ),
         precision_m=0.005,
         validator="geofield.formats.checks.agopengps:check",
+        reads_folders=True,
     ),
     Format(
         "rdf",
@@ -412,6 +424,24 @@ def detect(path: Path | str) -> Format:
         f"The format of {place} is not known.",
         hint=f"Known: {', '.join(sorted(s for f in FORMATS.values() for s in f.suffixes))}.",
     )
+
+
+def product_file(place: Path, found: Format) -> Path:
+    """What a format's reader is given for a path: the path, or the one file in that folder.
+
+    Raises
+    ------
+    FormatError
+        When the folder holds several.
+    """
+    if not place.is_dir() or found.reads_folders:
+        return place
+    files = sorted(file for file in place.iterdir() if file.suffix.lower() in found.suffixes)
+    if len(files) != 1:
+        raise FormatError(
+            f"{place} holds {len(files)} {found.title} files.", hint="Name one of them."
+        )
+    return files[0]
 
 
 def _detect_folder(folder: Path) -> Format:

@@ -14,7 +14,8 @@ import shapely
 from geofield import schema
 from geofield.errors import FormatWarning, GeofieldError
 from geofield.formats.importing import read_dataset
-from geofield.formats.registry import detect
+from geofield.formats.registry import detect, product_file
+from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -52,10 +53,16 @@ def validate_file(path: Path | str) -> list[Finding]:
         When there is no such file or its format is not known.
     """
     place = Path(path)
+    if place.suffix.lower() == ".zip" and place.is_file():
+        with unpacked(place) as folder:
+            return validate_file(folder)
     found = detect(place)
+    place = product_file(place, found)
     check = found.load_validator()
     findings = list(check(place)) if check is not None else []
     if found.reader is None:
+        if check is None:
+            findings.append(Finding("warning", place.name, f"there is no check for {found.title}"))
         return findings
     try:
         with warnings.catch_warnings(record=True) as caught:

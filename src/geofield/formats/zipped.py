@@ -1,0 +1,62 @@
+"""Reading out of ZIP archives, as Shapefiles and task data are passed on."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from geofield.errors import FormatError
+
+#: More than this is no archive of one field, bytes.
+MAX_BYTES = 4 * 2**30
+
+
+@contextmanager
+def unpacked(path: Path) -> Iterator[Path]:
+    """The folder with an archive's content, for a block.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    Path
+        The innermost folder that holds everything.
+
+    Raises
+    ------
+    FormatError
+        When it is no archive, encrypted, too large, or leads out of its folder.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+            if sum(entry.file_size for entry in entries) > MAX_BYTES:
+                raise FormatError(f"{path} unpacks to more than {MAX_BYTES / 2**30:.0f} GB.")
+            for entry in entries:
+                parts = PurePosixPath(entry.filename.replace("\\", "/")).parts
+                if ".." in parts or PurePosixPath(entry.filename).is_absolute():
+                    raise FormatError(f"{path}: the entry {entry.filename!r} leads out of it.")
+                if parts[0] == "__MACOSX":
+                    continue
+                target = folder.joinpath(*parts)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with archive.open(entry) as source, target.open("wb") as out:
+                    shutil.copyfileobj(source, out)
+            yield _innermost(folder)
+    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
+        raise FormatError(f"{path} cannot be unpacked: {error}.", hint="Is it whole?") from error
+
+
+def _innermost(folder: Path) -> Path:
+    inside = list(folder.iterdir())
+    while len(inside) == 1 and inside[0].is_dir() and inside[0].name.upper() != "TASKDATA":
+        folder = inside[0]
+        inside = list(folder.iterdir())
+    return folder
