@@ -147,6 +147,17 @@ def edit(path, changes):
     return {"done": len(changes)}
 
 
+def hold(uri):
+    """Keep a layer open, as a person does, until a line comes in."""
+    layer = QgsVectorLayer(uri, "layer", "ogr")
+    layer.startEditing()
+    assert next(layer.getFeatures()).isValid()
+    print("holding", flush=True)
+    sys.stdin.readline()
+    layer.rollBack()
+    return {"held": layer.isValid()}
+
+
 def validity(uris):
     """Errors of `qgis:checkvalidity` by layer, with the GEOS method."""
     sys.path.append("/usr/share/qgis/python/plugins")
@@ -180,6 +191,7 @@ ACTIONS = {
     "raster": raster,
     "render": render,
     "edit": edit,
+    "hold": hold,
     "validity": validity,
     "several": several,
 }

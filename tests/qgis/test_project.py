@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from formats_plan import NAME, X0, Y0
+from formats_plan import NAME, X0, Y0, make_dataset
 from PIL import Image
 
 from geofield import schema
+from geofield.errors import FormatError
+from geofield.formats import read_dataset, write_dataset
 
 STORED = Path(__file__).with_name("project.png")
 TOP_TO_BOTTOM = ["obstacles", "track_points", "gaps", "tracks", "segments", "field", "scene"]
@@ -131,3 +135,39 @@ def test_a_field_is_visible_at_region_scale(copy, qgis, tmp_path, scale):
         picture = np.asarray(image.convert("RGB")).astype(int)
     yellow = (picture[..., 0] > 220) & (picture[..., 1] > 180) & (picture[..., 2] < 80)
     assert yellow.sum() > 20
+
+
+def test_a_headland_a_route_and_turns_are_shown(qgis, tmp_path):
+    write_dataset(make_dataset(points=False, optional=True), tmp_path, ["gpkg"])
+    opened = qgis("project", uri=str(tmp_path / "field.qgz"))
+    assert opened["bad"] == []
+    for name in ("headland", "headland_tracks", "route", "turns"):
+        facts = opened["layers"][f"geofield_{name}"]
+        assert facts["rows"] == 1
+        assert facts["renderer"] == "RuleRenderer"
+    assert opened["layers"]["geofield_turns"]["rules"] == ["Turn", "Turn that does not fit"]
+    png = tmp_path / "optional.png"
+    assert qgis("render", uri=str(tmp_path / "field.qgz"), png=str(png))["errors"] == []
+
+
+def test_a_file_that_qgis_has_open_is_not_replaced(qgis_environment, tmp_path):
+    """A second program holds the layer in an edit session while the plan is written again."""
+    write_dataset(make_dataset(points=False), tmp_path, ["gpkg"])
+    path = tmp_path / "field.gpkg"
+    holder = subprocess.Popen(
+        ["/usr/bin/python3", str(Path(__file__).with_name("client.py")),
+         json.dumps({"do": "hold", "uri": f"{path}|layername=obstacles"})],
+        env=qgis_environment,
+        stdout=subprocess.PIPE,
+        stdin=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    try:
+        assert any("holding" in line for line in holder.stdout)
+        with pytest.raises(FormatError, match="open in another program"):
+            write_dataset(make_dataset(points=False), tmp_path, ["gpkg"], overwrite=True)
+        assert len(read_dataset(path).table("obstacles")) == 4
+    finally:
+        holder.communicate("\n", timeout=60)
+    write_dataset(make_dataset(points=False), tmp_path, ["gpkg"], overwrite=True)
+    assert len(read_dataset(path).table("obstacles")) == 4
