@@ -1,0 +1,125 @@
+"""What a format is: its names, what it carries and drops, who writes, reads and checks it.
+
+Nothing heavy is imported before a format is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from geofield.errors import FormatError
+from geofield.model import Dataset
+
+Writer = Callable[..., list[Path]]
+Reader = Callable[..., Dataset]
+Validator = Callable[[Path], Iterable[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """Something that a format cannot carry.
+
+    Attributes
+    ----------
+    words : str
+        For people: "the confidence of obstacles".
+    when : str
+        Which datasets have it: a layer (``gaps``), a column with values
+        (``obstacles.confidence``), ``provenance``, ``holes`` (of the field) or
+        ``polygons`` (obstacles that are not circles).
+    """
+
+    words: str
+    when: str
+
+    def __str__(self) -> str:
+        return self.words
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """One product format.
+
+    Attributes
+    ----------
+    name : str
+        As the user writes it.
+    title : str
+        For people.
+    files : tuple of str
+        What is written, relative to the output folder; ``{stem}`` is the product's name.
+    layers : tuple of str
+        The layers of `geofield.schema` that it carries.
+    writer : str
+        ``module:function`` with the signature
+        ``write(dataset, folder, *, stem, options) -> list[Path]``: writes into the empty
+        staging folder and returns what it wrote.
+    reader : str or None
+        ``module:function`` with the signature ``read(path) -> Dataset``; None where the
+        format cannot be imported.
+    suffixes : tuple of str
+        By which a file is recognised; with the dot, lower case.
+    drops : tuple of Drop
+        What it cannot carry, besides the layers that are not in `layers`.
+    precision_m : float or None
+        How far a coordinate may move on the way out and back, metres; None where there is
+        no way back.
+    crs : str
+        ``metric`` or ``WGS 84``.
+    options : tuple of str
+        The options its writer understands.
+    asks_crs : bool
+        Whether its reader takes a ``crs`` for files that do not say theirs.
+    reads_folders : bool
+        Whether its reader takes a folder of files; else a folder must hold just one.
+    validator : str or None
+        ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
+        of the format itself.
+    """
+
+    name: str
+    title: str
+    files: tuple[str, ...]
+    layers: tuple[str, ...]
+    writer: str
+    reader: str | None = None
+    suffixes: tuple[str, ...] = ()
+    drops: tuple[Drop, ...] = ()
+    precision_m: float | None = None
+    crs: str = "WGS 84"
+    options: tuple[str, ...] = ()
+    asks_crs: bool = False
+    validator: str | None = None
+    reads_folders: bool = False
+
+    def load_writer(self) -> Writer:
+        """The writer, imported."""
+        return _load(self.writer)  # type: ignore[no-any-return]
+
+    def load_reader(self) -> Reader:
+        """The reader, imported.
+
+        Raises
+        ------
+        FormatError
+            When the format cannot be imported.
+        """
+        if self.reader is None:
+            raise FormatError(
+                f"{self.title} can be written, not read.",
+                hint="`geofield formats` lists what can be read.",
+            )
+        return _load(self.reader)  # type: ignore[no-any-return]
+
+    def load_validator(self) -> Validator | None:
+        """The check of the format's own rules, imported; None where there is none."""
+        return None if self.validator is None else _load(self.validator)
+
+
+def _load(reference: str) -> Any:
+    module, _, function = reference.partition(":")
+    return getattr(import_module(module), function)
