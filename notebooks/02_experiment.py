@@ -18,7 +18,7 @@
 #
 # Two cautions. Simulated fields flatter every method: crowns are dark and round, and the true
 # outline is given. And the thresholds are scanned in coarser steps than the study's 0.001, on
-# pictures of 320 px, so that the notebook runs in about two minutes.
+# pictures of 320 px (430 px for crowded fields), so that the notebook runs in about two minutes.
 
 # %%
 import os
@@ -27,11 +27,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from experiment import METHODS, chip_trial, run_trials, simulated_trial, totals
+from experiment import METHODS, chip_trial, run_trials, simulated, simulated_trial, totals
 from look import COLOURS, show_scene, side_by_side, use
 
 import geofield as gf
-from geofield.simulate import SimulationSettings, simulate_field
 
 use()
 SHARED = Path(os.environ.get("GEOFIELD_SHARED", "../../shared")).resolve()
@@ -58,8 +57,7 @@ print(len(OBSTACLES), "fields,", sum(OBSTACLES), "obstacles")
 # %%
 figure, axes = side_by_side(4, height=2.4)
 for axis, number in zip(axes.flat, (1, 9, 18, 34), strict=True):
-    settings = SimulationSettings(width_px=320, height_px=320, obstacles=OBSTACLES[number - 1])
-    made = simulate_field(9_000 + number, settings)
+    made = simulated(number, OBSTACLES[number - 1])
     show_scene(axis, made.scene)
     axis.plot(*made.field.polygon.exterior.xy, color=COLOURS["field"], linewidth=1)
     axis.set_title(f"field {number}: {len(made.obstacles)} trees")
@@ -73,14 +71,15 @@ plt.show()
 # %%
 numbers = range(1, len(OBSTACLES) + 1)
 trials = run_trials(simulated_trial, numbers, OBSTACLES)
-simulated = totals(trials)
+on_simulated = totals(trials)
 print(sum(trial.obstacles for trial in trials), "trees drawn")
+assert [trial.obstacles for trial in trials] == OBSTACLES
 
 # %% [markdown]
 # The strategy `dlc` of geofield is what is put together here from the scans of the four methods:
 
 # %%
-made = simulate_field(9_001, SimulationSettings(width_px=320, height_px=320, obstacles=39))
+made = simulated(1, OBSTACLES[0])
 span = (0.0, 0.3, 0.02)
 dlc = gf.detect_obstacles(made.scene, made.field, strategy="dlc", threshold_range=span)
 counts = dlc.attrs["detection"]["counts"]
@@ -142,17 +141,18 @@ plt.show()
 # trees, recall the share of trees that were found, F1 their harmonic mean.
 
 # %%
-print(simulated.to_string())
+print(on_simulated.to_string())
 
 # %% [markdown]
 # ## Which threshold gave the most circles
 
 # %%
 picked = pd.DataFrame([trial.chosen for trial in trials], columns=["method", "threshold"])
-table = picked.groupby("method").threshold.agg(["count", "mean"]).round(3)
+table = picked.groupby("method").threshold.agg(fields="count", mean="mean").round(3)
 if STUDY_TABLES.is_dir():
     theirs = pd.read_csv(STUDY_TABLES / "study_dlc_counts.csv").groupby("edge_method").threshold
-    table = table.join(theirs.agg(["count", "mean"]).round(3), rsuffix=" (study)", how="outer")
+    theirs = theirs.agg(**{"fields (study)": "count", "mean (study)": "mean"}).round(3)
+    table = pd.concat([table, theirs], axis=1)
 print(table.to_string())
 
 # %% [markdown]
@@ -188,10 +188,10 @@ study = pd.Series(
     },
     name="study",
 )
-columns = [study, simulated.F1.rename("simulated")]
+columns = [study, on_simulated.F1.rename("simulated")]
 if real is not None:
     columns.append(real.F1.rename("real chips"))
-comparison = pd.concat(columns, axis=1).reindex(simulated.index)
+comparison = pd.concat(columns, axis=1).reindex(on_simulated.index)
 print(comparison.to_string())
 axis = comparison.plot.barh(figsize=(8, 4.2), color=["#8c6d31", "#4393c3", "#1b7837"], width=0.8)
 axis.invert_yaxis()
@@ -211,8 +211,8 @@ plt.show()
 #   trees too. Its figures there say how much a person still has to check.
 
 # %%
-best = simulated.F1.idxmax()
+best = on_simulated.F1.idxmax()
 print("best on simulated fields:", best)
 if real is not None:
     print("best on real chips:", real.F1.idxmax())
-assert simulated.loc["auto", "F1"] >= simulated.loc["DLC", "F1"]
+assert on_simulated.loc["auto", "F1"] >= on_simulated.loc["DLC", "F1"]

@@ -21,7 +21,7 @@ from shapely import Polygon
 
 import geofield as gf
 from geofield.model import Scene
-from geofield.simulate import SimulationSettings, simulate_field
+from geofield.simulate import SimulatedField, SimulationSettings, simulate_field
 
 METHODS = ("canny", "sobel", "prewitt", "roberts")
 #: Coarser than the study's steps of 0.001, so that the notebook takes minutes, not hours.
@@ -120,10 +120,16 @@ def try_all(
     return Trial(name, len(truth_px), rows, scans, (best[1], best[2]))
 
 
+def simulated(number: int, obstacles: int) -> SimulatedField:
+    """Draw field `number` of the experiment, with so many trees; crowded ones need room."""
+    size = 320 if obstacles <= 60 else 430
+    settings = SimulationSettings(width_px=size, height_px=size, obstacles=obstacles)
+    return simulate_field(9_000 + number, settings)
+
+
 def simulated_trial(number: int, obstacles: int) -> Trial:
-    """Field `number` of the experiment, with so many trees."""
-    settings = SimulationSettings(width_px=320, height_px=320, obstacles=obstacles)
-    made = simulate_field(9_000 + number, settings)
+    """Try everything on field `number`."""
+    made = simulated(number, obstacles)
     truth = made.obstacles[["x_px", "y_px"]].to_numpy(float)
     return try_all(f"{number}", made.scene, made.field, truth, hit_px=6.0)
 

@@ -1,0 +1,147 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# %% [markdown]
+# # 06 Linked data and SPARQL
+#
+# The study wanted its annotation to be reusable by programs that know nothing of the one that
+# made it. geofield writes plans as linked data with standard vocabularies (GeoSPARQL, PROV,
+# DCAT, SOSA, SAREF4AGRI), and in the study's own vocabulary where that is asked for. Here a plan
+# goes out as Turtle and is asked questions in SPARQL.
+
+# %%
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+import rdflib
+
+import geofield as gf
+
+pd.set_option("display.width", 140)
+out = Path(tempfile.mkdtemp())
+POINT = {"lat": 35.075373, "lon": 33.531142}
+settings = gf.Settings(tracks={"spacing_m": 8.0, "step_m": 10.0})
+plan = gf.plan_field("../sample_data/field_1.tif", **POINT, settings=settings)
+plan.write(out, formats=["turtle"])
+turtle = out / "field.ttl"
+print(turtle.name, f"{turtle.stat().st_size / 1024:.0f} kB")
+
+# %% [markdown]
+# ## What it looks like
+#
+# One node per feature; its address is built from the field's place and its number, so it is the
+# same after every run. (Set a base address of your own before you publish.)
+
+# %%
+text = turtle.read_text(encoding="utf-8")
+start = text.index("/obstacle/1>\n") if "/obstacle/1>\n" in text else text.index("gf:Obstacle")
+block = text[text.rindex("\n\n", 0, start) + 2 :].split("\n\n")[0]
+print("\n".join(line if len(line) < 110 else line[:107] + "..." for line in block.splitlines()))
+
+# %% [markdown]
+# ## Questions
+#
+# Counts per class:
+
+# %%
+graph = rdflib.Graph().parse(turtle)
+PREFIXES = """
+PREFIX gf: <https://w3id.org/geofield#>
+PREFIX geo: <http://www.opengis.net/ont/geosparql#>
+PREFIX prov: <http://www.w3.org/ns/prov#>
+PREFIX dcterms: <http://purl.org/dc/terms/>
+PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#>
+"""
+
+
+def ask(query):
+    """The answer as a table."""
+    answer = graph.query(PREFIXES + query)
+    return pd.DataFrame(
+        [[None if v is None else v.toPython() for v in row] for row in answer],
+        columns=[str(name) for name in answer.vars],
+    )
+
+
+print(len(graph), "triples")
+counts = ask(
+    """
+    SELECT ?class (COUNT(?x) AS ?n) WHERE {
+      ?x a ?class . FILTER(STRSTARTS(STR(?class), "https://w3id.org/geofield#"))
+    } GROUP BY ?class ORDER BY ?class
+    """
+)
+counts["class"] = counts["class"].astype(str).str.removeprefix("https://w3id.org/geofield#")
+print(counts.to_string(index=False))
+
+# %% [markdown]
+# The largest obstacles:
+
+# %%
+large = ask(
+    """
+    SELECT ?obstacle ?radius WHERE {
+      ?obstacle a gf:Obstacle ; gf:radiusInMetres ?radius .
+    } ORDER BY DESC(?radius) LIMIT 5
+    """
+)
+print(large.to_string(index=False))
+
+# %% [markdown]
+# Which obstacle opens how many gaps:
+
+# %%
+gaps = ask(
+    """
+    SELECT ?obstacle (COUNT(?gap) AS ?gaps) (SUM(?length) AS ?metres) WHERE {
+      ?gap a gf:Gap ; gf:causedBy ?obstacle ; geo:hasMetricLength ?length .
+      ?obstacle a gf:Obstacle .
+    } GROUP BY ?obstacle ORDER BY DESC(?metres) LIMIT 5
+    """
+)
+print(gaps.to_string(index=False))
+
+# %% [markdown]
+# Where the data come from, and on what terms:
+
+# %%
+print(
+    ask(
+        """
+        SELECT ?picture ?rights ?software WHERE {
+          ?data a prov:Entity ; prov:wasDerivedFrom ?image ; prov:wasGeneratedBy ?run .
+          ?image rdfs:label ?picture . OPTIONAL { ?image dcterms:rights ?rights }
+          ?run prov:wasAssociatedWith ?agent . ?agent rdfs:label ?software .
+        }
+        """
+    ).to_string(index=False)
+)
+
+# %% [markdown]
+# ## And back
+#
+# Linked data are no dead end: the plan reads back whole.
+
+# %%
+again = gf.read_plan(turtle)
+print(len(again.obstacles), "obstacles,", len(again.tracks.segments), "segments")
+assert again == plan
+
+# %% [markdown]
+# ## The study's vocabulary
+#
+# For programs that were written against the study's listings there is the profile `rdf-study`:
+
+# %%
+plan.write(out / "study", formats=["rdf-study"])
+listing = (out / "study" / "obstacles.rdf").read_text(encoding="utf-8").splitlines()
+print("\n".join(line[:110] for line in listing[:24]))
