@@ -85,7 +85,8 @@ for name in ("geojson", "shapefile", "kml", "isoxml", "agopengps", "gpx", "csv")
 # ## There and back
 #
 # The outline that comes back, against the one that went out: the largest distance between the
-# two in millimetres. Formats in longitude and latitude round to some decimals; the registry
+# two in millimetres. (Of formats with a file per layer, the field's file alone is read here.)
+# Formats in longitude and latitude round to some decimals; the registry
 # states how far a coordinate may move.
 
 

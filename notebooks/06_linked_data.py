@@ -58,6 +58,7 @@ PREFIXES = """
 PREFIX gf: <https://w3id.org/geofield#>
 PREFIX geo: <http://www.opengis.net/ont/geosparql#>
 PREFIX prov: <http://www.w3.org/ns/prov#>
+PREFIX dcat: <http://www.w3.org/ns/dcat#>
 PREFIX dcterms: <http://purl.org/dc/terms/>
 PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#>
 """
@@ -118,7 +119,7 @@ print(
     ask(
         """
         SELECT ?picture ?rights ?software WHERE {
-          ?data a prov:Entity ; prov:wasDerivedFrom ?image ; prov:wasGeneratedBy ?run .
+          ?data a dcat:Dataset ; prov:wasDerivedFrom ?image ; prov:wasGeneratedBy ?run .
           ?image rdfs:label ?picture . OPTIONAL { ?image dcterms:rights ?rights }
           ?run prov:wasAssociatedWith ?agent . ?agent rdfs:label ?software .
         }
@@ -144,4 +145,5 @@ assert again == plan
 # %%
 plan.write(out / "study", formats=["rdf-study"])
 listing = (out / "study" / "obstacles.rdf").read_text(encoding="utf-8").splitlines()
-print("\n".join(line[:110] for line in listing[:24]))
+start = next(n for n, line in enumerate(listing) if "Obstacle#no" in line or "obstacle:no" in line)
+print("\n".join(line[:110] for line in listing[max(0, start - 6) : start + 12]))

@@ -22,8 +22,11 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from orthophoto_server import PUBLIC_ADDRESS, serving  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -103,6 +106,8 @@ def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
     environment["PATH"] = f"{programs}{os.pathsep}{environment['PATH']}"
     environment["PYTHONPATH"] = str(ROOT / "src")
     environment["COLUMNS"] = "100"
+    # Tiles of the how-to are kept for the page alone.
+    environment["XDG_CACHE_HOME"] = str(folder / "cache")
     return work, environment
 
 
@@ -114,14 +119,33 @@ def run_page(path: Path, folder: Path, shared: Path | None = None, *, update: bo
     BlockError
         Naming the page and the line of the block.
     """
-    work, environment = prepare(folder, shared)
     text = path.read_text(encoding="utf-8")
+    if PUBLIC_ADDRESS not in text:
+        return _run_page(path, text, folder, shared, {}, update=update)
+    with serving() as address:
+        return _run_page(path, text, folder, shared, {PUBLIC_ADDRESS: address}, update=update)
+
+
+def _run_page(
+    path: Path,
+    text: str,
+    folder: Path,
+    shared: Path | None,
+    addresses: dict[str, str],
+    *,
+    update: bool,
+) -> int:
+    """Run a page's blocks, with addresses that stand for those on the page."""
+    work, environment = prepare(folder, shared)
     blocks = read_blocks(text)
     namespace: dict[str, object] = {"__name__": "__main__"}
     replacements: list[tuple[Block, str]] = []
     count = 0
-    for index, block in enumerate(blocks):
+    for index, shown in enumerate(blocks):
+        block = shown
         where = f"{path.relative_to(ROOT)}, line {block.line}"
+        for public, loopback in addresses.items():
+            block = replace(block, body=block.body.replace(public, loopback))
         if not _runs(block):
             if "." in block.title and not block.is_output:
                 (work / block.title).write_text(block.body, encoding="utf-8")

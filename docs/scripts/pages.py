@@ -25,6 +25,8 @@ def generated_pages(root: Path) -> dict[str, str | bytes]:
         "reference/layers.md": layers(),
         "reference/ontology.md": ontology_page(),
         "reference/queries.md": queries_page(),
+        "reference/formats.md": formats(),
+        "reference/sources.md": sources(),
         "reference/changes.md": changes(root / "CHANGES.md"),
         "benchmarks.md": benchmarks(root / "benchmarks" / "results"),
     }
@@ -102,10 +104,23 @@ def _prose(text: str) -> str:
 
 
 def _epilog(text: str) -> list[str]:
-    lines = text.replace("\b", "").strip().splitlines()
-    title = lines[0].strip().rstrip(":")
-    body = [line.removeprefix("  ") for line in lines[1:]]
-    return [f"**{title}**", "", "```bash", *body, "```", ""]
+    """The examples as code, what stands between them as text."""
+    lines: list[str] = []
+    code: list[str] = []
+
+    def close() -> None:
+        if code:
+            lines.extend(["```bash", *code, "```", ""])
+            code.clear()
+
+    for line in text.replace("\b", "").strip().splitlines():
+        if line.startswith("  ") and not line.lstrip().startswith("`"):
+            code.append(line.removeprefix("  "))
+        elif line.strip():
+            close()
+            lines += [f"**{line.strip()}**" if line.rstrip().endswith(":") else _cell(line), ""]
+    close()
+    return lines
 
 
 def _cell(text: str) -> str:
@@ -193,6 +208,81 @@ def layers() -> str:
             )
         lines.append("")
     return "\n".join(lines)
+
+
+# --- formats, sources
+
+
+def formats() -> str:
+    """Every format: what it carries, what it drops, how exact it is."""
+    from geofield.formats import FORMATS
+
+    lines = [
+        "# Formats",
+        "",
+        REPOSITORY_NOTE,
+        "",
+        "Give these names to `geofield export --format NAME`, `geofield run --format NAME` or "
+        "`plan.write(folder, formats=[NAME])`. What a format leaves out of a plan is said when it "
+        "is written, and stands in `report.json`.",
+        "",
+        "| name | format | carries | read back |",
+        "| --- | --- | --- | --- |",
+    ]
+    for name, one in FORMATS.items():
+        back = "no" if one.reader is None else "yes"
+        lines.append(f"| [`{name}`](#{name}) | {one.title} | {_layer_list(one)} | {back} |")
+    for name, one in FORMATS.items():
+        lines += ["", f"## {name}", "", f"{one.title}, coordinates in {_crs_words(one.crs)}.", ""]
+        lines += ["Files: " + ", ".join(f"`{file}`" for file in one.files) + ".", ""]
+        if one.drops:
+            lines += ["Leaves out: " + "; ".join(str(drop) for drop in one.drops) + ".", ""]
+        if one.precision_m is not None:
+            moved = "exactly" if one.precision_m == 0 else f"to {one.precision_m * 1000:g} mm"
+            lines += [f"Coordinates come back {moved}.", ""]
+        if one.options:
+            lines += ["Options: " + ", ".join(f"`{option}`" for option in one.options) + ".", ""]
+    return "\n".join(lines)
+
+
+def _layer_list(one: Any) -> str:
+    from geofield import schema
+
+    if len(one.layers) == len(schema.LAYERS):
+        return "all layers"
+    return ", ".join(one.layers)
+
+
+def _crs_words(crs: str) -> str:
+    return "the field's UTM zone" if crs == "metric" else "longitude and latitude (WGS 84)"
+
+
+def sources() -> str:
+    """The imagery known by name, with its terms."""
+    from geofield.imagery.sources.catalogue import BUILTIN
+
+    lines = [
+        "# Imagery sources",
+        "",
+        REPOSITORY_NOTE,
+        "",
+        "Known by name to `geofield tiles` and `geofield run`. Terms change: follow the address, "
+        "you answer for keeping to them. Sources of your own go into the settings file; see "
+        "[Use a national orthophoto](../how-to/orthophoto.md).",
+        "",
+        "| name | imagery | region | licence | to be named | derive geodata | keep tiles |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, one in BUILTIN.items():
+        terms = one.terms
+        derive = "allowed" if terms.may_derive else "**forbidden**"
+        keep = "allowed" if terms.cacheable else "no"
+        licence = f"[{terms.licence or 'terms'}]({terms.url})" if terms.url else terms.licence
+        lines.append(
+            f"| `{name}` | {one.title} | {one.region} | {licence} | {terms.attribution} "
+            f"| {derive} | {keep} |"
+        )
+    return "\n".join([*lines, ""])
 
 
 # --- changes, benchmarks
