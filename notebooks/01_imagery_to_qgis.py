@@ -9,7 +9,6 @@
 # ---
 
 # %% [markdown]
-# %% [markdown]
 # # 01 A field, from imagery to QGIS
 #
 # One picture and one point in the field: this is all the main job needs. This notebook runs its

@@ -9,7 +9,6 @@
 # ---
 
 # %% [markdown]
-# %% [markdown]
 # # 04 Analysis with geopandas
 #
 # Every table of a plan is a GeoDataFrame in the field's UTM zone, so questions about a field are a

@@ -9,7 +9,6 @@
 # ---
 
 # %% [markdown]
-# %% [markdown]
 # # 05 Exchange with farm tools
 #
 # A plan goes out as many formats, and comes back from most of them. This notebook writes every

@@ -9,7 +9,6 @@
 # ---
 
 # %% [markdown]
-# %% [markdown]
 # # 06 Linked data and SPARQL
 #
 # The study wanted its annotation to be reusable by programs that know nothing of the one that

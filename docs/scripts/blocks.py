@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from orthophoto_server import PUBLIC_ADDRESS, serving  # noqa: E402
+from orthophoto_server import PUBLIC_ADDRESS, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -94,7 +94,7 @@ class _Handler(BaseHTTPRequestHandler):
     def log_message(self, *_: Any) -> None:
         """Quiet."""
 
-    def do_GET(self) -> None:  # noqa: N802 - the base class's name
+    def do_GET(self) -> None:
         if self.path.partition("?")[0].endswith("WMTSCapabilities.xml"):
             address = f"http://127.0.0.1:{self.server.server_address[1]}"
             self._reply(capabilities(address), "application/xml")
