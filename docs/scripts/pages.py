@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
+import importlib
 import json
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ def generated_pages(root: Path) -> dict[str, str | bytes]:
         "reference/formats.md": formats(),
         "reference/sources.md": sources(),
         "reference/changes.md": changes(root / "CHANGES.md"),
-        "benchmarks.md": benchmarks(root / "benchmarks" / "results"),
+        "benchmarks.md": benchmarks(root / "benchmarks"),
     }
     return pages | notebooks(root / "notebooks")
 
@@ -40,13 +41,8 @@ def command_line() -> str:
     """Every command with its arguments, options and examples."""
     from geofield.cli.main import COMMANDS, cli
 
-    commands = {
-        name: home
-        for name, home in COMMANDS.items()
-        if importlib.util.find_spec(home[0].partition(":")[0])
-    }
     context = click.Context(cli, info_name="geofield")
-    rows = [f"| [`{name}`](#geofield-{name}) | {text} |" for name, (_, text) in commands.items()]
+    rows = [f"| [`{name}`](#geofield-{name}) | {text} |" for name, (_, text) in COMMANDS.items()]
     lines = [
         "# Command line",
         "",
@@ -62,7 +58,7 @@ def command_line() -> str:
         *rows,
         "",
     ]
-    for name in commands:
+    for name in COMMANDS:
         command = cli.get_command(context, name)
         if command is not None:
             lines += _command(command, f"geofield {name}", context)
@@ -293,28 +289,14 @@ def changes(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def benchmarks(results: Path) -> str:
+def benchmarks(folder: Path) -> str:
     """All measured pages under one heading."""
-    lines = [
-        "# Benchmarks",
-        "",
-        "Every figure is measured side by side with its peers in one run on one machine; times "
-        "are medians. Compare ratios, not seconds: another machine gives other seconds. "
-        "Measure them yourself with `make bench`, or one page with "
-        "`python benchmarks/NAME.py`.",
-        "",
-    ]
-    for path in sorted(results.glob("*.md")):
-        if path.stem == "all":
-            continue
-        text = path.read_text(encoding="utf-8").strip()
-        # One level down, outside fenced code.
-        fenced = False
-        for line in text.splitlines():
-            fenced ^= line.startswith("```")
-            lines.append("#" + line if line.startswith("#") and not fenced else line)
-        lines += ["", f"Measured by `benchmarks/{path.stem}.py`.", ""]
-    return "\n".join(lines)
+    sys.path.insert(0, str(folder))
+    try:
+        joined_page = importlib.import_module("all").joined_page
+    finally:
+        sys.path.remove(str(folder))
+    return str(joined_page(folder / "results"))
 
 
 # --- notebooks
