@@ -10,8 +10,10 @@ import pytest
 from rdf_plans import small_plan
 
 from geofield.formats.rdf import write
+from geofield.formats.rdf.parse import parse
+from geofield.formats.rdf.quick import QuickCheck
 from geofield.formats.rdf.shapes import class_rules
-from geofield.formats.rdf.validate import validate
+from geofield.formats.rdf.validate import _batches, validate
 
 WRITERS = {
     "xml": write.write_rdfxml,
@@ -144,6 +146,39 @@ def test_a_broken_file_is_found_and_the_thing_named(sound, tmp_path, profile, na
     named = [p for p in problems if p.subject in subjects and words.lower() in str(p).lower()]
     assert named, [str(problem) for problem in problems]
     assert line in {p.line for p in problems} or named[0].subject != full
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", write.PROFILES)
+def test_the_quick_check_never_hides_what_pyshacl_finds(sound, tmp_path, profile, monkeypatch):
+    found = {}
+    cases = BROKEN if profile == "geosparql" else STUDY_BROKEN
+    for check in ("quick", "all"):
+        if check == "all":
+            monkeypatch.setattr(QuickCheck, "unsure", lambda self, nodes: set(nodes))
+        for name, (subject, cls, pattern, replacement, _) in cases.items():
+            path = tmp_path / "broken.ttl"
+            path.write_text(broken_file(sound[profile], subject, cls, pattern, replacement)[0])
+            found[check, name] = validate(path)
+    for name in cases:
+        assert found["quick", name] == found["all", name], name
+
+
+def test_the_quick_check_leaves_little_of_a_sound_plan_to_pyshacl(sound, tmp_path):
+    path = tmp_path / "sound.ttl"
+    path.write_text(sound["geosparql"])
+    quads = list(parse(path))
+    assert sum(map(len, _batches(quads))) < 0.1 * len(quads)
+
+
+def test_a_subclass_of_a_planners_own_is_held_to_the_shapes(tmp_path):
+    path = tmp_path / "own.ttl"
+    path.write_text(
+        "@prefix gf: <https://w3id.org/geofield#> . @prefix my: <https://p.example/> .\n"
+        "@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n"
+        "my:Lane rdfs:subClassOf gf:Track .\nmy:one a my:Lane .\nmy:f a gf:Field ."
+    )
+    assert any(p.subject == "<https://p.example/one>" for p in validate(path))
 
 
 def test_each_shape_is_broken_at_least_once():

@@ -15,15 +15,25 @@ from rdflib.namespace import RDF, SH
 from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
 from geofield.formats.rdf.layers import all_terms, layer_maps
-from geofield.formats.rdf.namespaces import GEO, GML, SCHEMA_PREFIXES, STRING, STUDY_TREE, expand
+from geofield.formats.rdf.namespaces import (
+    GEO,
+    GML,
+    RDFS,
+    SCHEMA_PREFIXES,
+    STRING,
+    STUDY_TREE,
+    expand,
+)
 from geofield.formats.rdf.parse import Graph, parse
 from geofield.formats.rdf.problem import Problem
 from geofield.formats.rdf.publish import SHAPES, resource
+from geofield.formats.rdf.quick import QuickCheck
 from geofield.formats.validation import Finding
 
 _BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
 
 _GEOMETRY_LINKS = frozenset({GEO + "hasGeometry", GEO + "hasDefaultGeometry"})
+_SUBCLASS = RDFS + "subClassOf"
 _TRIPLES_AT_ONCE = 20_000
 
 
@@ -87,17 +97,29 @@ def _shape_problems(quads: list[ox.Quad]) -> Iterator[Problem]:
 
 
 def _batches(quads: list[ox.Quad]) -> Iterator[list[ox.Quad]]:
-    """Triples in parts that can be checked on their own: features with their geometries.
+    """What is not plainly sound, in parts that can be checked on their own.
 
     No shape looks further than from a feature to its geometry, and rdflib needs a kilobyte
     for each triple: a large plan would not fit into memory at once.
     """
+    if any(quad.predicate.value == _SUBCLASS for quad in quads):
+        # Classes of the file's own: only all triples together tell whose shapes apply.
+        yield quads
+        return
+    nodes: dict[Any, dict[str, list[Any]]] = {}
+    for quad in quads:
+        node = nodes.setdefault(quad.subject, {})
+        node.setdefault(quad.predicate.value, []).append(quad.object)
+    unsure = _quick_check().unsure(nodes)
     owners = {
         quad.object: quad.subject for quad in quads if quad.predicate.value in _GEOMETRY_LINKS
     }
+    wanted = {owners.get(subject, subject) for subject in unsure}
     parts: dict[Any, list[ox.Quad]] = {}
     for quad in quads:
-        parts.setdefault(owners.get(quad.subject, quad.subject), []).append(quad)
+        owner = owners.get(quad.subject, quad.subject)
+        if owner in wanted:
+            parts.setdefault(owner, []).append(quad)
     batch: list[ox.Quad] = []
     for part in parts.values():
         batch += part
@@ -120,6 +142,11 @@ def _run_shapes(data: rdflib.Graph) -> Iterator[Problem]:
         raise FormatError(f"The shapes could not be run: {report!r}.")
     for result in report.subjects(RDF.type, SH.ValidationResult):
         yield _problem(report, result)
+
+
+@cache
+def _quick_check() -> QuickCheck:
+    return QuickCheck(_shapes())
 
 
 @cache
