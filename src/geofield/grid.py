@@ -137,7 +137,22 @@ class Grid:
         source = parse_crs(crs)
         if source != self.crs:
             x, y = transformer(source, self.crs).transform(np.asarray(x, float), np.asarray(y))
+        if self._turn:
+            # Across the antimeridian one place has two values of x: take the nearer one.
+            middle, _ = self.to_native(self.width_px / 2, self.height_px / 2)
+            x = np.asarray(x, float)
+            away = (x - middle) / self._turn
+            x = x - self._turn * np.round(np.where(np.isfinite(away), away, 0.0))
         return self.from_native(x, y)
+
+    @cached_property
+    def _turn(self) -> float:
+        """Once around the earth in units of x, where x runs with the longitude; else 0."""
+        if self.crs == WEB_MERCATOR:
+            return 2.0 * math.pi * EARTH_RADIUS_M
+        if self.crs.is_geographic:
+            return 2.0 * math.pi / float(self.crs.axis_info[0].unit_conversion_factor)
+        return 0.0
 
     def to_lonlat(self, x_px: ArrayLike, y_px: ArrayLike) -> tuple[Any, Any]:
         """Pixel coordinates to longitude and latitude, degrees, WGS 84."""

@@ -68,6 +68,9 @@ class ImagerySettings(Section):
         None,
         description="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
     )
+    crs: str | None = Field(
+        None, description="CRS of a picture that does not say its own, e.g. EPSG:32633."
+    )
 
 
 class FetchSettings(Section):

@@ -18,8 +18,10 @@ import rasterio.warp
 from shapely.geometry import box
 
 from geofield.cli import main
+from geofield.errors import TermsError
 from geofield.imagery import read_scene
 
+from .pictures import ground, write
 from .test_fetch import expected
 from .tile_server import Handler, first_time, hole, serving, status_500
 
@@ -126,6 +128,27 @@ def test_terms_are_refused_until_acknowledged(
     shown = capsys.readouterr().err
     assert "--acknowledge-terms" in shown
     assert "hush-hush" not in shown
+
+
+def test_a_named_picture_carries_its_terms(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from geofield.cli.imagery_tools import as_picture
+    from geofield.settings import load_settings
+
+    path = write(tmp_path / "drone.tif", ground(), photometric="RGB")
+    lon, lat = read_scene(path).grid.centre_lonlat
+    text = f'[fetch.sources.drone]\nkind = "picture"\nurl = "{path}"\nattribution = "Me"\n'
+    Path("geofield.toml").write_text(text)
+    with pytest.raises(TermsError), as_picture("drone", load_settings(), lat=lat, lon=lon):
+        pass
+    Path("geofield.toml").write_text(text + "may_derive = true\n")
+    with as_picture("drone", load_settings(), lat=lat, lon=lon) as picture:
+        scene = read_scene(picture)
+    assert scene.source.attribution == "Me"
+    assert np.array_equal(scene.bands, ground())
+    with as_picture(path, load_settings(), lat=lat, lon=lon) as picture:
+        assert picture == path
 
 
 def test_sources_of_ones_own(

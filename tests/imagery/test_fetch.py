@@ -6,6 +6,8 @@ import hashlib
 import multiprocessing
 import random
 import sqlite3
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from datetime import date
@@ -156,6 +158,50 @@ def test_the_antimeridian_is_crossed_without_a_seam(tmp_path: Path, lon: float) 
         assert np.array_equal(file.read(), expected(done.grid, 12))
     columns = {tile[1] for tile in server.asked}
     assert {0, 4095} <= columns
+    # Places on both sides of it are found, and come back.
+    scene = read_scene(done.path, lat=-16.8, lon=lon)
+    for x in (10.5, 350.0, 690.5):
+        there, north = scene.grid.to_lonlat(x, 350.0)
+        assert abs(there) > 179
+        assert scene.grid.from_lonlat(there, north) == pytest.approx((x, 350.0), abs=1e-5)
+    round_trip = scene.grid.from_metric_array(
+        scene.grid.to_metric_array(np.array([[10.5, 20.0], [690.0, 600.0]]))
+    )
+    assert np.allclose(round_trip, [[10.5, 20.0], [690.0, 600.0]], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_mosaic_is_not_built_in_memory(tmp_path: Path) -> None:
+    code = (
+        "import sys, numpy as np\n"
+        "from pathlib import Path\n"
+        "from geofield.imagery.mosaic import Staging, stage_to_cog\n"
+        "from geofield.imagery.tiling import TilePyramid\n"
+        "block = TilePyramid.web_mercator().block_around(18, lat=35.0, lon=33.5, size_px=9000)\n"
+        "strip = np.random.default_rng(1).integers(0, 255, (256, 256 * block.columns, 3), 'u1')\n"
+        "valid = np.ones(strip.shape[:2], bool)\n"
+        "valid[:9] = False\n"
+        "def rows():\n"
+        "    for row in range(block.rows):\n"
+        "        yield row, strip, valid if row > 5 else None\n"
+        "def peak():\n"
+        "    return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0])\n"
+        "before = peak()\n"
+        "staging = Staging(Path(sys.argv[1]) / 'rows.tif', block)\n"
+        "staging.fill(rows())\n"
+        "stage_to_cog(staging.path, Path(sys.argv[1]) / 'a.tif', {})\n"
+        "print((peak() - before) // 1024)\n"
+    )
+    if not Path("/proc/self/status").exists():
+        pytest.skip("the peak of a process's memory is read from /proc")
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], check=True, capture_output=True, text=True
+    )
+    # 243 MB of pixels went through.
+    assert int(done.stdout) < 150
+    with rasterio.open(tmp_path / "a.tif") as file:
+        assert file.overviews(1) == [2, 4, 8, 16, 32]
+        assert 0.9 < (file.dataset_mask() > 0).mean() < 1.0
 
 
 def test_whole_tiles_and_areas(tmp_path: Path) -> None:

@@ -417,6 +417,6 @@ def _crs_of(dataset: Any, path: str) -> CRS:
     if not found:
         raise CRSError(
             f"The picture {display_name(path)} does not name its coordinate reference system.",
-            hint="Name it: `gdal_edit.py -a_srs EPSG:32633 FILE`, or `read_scene(..., crs=...)`.",
+            hint="Name it: --crs EPSG:32633, or crs=... in Python.",
         )
     return to_pyproj(found)
