@@ -52,6 +52,13 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     """
     if not np.isfinite(clearance_m) or clearance_m < 0.0:
         raise TrackError(f"clearance_m is {clearance_m}; it must be 0 or more metres.")
+    if obstacles is None:
+        return ObstacleShapes(
+            np.empty((0, 3)),
+            np.empty(0, np.int64),
+            np.empty(0, dtype=object),
+            np.empty(0, np.int64),
+        )
     frame = _as_table(obstacles, crs)
     if "status" in frame.columns:
         frame = frame[frame["status"] != "rejected"]
@@ -78,8 +85,6 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
 
 
 def _as_table(obstacles: Any, crs: CRS) -> gpd.GeoDataFrame:
-    if obstacles is None:
-        return gpd.GeoDataFrame(geometry=gpd.GeoSeries([], crs=crs))
     if isinstance(obstacles, gpd.GeoSeries):
         obstacles = gpd.GeoDataFrame(geometry=obstacles)
     if isinstance(obstacles, gpd.GeoDataFrame):

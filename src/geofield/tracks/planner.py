@@ -262,16 +262,14 @@ def _tracks(
     track_no, segment_no = number_segments(pieces)
     length_m = pieces.end - pieces.start
     ends = segment_ends(pieces, positions, frame)
-    segments, lines = segment_table(ends, track_no, segment_no, length_m, crs)
+    segments = segment_table(ends, track_no, segment_no, length_m, crs)
     lost = obstacle_losses(crossings, len(obstacle_no))
     whole = float(length_m.sum() + lost.sum())
     numbers, row = np.unique(obstacle_no, return_inverse=True)
     per_number = np.bincount(row, weights=lost, minlength=len(numbers))
     blocked = len(positions) - len(np.unique(pieces.track))
     return Tracks(
-        lines=line_table(
-            lines, track_no, length_m, heading_deg=heading_deg, step_m=step_m, crs=crs
-        ),
+        lines=line_table(ends, track_no, length_m, heading_deg=heading_deg, step_m=step_m, crs=crs),
         segments=segments,
         gaps=gap_table(pieces, crossings, positions, frame, obstacle_no=obstacle_no, crs=crs),
         heading_deg=heading_deg,

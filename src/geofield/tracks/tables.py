@@ -30,20 +30,18 @@ def _ends(start: FloatArray, end: FloatArray, v: FloatArray, frame: TrackFrame) 
 
 def segment_table(
     ends: FloatArray, track_no: IntArray, segment_no: IntArray, length_m: FloatArray, crs: CRS
-) -> tuple[gpd.GeoDataFrame, NDArray[np.object_]]:
-    """Layer `segments`, and its geometries."""
-    lines = _lines(ends)
-    table = schema.table(
+) -> gpd.GeoDataFrame:
+    """Layer `segments`."""
+    return schema.table(
         schema.SEGMENTS,
         {"track_no": track_no, "segment_no": segment_no, "length_m": length_m},
-        lines,
+        _lines(ends),
         crs,
     )
-    return table, lines
 
 
 def line_table(
-    lines: NDArray[np.object_],
+    ends: FloatArray,
     track_no: IntArray,
     length_m: FloatArray,
     *,
@@ -53,7 +51,6 @@ def line_table(
 ) -> gpd.GeoDataFrame:
     """Layer `tracks`: one row for each track with at least one segment."""
     numbers, first, count = np.unique(track_no, return_index=True, return_counts=True)
-    row = np.repeat(np.arange(len(numbers)), count)
     points = points_per_segment(length_m, step_m)
     return schema.table(
         schema.TRACKS,
@@ -65,7 +62,7 @@ def line_table(
             "point_count": np.add.reduceat(points, first) if len(first) else points,
             "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
         },
-        shapely.multilinestrings(lines, indices=row) if len(lines) else lines,
+        _multi_lines(ends, first),
         crs,
     )
 
@@ -142,6 +139,16 @@ def _count_within(track: IntArray) -> IntArray:
 def number_segments(pieces: Pieces) -> tuple[IntArray, IntArray]:
     """Track and segment numbers of the pieces, both from 1."""
     return pieces.track + 1, _count_within(pieces.track)
+
+
+def _multi_lines(ends: FloatArray, first: IntArray) -> NDArray[np.object_]:
+    """One multi-line per track, from the index of the first segment of each."""
+    if not len(ends):
+        return np.empty(0, dtype=object)
+    # Many times faster than collecting lines that were made one by one.
+    offsets = (np.arange(len(ends) + 1) * 2, np.append(first, len(ends)))
+    kind = shapely.GeometryType.MULTILINESTRING
+    return np.asarray(shapely.from_ragged_array(kind, ends.reshape(-1, 2), offsets))
 
 
 def _lines(ends: FloatArray) -> NDArray[np.object_]:
