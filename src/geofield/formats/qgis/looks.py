@@ -128,7 +128,7 @@ LOOKS: dict[str, Look] = {
             Rule(
                 "Rejected by a person",
                 "fill",
-                (line("235,235,235,220", 0.3, dash="0.6;0.9"),),
+                (line("60,60,60,150", 0.35), line("245,245,245,255", 0.25, dash="0.6;0.9")),
                 _is("rejected"),
             ),
         ),
@@ -219,13 +219,13 @@ LOOKS: dict[str, Look] = {
         tip='<b>Headland</b>, [% round("width_m", 1) %] m wide',
     ),
     "headland_tracks": Look(
-        (Rule("Headland track", "line", (line("150,255,170,255", 0.3),)),),
+        (Rule("Headland track", "line", (line("40,190,100,255", 0.35),)),),
         max_scale=REGION_SCALE,
         tip='<b>Headland pass [% "pass_no" %]</b>: [% round("length_m", 1) %] m',
     ),
     "turns": Look(
         (
-            Rule("Turn", "line", (line("255,255,255,230", 0.3),), "\"fits\" = 'yes'"),
+            Rule("Turn", "line", (line(_BLACK, 0.45), line(_WHITE, 0.25)), "\"fits\" = 'yes'"),
             Rule("Turn that does not fit", "line", (line(_AVOID, 0.5),), "\"fits\" = 'no'"),
         ),
         max_scale=5000,
@@ -237,7 +237,7 @@ LOOKS: dict[str, Look] = {
             Rule(
                 "Route",
                 "line",
-                (line("255,255,255,200", 0.3), arrows(_WHITE, every_m=30, size_m=1.6)),
+                (line(_BLACK, 0.45), line(_WHITE, 0.25), arrows(_WHITE, every_m=30, size_m=1.6)),
             ),
         ),
         max_scale=REGION_SCALE,
