@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.filters import apply_hysteresis_threshold
 
 from geofield.obstacles.channels import Channels, Image, enlarge, shrink
 from geofield.obstacles.circles import Circles
@@ -20,9 +21,14 @@ MIN_WIDTH_M = 2.4
 MAX_FIELD_SHARE = 0.1
 BORDER_M = 3.0
 Z_THRESHOLD = 5.0
+RIM_Z = 3.5
 SHARP_Z_PER_PX = 1.0
+SOFT_Z_PER_PX = 0.5
+STRONG_Z = 6.5
 _SHADOW_REACH = 2.2
 _COARSE = 4
+_DEEP = 3.0
+_EXPLAINED = 0.7
 _MIN_SPREAD = {"luma": 7.0, "ndvi": 7.0, "exg": 4.0, "rg": 4.0, "gb": 4.0}
 
 
@@ -77,8 +83,9 @@ def footprints(
     score = difference_from_field(found, region)
     margin = max(round(BORDER_M / pixel_m), 1)
     distance = ndimage.distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1]
-    mask = (score > Z_THRESHOLD) & region
-    mask &= ~_tree_discs(trees, region.shape)
+    # A clear core, and as much around it as still differs: crowns fade towards their rims.
+    mask = apply_hysteresis_threshold(score, RIM_Z, Z_THRESHOLD) & region
+    known = _tree_discs(trees, region.shape)
     width = max(MIN_WIDTH_M / pixel_m, 2.0)
     mask = _opened(mask, width / 2)
     labels, count = ndimage.label(mask, structure=np.ones((3, 3), dtype=bool))
@@ -94,11 +101,18 @@ def footprints(
         if area * pixel_m**2 < MIN_AREA_M2 or area > MAX_FIELD_SHARE * field_area:
             continue
         core = part[2:-2, 2:-2]
-        # What touches the field's border is its border, not an obstacle in it.
-        if float(distance[where][core].min()) <= margin:
+        # A tree and its shadow are one blob; a clump with one tree known in it is more.
+        if float(known[where][core].mean()) >= _EXPLAINED:
             continue
+        # What lies along the field's border is its border; what reaches far in is in the way.
+        depth = distance[where][core]
+        if float(depth.min()) <= margin and float(depth.max()) <= _DEEP * margin:
+            continue
+        # Shadows and blurred crowns have soft rims, but then their insides differ strongly.
         rim = core & ~ndimage.binary_erosion(core)
-        if float(np.median(slope[where][rim])) < SHARP_Z_PER_PX:
+        strong = float(np.percentile(score[where][core], 90)) >= STRONG_Z
+        least = SOFT_Z_PER_PX if strong else SHARP_Z_PER_PX
+        if float(np.median(slope[where][rim])) < least:
             continue
         polygon = _outline(part, where[1].start - 2, where[0].start - 2)
         if polygon is not None:
