@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from geofield import schema
-from geofield.errors import TrackError
+from geofield.errors import TrackError, TrackWarning
 from geofield.model.tracks import Tracks
 from geofield.tracks import plan_route, plan_tracks
 from geofield.tracks.route.order import track_order
@@ -74,6 +74,10 @@ def test_route_is_whole_and_free(
     if radius_m is not None:
         assert fits.mean() > 0.7
         assert (turns.loc[~fits & (turns["kind"] != "drive"), "outside_m"] > 0.0).all()
+        # A way with corners is not what a machine with a turning radius can drive.
+        assert (turns.loc[turns["kind"] == "drive", "fits"] == "no").all()
+    else:
+        assert fits.all()
     if curve == "dubins":
         assert (turns["reverse_m"] == 0.0).all()
 
@@ -185,6 +189,24 @@ def test_shortest_ways_are_shortest() -> None:
 def test_bad_settings_are_refused(tracks: Tracks, wrong: dict[str, object]) -> None:
     with pytest.raises(TrackError):
         plan_route(tracks, **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("radius_m", [None, 5.0])
+def test_a_wall_is_never_driven_through(radius_m: float | None) -> None:
+    field = shapely.box(500000, 5600000, 500100, 5600060)
+    wall = shapely.box(500048, 5599990, 500052, 5600070)
+    tracks = plan_tracks(field, [wall], crs=CRS, spacing_m=6.0, headland_m=12.0)
+    with pytest.warns(TrackWarning, match="cut the field"):
+        planned = plan_route(tracks, pattern="shortest", turning_radius_m=radius_m)
+    assert planned.route is not None
+    assert planned.notes
+    assert not shapely.intersects(
+        planned.route.geometry.to_numpy(), shapely.buffer(wall, -0.01)
+    ).any()
+    # One number is missing: there the machine must be carried over.
+    numbers = planned.route["sequence"].to_numpy()
+    assert (np.diff(numbers) > 1).sum() >= 1
+    assert (planned.route["kind"] == "work").sum() == len(tracks.segments)
 
 
 def test_fields_with_nothing_to_drive() -> None:

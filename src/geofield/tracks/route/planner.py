@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.errors import TrackError
+from geofield.errors import TrackError, TrackWarning
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.route.order import PATTERNS, IntArray, Pattern, nearest_start
@@ -59,6 +60,7 @@ def plan_route(
     Tracks
         The same tracks with the tables `route` and `turns`. A turn that cannot be driven within the
         allowed area is there all the same, with ``fits`` = ``no``; no way runs through an obstacle.
+        Where there is no way at all it is left out, and its sequence number with it.
 
     Raises
     ------
@@ -97,7 +99,16 @@ def plan_route(
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
     )
-    return replace(tracks, route=route, turns=table)
+    notes = tracks.notes
+    cut_off = sum(turn.kind == "none" for turn in turns)
+    if cut_off:
+        note = (
+            f"Obstacles or the border cut the field into parts: {cut_off} ways between segments do "
+            "not exist, and the route leaves them out."
+        )
+        warnings.warn(note, TrackWarning, stacklevel=2)
+        notes = (*notes, note)
+    return replace(tracks, route=route, turns=table, notes=notes)
 
 
 def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
@@ -198,6 +209,8 @@ def _tables(
         geometry,
         crs,
     )
+    there = np.ones(count, dtype=bool)
+    there[1::2] = [turn.kind != "none" for turn in turns]
     table = schema.table(
         schema.TURNS,
         {
@@ -219,6 +232,9 @@ def _tables(
         lines,
         crs,
     )
+    if not there.all():
+        route = route[there].reset_index(drop=True)
+        table = table[there[1::2]].reset_index(drop=True)
     return route, table
 
 

@@ -41,11 +41,12 @@ class Turn:
     places : array, shape (n, 2)
         The way, in the CRS.
     kind : str
-        ``dubins``, ``reeds_shepp`` or ``drive``.
+        ``dubins``, ``reeds_shepp``, ``drive``, or ``none`` where there is no way at all.
     length_m, reverse_m, outside_m : float
         All of it, backwards, beyond the border and its margin.
     fits : bool
-        Whether the machine can drive it within the allowed area.
+        Whether the machine can drive it within the allowed area; without a turning radius,
+        whether there is a way at all.
     early_m, late_m : float
         How much of the segment before and of the one after it leaves out.
     """
@@ -132,7 +133,9 @@ def plan_turns(
                     exits[row], entries[row], way, passage, radius_m=radius_m, spare_m=spare[row]
                 )
         if found[row] is None:
-            found[row] = loose[row] or _drive(ends, passage, way)
+            found[row] = loose[row] or (
+                _no_way(ends) if way is None else _polyline(way, fits=False)
+            )
     return [turn for turn in found if turn is not None]
 
 
@@ -305,11 +308,14 @@ def _lane_change(
     return None
 
 
-def _drive(ends: FloatArray, passage: Passage, way: FloatArray | None = None) -> Turn:
-    """The shortest way, with corners; straight and not fit where there is no way at all."""
-    if way is None:
-        way = passage.shortest(ends[0], ends[1])
-    return _polyline(ends, fits=False) if way is None else _polyline(way, fits=len(way) == 2)
+def _drive(ends: FloatArray, passage: Passage) -> Turn:
+    """The shortest way, with corners."""
+    way = passage.shortest(ends[0], ends[1])
+    return _no_way(ends) if way is None else _polyline(way, fits=True)
+
+
+def _no_way(ends: FloatArray) -> Turn:
+    return Turn(ends, "none", 0.0, fits=False)
 
 
 def _polyline(places: FloatArray, *, fits: bool) -> Turn:
