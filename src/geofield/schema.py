@@ -352,15 +352,24 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
         if column.name not in frame.columns:
             continue
         series = frame[column.name]
+        if column.type in ("int", "float"):
+            try:
+                series = pd.to_numeric(series)
+            except (ValueError, TypeError) as error:
+                raise FormatError(
+                    f"Layer {of.name!r}: column {column.name!r} holds something that is no "
+                    f"number ({error}).",
+                    hint="Correct the column, or leave the cell empty.",
+                ) from error
         if column.type == "int":
-            whole = pd.to_numeric(series)
+            whole = series
             if whole.dtype.kind == "i" and not whole.isna().any():
                 data[column.name] = whole.to_numpy(dtype="int64")
             else:
                 rounded = whole.round().astype("Int64").to_list()
                 data[column.name] = [None if pd.isna(v) else int(v) for v in rounded]
         elif column.type == "float":
-            data[column.name] = pd.to_numeric(series).to_numpy(dtype="float64", na_value=np.nan)
+            data[column.name] = series.to_numpy(dtype="float64", na_value=np.nan)
         elif column.type == "date":
             data[column.name] = [None if pd.isna(v) else str(v)[:10] for v in series]
         else:

@@ -158,3 +158,60 @@ def test_infinite_coordinates_are_found(tmp_path):
     broken.loc[0, "geometry"] = shapely.LineString([(0, 0), (np.inf, 1)])
     broken_set = dataclasses.replace(dataset, tables={**dataset.tables, "gaps": broken})
     assert any("not a number" in each.message for each in check_dataset(broken_set))
+
+
+def drawn_by_a_person(dataset):
+    """The plan with a row as QGIS makes it: a shape, and nothing else."""
+    import pandas as pd
+
+    table = dataset.tables["obstacles"]
+    new = schema.table(schema.OBSTACLES, {}, [shapely.box(*(table.total_bounds + 1))], dataset.crs)
+    both = pd.concat([table, new], ignore_index=True)
+    return dataclasses.replace(dataset, tables={**dataset.tables, "obstacles": both})
+
+
+@pytest.mark.parametrize("name", ["isoxml", "agopengps", "gpx", "kml", "dxf", "shapefile", "csv"])
+def test_a_drawn_obstacle_is_exported_before_planning_again(dataset, tmp_path, name):
+    edited = drawn_by_a_person(dataset)
+    for path in write_dataset(edited, tmp_path, [name]):
+        assert b"<NA>" not in path.read_bytes()
+        assert b"&lt;NA&gt;" not in path.read_bytes()
+        assert b"Obstacle None" not in path.read_bytes()
+        assert b"Obstacle nan" not in path.read_bytes()
+    if name in ("isoxml", "agopengps"):
+        back = read_dataset(tmp_path / name / ("Fields" if name == "agopengps" else ""))
+        assert 5 in set(back.table("obstacles")["obstacle_no"])
+
+
+def test_a_renamed_field_keeps_its_new_name(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    with sqlite3.connect(tmp_path / "field.gpkg") as connection:
+        for (trigger,) in connection.execute(
+            "SELECT name FROM sqlite_master WHERE type='trigger' AND tbl_name='field'"
+        ).fetchall():
+            connection.execute(f'DROP TRIGGER "{trigger}"')
+        connection.execute("UPDATE field SET name = 'Neuer Name'")
+    connection.close()
+    assert read_dataset(tmp_path / "field.gpkg").name == "Neuer Name"
+
+
+def test_an_obstacle_of_two_parts_becomes_two(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    path = tmp_path / "field.gpkg"
+    table = dataset.table("obstacles").copy()
+    two = shapely.multipolygons([table.geometry.iloc[0], table.geometry.iloc[2]])
+    table.loc[0, "geometry"] = two
+    table.to_file(path, layer="obstacles", driver="GPKG")
+    back = read_dataset(path).table("obstacles")
+    assert len(back) == 5
+    assert back["obstacle_no"].isna().sum() == 1
+    assert set(back.geom_type) == {"Polygon"}
+
+
+def test_text_where_numbers_belong(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    table = dataset.table("obstacles").copy()
+    table["radius_m"] = ["about three", None, None, None]
+    table.to_file(tmp_path / "field.gpkg", layer="obstacles", driver="GPKG")
+    with pytest.raises(FormatError, match="'radius_m' holds something that is no number"):
+        read_dataset(tmp_path / "field.gpkg")

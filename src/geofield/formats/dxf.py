@@ -16,6 +16,7 @@ import shapely
 from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry
+from geofield.formats.avoided import avoided
 from geofield.model import Dataset
 
 #: DXF layer by layer of the schema.
@@ -36,9 +37,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     names: list[str] = []
     lines: list[Any] = []
     for name, drawing_layer in LAYERS.items():
-        table = dataset.table(name)
-        if name == "obstacles":
-            table = table[table["status"] != "rejected"]
+        table = avoided(dataset) if name == "obstacles" else dataset.table(name)
         shapes = exact_geometry(schema.layer(name), table)
         if name in ("field", "obstacles"):
             shapes = shapely.get_rings(shapes)

@@ -56,12 +56,15 @@ def read(path: Path) -> Dataset:
             continue
         if name != schema.TRACK_POINTS.name:
             tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
+    field = tables.get(schema.FIELD.name)
+    named = field is not None and len(field) == 1 and isinstance(field["name"].iloc[0], str)
     scene = None if record.scene is None else path.parent / record.scene
     has_points = schema.TRACK_POINTS.name in layers
     return Dataset(
         tables,
         crs,
-        record.name,
+        # A person may have renamed the field in its row.
+        field["name"].iloc[0] if field is not None and named else record.name,
         record.provenance,
         record.grid,
         scene if scene is not None and scene.exists() else None,
@@ -121,7 +124,22 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             stacklevel=3,
         )
         frame = frame[~absent]
+    if of is schema.OBSTACLES:
+        frame = _parts_apart(frame)
     return schema.conform(of, frame, extras=True)
+
+
+def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Obstacles of several parts as several obstacles; the further parts have no number yet."""
+    import shapely
+
+    if not (shapely.get_num_geometries(frame.geometry.to_numpy()) > 1).any():
+        return frame
+    apart = frame.explode(index_parts=False, ignore_index=False)
+    further = apart.index.duplicated()
+    numbers = apart["obstacle_no"].astype("Int64")
+    numbers[further] = None
+    return apart.assign(obstacle_no=numbers).reset_index(drop=True)
 
 
 def _origin(path: Path) -> origin.Origin | None:

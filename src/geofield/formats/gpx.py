@@ -12,6 +12,7 @@ import shapely
 
 from geofield import schema
 from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.avoided import avoided
 from geofield.formats.origin import lineage, timestamp
 from geofield.formats.xml import write_xml
 from geofield.model import Dataset
@@ -37,8 +38,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     ET.SubElement(metadata, "name").text = dataset.name
     ET.SubElement(metadata, "desc").text = lineage(dataset)
     ET.SubElement(metadata, "time").text = f"{timestamp(dataset)[:19]}Z"
-    obstacles = dataset.table(schema.OBSTACLES.name)
-    obstacles = obstacles[obstacles["status"] != "rejected"]
+    obstacles = avoided(dataset)
     centres = shapely.point_on_surface(obstacles.geometry.to_numpy())
     for row, (lon, lat) in zip(
         obstacles.to_dict("records"), _lonlat(centres, dataset), strict=True

@@ -116,7 +116,8 @@ def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
     if layer.name == schema.GAPS.name:
         return f"Gap {row['gap_no']} of track {row['track_no']}"
     if layer.name == schema.OBSTACLES.name:
-        return f"Obstacle {row['obstacle_no']}"
+        number = row["obstacle_no"]
+        return "Obstacle" if pd.isna(number) else f"Obstacle {number}"
     return f"Track {row['track_no']}"
 
 

@@ -115,7 +115,6 @@ def restored(dataset: Dataset, record: Origin | None) -> Dataset:
         return dataset
     return dataclasses.replace(
         dataset,
-        name=record.name,
         provenance=record.provenance,
         grid=record.grid if record.crs == dataset.crs else None,
     )

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from geofield.formats.arrow import to_lonlat
+from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
 from geofield.model import Dataset
 
@@ -96,12 +97,7 @@ def _tables(
     dataset: Dataset,
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame, gpd.GeoDataFrame]:
     """Field, obstacles that are to be avoided, and segments."""
-    obstacles = dataset.table("obstacles")
-    return (
-        dataset.table("field"),
-        obstacles[obstacles["status"] != "rejected"],
-        dataset.table("segments"),
-    )
+    return dataset.table("field"), avoided(dataset), dataset.table("segments")
 
 
 def _obstacle_columns(obstacles: gpd.GeoDataFrame) -> dict[str, Any]:

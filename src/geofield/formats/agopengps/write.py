@@ -14,6 +14,7 @@ from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
 from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
 from geofield.formats.origin import timestamp
 from geofield.model import Dataset
@@ -69,8 +70,7 @@ def _field(name: str, plane: LocalPlane, stamp: str) -> list[str]:
 def _boundary(dataset: Dataset, polygon: Any, plane: LocalPlane) -> list[str]:
     area_ha = polygon.area / 10_000.0
     step = next(step for limit, step in _STEPS if area_ha < limit)
-    obstacles = dataset.table(schema.OBSTACLES.name)
-    obstacles = obstacles[obstacles["status"] != "rejected"]
+    obstacles = avoided(dataset)
     rings = [polygon.exterior, *polygon.interiors]
     rings += [shape.exterior for shape in exact_geometry(schema.OBSTACLES, obstacles)]
     outer, *inner = to_lonlat(np.array(rings, dtype=object), dataset.crs)
@@ -125,8 +125,7 @@ def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
 
 def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
     """One flag per obstacle that is to be avoided, at its centre."""
-    obstacles = dataset.table(schema.OBSTACLES.name)
-    obstacles = obstacles[obstacles["status"] != "rejected"]
+    obstacles = avoided(dataset)
     lines = ["$Flags", str(len(obstacles))]
     centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
     if not len(centres):

@@ -18,6 +18,7 @@ from pyproj import Geod
 from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.avoided import avoided
 from geofield.formats.isoxml.codes import (
     DECIMALS,
     DESIGNATOR,
@@ -98,8 +99,7 @@ def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, A
 def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:
     outline = to_lonlat(np.array([polygon], dtype=object), dataset.crs)[0]
     _add_polygon(part, PolygonType.BOUNDARY, dataset.name, polygon.area, outline)
-    obstacles = dataset.table(schema.OBSTACLES.name)
-    obstacles = obstacles[obstacles["status"] != "rejected"]
+    obstacles = avoided(dataset)
     shapes = exact_geometry(schema.OBSTACLES, obstacles)
     placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes
     names = [f"Obstacle {number}" for number in obstacles["obstacle_no"]]
