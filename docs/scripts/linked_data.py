@@ -21,7 +21,8 @@ def ontology_page() -> str:
         "GeoSPARQL 1.1, a field is also a SAREF4AGRI parcel, detections are SOSA observations, "
         "origins are PROV-O, the dataset is DCAT. The package holds the OWL 2 file "
         "`ontology.ttl`, the SHACL shapes `shapes.ttl` and the JSON-LD context "
-        "`context.jsonld` in `geofield/formats/rdf/data/`.",
+        "`context.jsonld` in `geofield/formats/rdf/data/`. The namespace is a name: until it is "
+        "registered with w3id.org nothing answers at that address, and nothing here asks it.",
         "",
         "## Names of things",
         "",

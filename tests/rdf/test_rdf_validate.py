@@ -97,7 +97,7 @@ BROKEN = {
     "route step of unknown kind": (F + "/route/1", "gf:RouteStep", r'stepKind "work"', 'stepKind "fly"',
                                    "not allowed"),
     "sequence twice": (F + "/route/2", "gf:RouteStep", r"gf:sequence 2", "gf:sequence 1", "same sequence"),
-    "turn that fits perhaps": (F + "/turn/1", "gf:Turn", r'gf:fits "true"', 'gf:fits "perhaps"',
+    "turn that fits perhaps": (F + "/turn/1", "gf:Turn", r'gf:fits true', 'gf:fits "perhaps"^^xsd:boolean',
                                "no xsd:boolean"),
     "turn to a lost track": (F + "/turn/1", "gf:Turn", r"(gf:toTrack <\S+)2>", r"\g<1>77>", "no gf:Track"),
     "plan of no field": (F + "/plan", "gf:TrackPlan", r"gf:inField \S+ ;", "", "no in field"),

@@ -20,6 +20,7 @@ from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.namespaces import (
     CC,
     DATE,
+    DC,
     DCAT,
     DCTERMS,
     GEO,
@@ -251,7 +252,7 @@ class Description:
             one(DCTERMS + "title", dataset.name),
             one(DCTERMS + "subject", self.names.field, datatype=IRI),
             one(DCTERMS + "license", licence_iri(source.licence), datatype=IRI),
-            one(DCTERMS + "rights", source.licence),
+            one(DC + "rights", source.licence),
             one(CC + "attributionName", source.attribution),
             one(GF + "metricCrs", crs, datatype=IRI),
             one(GF + "metricCrsWkt", None if crs else dataset.crs.to_wkt()),
@@ -273,7 +274,7 @@ class Description:
 
     def _software(self) -> str:
         name = self.dataset.provenance.software
-        return f"{self.base}software/{path_part(name)}" if name else ""
+        return f"{self.base}software/{'/'.join(map(path_part, name.split()))}" if name else ""
 
     def _imagery_node(self) -> Group:
         dataset, source, grid = self.dataset, self.dataset.provenance.source, self.dataset.grid
@@ -281,7 +282,7 @@ class Description:
             one(LABEL, source.name),
             one(DCTERMS + "created", source.date, datatype=DATE if is_date(source.date) else None),
             one(DCTERMS + "license", licence_iri(source.licence), datatype=IRI),
-            one(DCTERMS + "rights", source.licence),
+            one(DC + "rights", source.licence),
             one(CC + "attributionName", source.attribution),
             one(GF + "mayDerive", source.may_derive),
             one(GF + "mayCache", source.may_cache),

@@ -17,6 +17,7 @@ RDFS: Final = "http://www.w3.org/2000/01/rdf-schema#"
 OWL: Final = "http://www.w3.org/2002/07/owl#"
 XSD: Final = "http://www.w3.org/2001/XMLSchema#"
 SKOS: Final = "http://www.w3.org/2004/02/skos/core#"
+DC: Final = "http://purl.org/dc/elements/1.1/"
 DCTERMS: Final = "http://purl.org/dc/terms/"
 DCAT: Final = "http://www.w3.org/ns/dcat#"
 PROV: Final = "http://www.w3.org/ns/prov#"
@@ -39,7 +40,6 @@ STUDY_POINT: Final = "http://www.DLC.org/trajectory#"
 STUDY_TREE: Final = "http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#"
 SVG_CIRCLE: Final = "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd/circle#"
 GML: Final = "http://www.opengis.net/gml/"
-DC: Final = "http://purl.org/dc/elements/1.1/"
 DCMI_IMAGE: Final = "http://purl.org/dc/dcmitype/Image"
 
 #: Prefixes of every product, by name; the order is that of the files.
@@ -47,6 +47,7 @@ PREFIXES: Final[dict[str, str]] = {
     "rdf": RDF,
     "rdfs": RDFS,
     "xsd": XSD,
+    "dc": DC,
     "dcterms": DCTERMS,
     "dcat": DCAT,
     "prov": PROV,
@@ -59,7 +60,6 @@ PREFIXES: Final[dict[str, str]] = {
     "gf": GF,
 }
 STUDY_PREFIXES: Final[dict[str, str]] = {
-    "dc": DC,
     "po": STUDY_TREE,
     "svg": SVG_CIRCLE,
     "gml": GML,

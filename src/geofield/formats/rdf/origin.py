@@ -10,7 +10,7 @@ from affine import Affine
 
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import CC, DCAT, DCTERMS, GF, LABEL, PROV
+from geofield.formats.rdf.namespaces import CC, DC, DCAT, DCTERMS, GF, LABEL, PROV
 from geofield.formats.rdf.parse import Graph
 from geofield.grid import Grid
 from geofield.model.dataset import Provenance
@@ -96,7 +96,7 @@ def _source(graph: Graph) -> ImagerySource:
         graph.value(picture, LABEL) or "",
         graph.value(picture, DCTERMS + "created"),
         graph.value(picture, CC + "attributionName") or "",
-        graph.value(picture, DCTERMS + "rights") or "",
+        graph.value(picture, DC + "rights") or "",
         graph.value(picture, GF + "mayDerive") != "false",
         graph.value(picture, GF + "mayCache") != "false",
         int(zoom) if zoom and zoom.isdecimal() else None,

@@ -39,7 +39,7 @@ TERMS: tuple[Term, ...] = (
     Term("gf:imageryDate", "xsd:date", "Imagery date",
          "When the picture was taken; a text where only the year or month is known.",
          ("gf:Field",)),
-    Term("dcterms:rights", "xsd:string", "Rights", "The licence in words.",
+    Term("dc:rights", "xsd:string", "Rights", "The licence in words.",
          ("gf:Field", "dcat:Dataset", "prov:Entity")),
     # -- obstacles
     Term("gf:obstacleNo", "xsd:integer", "Obstacle number", "Unique in its field.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from geofield.formats.rdf.namespaces import INTEGER, RDFS, STRING
+from geofield.formats.rdf.namespaces import BOOLEAN, INTEGER, RDFS, STRING
 from geofield.formats.rdf.nodes import IRI, Nodes, join_values, joined
 from geofield.formats.rdf.ntriples import escape_literal
 from geofield.formats.rdf.serialise import Serialiser, escaped
@@ -50,7 +50,7 @@ class Turtle(Serialiser):
     def _value(self, column: Any, datatype: str) -> Any:
         if datatype == IRI:
             return self._iris(column)
-        if datatype == INTEGER:
+        if datatype in (INTEGER, BOOLEAN):
             return column
         if datatype == STRING:
             return joined('"', column, '"')

@@ -196,7 +196,7 @@ _COLUMN_TERMS: dict[str, str] = {
     "perimeter_m": "geo:hasMetricPerimeterLength",
     "method": "gf:outlineMethod",
     "imagery": "gf:imageryName",
-    "licence": "dcterms:rights",
+    "licence": "dc:rights",
     "x_px": "gf:pixelX",
     "y_px": "gf:pixelY",
     "radius_px": "gf:pixelRadius",
