@@ -335,6 +335,20 @@ def test_tiles_that_never_come_whole_are_counted_as_failed(tmp_path: Path) -> No
     assert "0 are not there" in str(caught.value)
 
 
+def test_a_server_that_refuses_everything_is_left_in_peace(tmp_path: Path) -> None:
+    def forbidden(handler: Any, tile: tuple[int, int, int], attempt: int) -> bool:
+        handler.reply(403, b"no", "text/plain")
+        return True
+
+    with serving(forbidden) as server:
+        where = replace(HERE, size_px=256 * 40)
+        with pytest.raises(ImageryError, match=r"gives nothing.*403.*check the key"):
+            acquire(_named(server), where, tmp_path / "a.tif", options=FAST)
+        assert len(server.asked) < 400
+        assert set(server.asked.values()) == {1}
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_tile_half_transparent_is_masked(tmp_path: Path) -> None:
     class Transparent(TileServer):
         def body(self, tile: tuple[int, int, int]) -> bytes:

@@ -15,6 +15,7 @@ import mercantile
 import numpy as np
 import pytest
 import rasterio
+import shapely
 from affine import Affine
 from hypothesis import given
 from hypothesis import strategies as st
@@ -661,6 +662,9 @@ def test_own_pictures_are_cut_as_they_are(tmp_path: Path) -> None:
     done = acquire(source, Where(lat=lat, lon=lon, size_px=21), tmp_path / "cut.tif")
     with rasterio.open(done.path) as file:
         assert np.array_equal(file.read(), ground()[:, 30:51, 50:71])
+    area = shapely.box(*grid.to_lonlat(40, 60), *grid.to_lonlat(60, 40))
+    done = acquire(source, Where(area=area), tmp_path / "area.tif")
+    assert 19 <= done.grid.width_px <= 22
     with pytest.raises(ImageryError, match="is the picture itself"):
         acquire(source, Where(lat=lat, lon=lon), path, overwrite=True)
 

@@ -9,6 +9,7 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Literal
 
+from pyproj import Geod
 from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import ImageryError
@@ -314,17 +315,30 @@ def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite
     if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
         raise ImageryError(f"{path} is the picture itself.", hint="Give the output another name.")
     lat, lon = place.point
+    size_m = place.size_m
+    if place.area is not None and place.size_px is None and size_m is None:
+        size_m = _extent_m(place.area)
     scene = read_scene(
         source.path,
         lat=lat,
         lon=lon,
-        size_m=place.size_m,
-        size_px=place.size_px if place.size_m is None else None,
+        size_m=size_m,
+        size_px=place.size_px,
         bands=source.bands,
     )
     scene = with_provenance(scene, source)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
+
+
+def _extent_m(area: BaseGeometry) -> float:
+    """The longer side of an area's box, ground metres."""
+    west, south, east, north = area.bounds
+    middle = (south + north) / 2
+    geod = Geod(ellps="WGS84")
+    return float(
+        max(geod.inv(west, middle, east, middle)[2], geod.inv(west, south, west, north)[2], 1.0)
+    )
 
 
 def with_provenance(scene: Scene, source: PictureSource) -> Scene:

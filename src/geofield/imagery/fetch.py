@@ -26,6 +26,8 @@ from geofield.imagery.tiling import Block, Tile
 Missing = Literal["error", "mask"]
 Progress = Callable[[int, int, str], None]
 
+#: After so many failures without one success the server is left in peace.
+_HOPELESS = 24
 #: Tiles under way at least, however short the rows are.
 _AHEAD = 96
 
@@ -218,6 +220,13 @@ class TileFetcher:
         else:
             self.report.failed += 1
         self.report.reasons[reason] += 1
+        hopeless = not (self.report.downloaded or self.report.cached)
+        if hopeless and self.report.failed >= _HOPELESS:
+            raise ImageryError(
+                f"{self.source.name} gives nothing: the first {self.report.failed} tiles failed, "
+                f"{self.report.reasons.most_common(1)[0][0]}.",
+                hint="Check the key, the terms and the address; nothing more was asked for.",
+            )
 
     def _seen(self, day: date) -> None:
         self.report.cached += 1
