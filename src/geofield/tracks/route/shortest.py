@@ -23,6 +23,7 @@ from geofield.tracks.route.tour import improve_tour
 
 _NEIGHBOURS = 12
 _BLOCKED_FACTOR = 1.5
+_CRAMPED_RADII = 12.0
 """A link that is blocked is priced as this many times its length, until its way is known."""
 
 
@@ -72,6 +73,22 @@ def shortest_order(
     return first // 2, (first % 2).astype(bool)
 
 
+def _cramped(
+    places: FloatArray, leaving: FloatArray, passage: Passage, radius_m: float
+) -> NDArray[np.bool_]:
+    """Whether an obstacle stands so close before an end that no turn can be begun there."""
+    ahead = radius_m * np.column_stack((np.cos(leaving), np.sin(leaving)))
+    return passage.hits(np.asarray(shapely.linestrings(np.stack((places, places + ahead), axis=1))))
+
+
+def _face_to_face(exits: FloatArray, entries: FloatArray) -> NDArray[np.bool_]:
+    """Whether one end lies straight ahead of the other: what is between is driven around."""
+    offset = entries[:, :2] - exits[:, :2]
+    across = np.cos(exits[:, 2]) * offset[:, 1] - np.sin(exits[:, 2]) * offset[:, 0]
+    along = np.cos(exits[:, 2]) * offset[:, 0] + np.sin(exits[:, 2]) * offset[:, 1]
+    return np.asarray((np.abs(across) < 1e-3) & (along > 0.0))
+
+
 def _link_costs(
     ends: FloatArray, passage: Passage, radius_m: float | None
 ) -> tuple[list[list[int]], dict[int, float]]:
@@ -103,6 +120,9 @@ def _link_costs(
         exits = np.column_stack((places[a], leaving[a]))
         entries = np.column_stack((places[b], leaving[b] + np.pi))
         length = dubins_words(exits, entries, radius_m).total.min(axis=1) * radius_m
+        length += _cramped(places, leaving, passage, radius_m)[np.stack((a, b))].any(axis=0) * (
+            _CRAMPED_RADII * radius_m * ~_face_to_face(exits, entries)
+        )
     lines = np.asarray(shapely.linestrings(np.stack((places[a], places[b]), axis=1)))
     blocked = passage.hits(lines) | ~shapely.covers(passage.open_shell, lines)
     length = np.where(blocked, length * _BLOCKED_FACTOR, length)
