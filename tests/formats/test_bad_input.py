@@ -215,3 +215,24 @@ def test_text_where_numbers_belong(dataset, tmp_path):
     table.to_file(tmp_path / "field.gpkg", layer="obstacles", driver="GPKG")
     with pytest.raises(FormatError, match="'radius_m' holds something that is no number"):
         read_dataset(tmp_path / "field.gpkg")
+
+
+def test_edits_that_qgis_has_saved_but_not_folded_in_are_read(dataset, tmp_path):
+    """While QGIS is open, what a person saved lies in the write-ahead log beside the file."""
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    path = tmp_path / "field.gpkg"
+    other = sqlite3.connect(path)
+    other.execute("PRAGMA journal_mode = WAL")
+    other.execute("PRAGMA wal_autocheckpoint = 0")
+    for (trigger,) in other.execute(
+        "SELECT name FROM sqlite_master WHERE type='trigger' AND tbl_name='obstacles'"
+    ).fetchall():
+        other.execute(f'DROP TRIGGER "{trigger}"')
+    other.execute("UPDATE obstacles SET status = 'rejected' WHERE obstacle_no = 1")
+    other.commit()
+    try:
+        assert (tmp_path / "field.gpkg-wal").stat().st_size > 0
+        back = read_dataset(path).table("obstacles")
+        assert list(back["status"])[:2] == ["rejected", "confirmed"]
+    finally:
+        other.close()

@@ -11,8 +11,10 @@ import pytest
 import shapely
 
 from geofield.errors import FormatError, FormatWarning, OutputExistsError
-from geofield.formats import FORMATS, atomic, format_named, read_dataset, write_dataset
+from geofield.formats import FORMATS, atomic, detect, format_named, read_dataset, write_dataset
 from geofield.formats.atomic import staged_file, staged_folder
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*cannot carry.*:geofield.errors.FormatWarning")
 
 
 def listing(folder):
@@ -171,6 +173,14 @@ def test_mixed_geometries_are_refused(dataset, tmp_path):
 def test_impossible_stems(dataset, tmp_path, stem):
     with pytest.raises(FormatError, match="not a file name"):
         write_dataset(dataset, tmp_path, ["gpkg"], stem=stem)
+
+
+def test_products_are_recognised(dataset, tmp_path):
+    names = [name for name, each in FORMATS.items() if each.reader and name != "rdf-study"]
+    for name in names:
+        write_dataset(dataset, tmp_path / name, [name])
+        found = detect(next(p for p in (tmp_path / name).iterdir() if p.suffix != ".qgz"))
+        assert found.name == name
 
 
 def test_missing_and_unknown_files(tmp_path):

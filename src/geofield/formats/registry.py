@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -12,6 +13,8 @@ from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
 
 __all__ = ["FORMATS", "Drop", "Format", "detect", "format_named", "product_file"]
+
+_TASK_DATA = b"ISO11783_TaskData"
 
 #: Every format by its name.
 FORMATS: Mapping[str, Format] = MappingProxyType({each.name: each for each in CATALOGUE})
@@ -50,8 +53,8 @@ def detect(path: Path | str) -> Format:
     if place.is_dir():
         return _detect_folder(place)
     suffix = place.suffix.lower()
-    if suffix == ".xml" and _is_taskdata(place):
-        return format_named("isoxml")
+    if suffix == ".xml" and _TASK_DATA in _head(place):
+        return _isoxml_of(_head(place))
     for each in FORMATS.values():
         if suffix in each.suffixes:
             return each
@@ -84,8 +87,10 @@ def product_file(place: Path, found: Format) -> Path:
 def _detect_folder(folder: Path) -> Format:
     names = {path.name.upper() for path in folder.iterdir()}
     if "TASKDATA.XML" in names or "TASKDATA" in names:
-        return format_named("isoxml")
-    if {"FIELD.TXT", "BOUNDARY.TXT"} & names or any(folder.glob("*/Field.txt")):
+        from geofield.formats.isoxml.read import task_file
+
+        return _isoxml_of(_head(task_file(folder)))
+    if {"FIELD.TXT", "BOUNDARY.TXT"} & names or _below(folder, "Field.txt"):
         return format_named("agopengps")
     suffixes = {Path(name).suffix.lower() for name in names}
     for each in FORMATS.values():
@@ -96,6 +101,17 @@ def _detect_folder(folder: Path) -> Format:
     )
 
 
-def _is_taskdata(path: Path) -> bool:
+def _below(folder: Path, name: str) -> bool:
+    """Whether a file lies one or two folders deeper."""
+    return any(folder.glob(f"*/{name}")) or any(folder.glob(f"*/*/{name}"))
+
+
+def _head(path: Path) -> bytes:
     with path.open("rb") as file:
-        return b"ISO11783_TaskData" in file.read(4096)
+        return file.read(4096)
+
+
+def _isoxml_of(head: bytes) -> Format:
+    version = re.search(rb"""VersionMajor=["'](\d)""", head)
+    old = version is not None and version.group(1) in (b"1", b"2", b"3")
+    return format_named("isoxml-v3" if old else "isoxml")
