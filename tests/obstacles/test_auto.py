@@ -69,10 +69,9 @@ def test_results_do_not_depend_on_the_window(simulated):
     from geofield.obstacles.windows import detect_trees
 
     verifier = load_verifier("nir")
-    region = np.ones(simulated.scene.grid.shape, bool)
-    whole = detect_trees(simulated.scene, region, verifier, factor=1.0, min_confidence=0.4)
+    whole = detect_trees(simulated.scene, None, verifier, factor=1.0, min_confidence=0.4)
     parts = detect_trees(
-        simulated.scene, region, verifier, factor=1.0, min_confidence=0.4, core_px=160
+        simulated.scene, None, verifier, factor=1.0, min_confidence=0.4, core_px=160
     )
     assert len(whole) == len(parts) > 5
     a = np.sort(np.round(whole.x_px, 3))
@@ -127,6 +126,15 @@ def test_holes_without_data_add_nothing(simulated):
     assert valid[rows, cols].all()
 
 
+def test_a_reader_gives_the_same_as_its_scene(simulated, simulated_tif):
+    from geofield.imagery.reader import SceneReader
+
+    reader = SceneReader.open(str(simulated_tif))
+    found = gf.detect_obstacles(reader, simulated.field)
+    whole = gf.detect_obstacles(simulated.scene, simulated.field)
+    assert found["x_px"].to_numpy() == pytest.approx(whole["x_px"].to_numpy(), abs=1e-6)
+
+
 def test_a_coarse_picture_warns(simulated):
     scene = simulated.scene
     grid = scene.grid.resized(scene.grid.width_px // 4, scene.grid.height_px // 4)
@@ -146,7 +154,7 @@ def test_a_coarse_picture_warns(simulated):
         ({"polarity": "grey"}, "polarity"),
         ({"min_confidence": 2}, "confidence"),
         ({"strategy": "single", "edge_method": "laplace"}, "edge method"),
-        ({"grey_check": "bright"}, "grey check"),
+        ({"strategy": "single", "grey_check": "bright"}, "grey check"),
     ],
 )
 def test_bad_arguments_are_refused(simulated, arguments, match):

@@ -9,23 +9,28 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from geofield.obstacles.channels import Channels, Image, gaussian
+from geofield.obstacles.channels import Channels, Image, gaussian, is_peak, shrink
 from geofield.obstacles.evidence import Support, support_peaks
 
 SUPPORT_THRESHOLD = 0.25
+DARK_SUPPORT_THRESHOLD = 0.5
 MIN_DISTANCE_PX = 3.0
 
 
 def candidate_centres(
-    found: Channels, support: Support
+    found: Channels, support: Support, dark_support: Support | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return candidate centres in pixel-index coordinates of the working grid."""
     peaks = support_peaks(support, SUPPORT_THRESHOLD)
     xs, ys = [peaks.x_px], [peaks.y_px]
+    if dark_support is not None:
+        peaks = support_peaks(dark_support, DARK_SUPPORT_THRESHOLD)
+        xs.append(peaks.x_px)
+        ys.append(peaks.y_px)
     blobs: list[tuple[Image, float, float]] = [(found.evidence, 1.5, 0.03)]
     blobs.append((found.evidence, 2.5, 0.03))
+    blobs.append((found.dark, 4.0, 0.05))
     if found.index is not None:
         blobs.append((found.index, 1.5, 1.0))
     if found.variant == "nir":
@@ -45,16 +50,22 @@ def candidate_centres(
 def _blobs(
     image: Image, sigma: float, threshold: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rows and columns of what stands out at a size; wide ones on a coarser picture."""
+    factor = 1 if sigma < 2 else 2 if sigma < 4 else 4
+    if factor > 1:
+        image = shrink(image, factor)
+        sigma = float(np.sqrt(sigma**2 - (factor**2 - 1) / 6)) / factor
     response = gaussian(image, sigma) - gaussian(image, 1.6 * sigma)
-    peak = (response > threshold) & (response >= ndimage.maximum_filter(response, 3))
+    peak = (response > threshold) & is_peak(response)
     rows, cols = np.nonzero(peak)
-    return rows.astype(np.float64), cols.astype(np.float64)
+    offset = (factor - 1) / 2
+    return rows.astype(np.float64) * factor + offset, cols.astype(np.float64) * factor + offset
 
 
 def _spread(
     x: NDArray[np.float64], y: NDArray[np.float64], shape: tuple[int, ...]
 ) -> NDArray[np.intp]:
-    """Keep one candidate per cell of two pixels, the first one found."""
+    """Keep one candidate per cell of three pixels, the first one found."""
     cell = (y // MIN_DISTANCE_PX).astype(np.int64) * (shape[1] + 2) + (x // MIN_DISTANCE_PX).astype(
         np.int64
     )

@@ -5,6 +5,7 @@ All pictures here are float32 (rows, cols) on the working grid (about 0.6 m per 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -39,6 +40,8 @@ class Channels:
         greenness by the best index there is (zero without colour).
     evidence : float32 array
         (dark + green) / sqrt 2; darkness alone without colour.
+    mixture : float32 array or None
+        What the best index divides by: how much each cover weighs in a mixed pixel.
     """
 
     variant: Variant
@@ -46,6 +49,7 @@ class Channels:
     dark: Image
     green: Image
     evidence: Image
+    mixture: Image | None = None
 
     @property
     def index(self) -> Image | None:
@@ -86,7 +90,8 @@ def channels(
         variant = "nir"
     green = background_score(maps["ndvi" if nir is not None else "exg"], window_px, _MIN_MAD_GREEN)
     evidence = (dark + green) / np.float32(np.sqrt(2.0))
-    return Channels(variant, maps, dark, green, evidence)
+    mixture = red + green_band + blue + 30 if nir is None else nir + red + 30
+    return Channels(variant, maps, dark, green, evidence, mixture)
 
 
 def background_score(image: Image, window_px: float, min_mad: float) -> Image:
@@ -110,11 +115,27 @@ def shrink(image: Image, factor: int) -> Image:
     """Return block means, the last row and column repeated to fill the last blocks."""
     if factor == 1:
         return image
+    if factor % 2 == 0 and factor > 2:
+        return shrink(shrink(image, 2), factor // 2)
     rows, cols = image.shape
     pad = ((0, -rows % factor), (0, -cols % factor))
     padded = np.pad(image, pad, mode="edge") if any(p[1] for p in pad) else image
-    shape = (padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
-    return cast("Image", padded.reshape(shape).mean(axis=(1, 3), dtype=np.float32))
+    # Strided sums are several times faster than a mean over reshaped blocks.
+    tall = padded[::factor].copy()
+    for i in range(1, factor):
+        tall += padded[i::factor]
+    total = tall[:, ::factor].copy()
+    for i in range(1, factor):
+        total += tall[:, i::factor]
+    return total * np.float32(1 / factor**2)
+
+
+def is_peak(image: Image) -> NDArray[np.bool_]:
+    """Return which pixels are not below any of their eight neighbours."""
+    padded = np.pad(image, 1, mode="edge")
+    rows = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    around = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
+    return image >= around
 
 
 def enlarge(image: Image, factor: int, shape: tuple[int, ...]) -> Image:
@@ -138,7 +159,7 @@ def _bilinear(
 
 def gaussian(image: Image, sigma_px: float) -> Image:
     """Smooth by a Gaussian; wide ones on a coarser picture, at a fraction of the time."""
-    factor = 1 if sigma_px < 3 else 2 if sigma_px < 6 else 4
+    factor = 1 if sigma_px < 2 else 2 if sigma_px < 5 else 4
     if factor == 1:
         return _gaussian(image, sigma_px)
     # Block means have a variance of their own, (f^2 - 1) / 12 of a pixel squared.
@@ -146,18 +167,29 @@ def gaussian(image: Image, sigma_px: float) -> Image:
     return enlarge(_gaussian(shrink(image, factor), float(rest)), factor, image.shape)
 
 
-def sample_gaussian(
-    image: Image, sigma_px: float, rows: NDArray[np.intp], cols: NDArray[np.intp]
-) -> NDArray[np.float32]:
-    """Return a smoothed picture at some pixels, without enlarging the coarse picture first."""
-    factor = 1 if sigma_px < 2 else 2 if sigma_px < 6 else 4
-    if factor == 1:
-        return _gaussian(image, sigma_px)[rows, cols]
-    rest = np.sqrt(max(sigma_px**2 - (factor**2 - 1) / 6, 0.25)) / factor
-    coarse = _gaussian(shrink(image, factor), float(rest))
-    y = np.clip((rows + 0.5) / factor - 0.5, 0, coarse.shape[0] - 1)
-    x = np.clip((cols + 0.5) / factor - 0.5, 0, coarse.shape[1] - 1)
-    return bilinear(coarse, x, y)
+def sample_gaussians(
+    image: Image,
+    sigmas_px: Sequence[float],
+    rows: NDArray[np.intp],
+    cols: NDArray[np.intp],
+) -> list[NDArray[np.float32]]:
+    """Return a picture smoothed at several widths, at some pixels only."""
+    levels = {1: image}
+    out: list[NDArray[np.float32]] = []
+    for sigma in sigmas_px:
+        factor = 1 if sigma < 1.2 else 2 if sigma < 4 else 4
+        if factor == 1:
+            out.append(_gaussian(image, sigma)[rows, cols])
+            continue
+        if factor not in levels:
+            half = levels.setdefault(2, shrink(image, 2))
+            levels.setdefault(4, shrink(half, 2))
+        rest = np.sqrt(max(sigma**2 - (factor**2 - 1) / 6, 0.25)) / factor
+        coarse = _gaussian(levels[factor], float(rest))
+        y = np.clip((rows + 0.5) / factor - 0.5, 0, coarse.shape[0] - 1)
+        x = np.clip((cols + 0.5) / factor - 0.5, 0, coarse.shape[1] - 1)
+        out.append(bilinear(coarse, x, y))
+    return out
 
 
 def bilinear(image: Image, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.obstacles.channels import Image, shrink
+from geofield.obstacles.channels import Image, is_peak, shrink
 from geofield.obstacles.circles import Circles
 
 RADII = 12
 VOTE_THRESHOLD = 0.22
 """Gradient of the evidence per pixel, above which pixels vote: about 1.5 times its median."""
 
-_SCALED_FROM_PX = 6.0
+_SCALED_FROM_PX = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ def support_peaks(support: Support, threshold: float) -> Circles:
             for j in (i - 1, i + 1)
             if 0 <= j < count and support.levels[j][0] == factor
         ]
-        peak = (image > threshold) & (image >= ndimage.maximum_filter(image, 3))
+        peak = (image > threshold) & is_peak(image)
         rows, cols = np.nonzero(peak)
         values = image[rows, cols]
         keep = np.ones(values.size, dtype=bool)

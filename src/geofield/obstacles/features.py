@@ -21,11 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.obstacles.channels import Channels, Variant, gaussian, sample_gaussian
+from geofield.obstacles.channels import Channels, Variant, gaussian, sample_gaussians, shrink
 from geofield.obstacles.evidence import Support
 
 SIGMAS_PX = (0.8, 1.5, 2.5, 4.0, 7.0, 12.0)
 RAW_SIGMAS_PX = (0.8, 2.5, 7.0)
+_FINE = ("luma", "ndvi", "nir", "exg")
 RINGS_PX = (1.5, 3.0, 4.5, 6.0, 8.0, 10.5, 14.0, 19.0)
 DIRECTIONS = 16
 _CROWN_FALL = {"ndvi": 14.0, "exg": 5.0, "luma": 13.0}
@@ -69,6 +70,7 @@ class FeatureTable:
 def centre_features(
     found: Channels,
     support: Support,
+    dark_support: Support | None,
     x_px: NDArray[np.float64],
     y_px: NDArray[np.float64],
 ) -> FeatureTable:
@@ -79,6 +81,8 @@ def centre_features(
     found : Channels
     support : Support
         Of ``found.evidence``.
+    dark_support : Support or None
+        Of ``found.dark``, where it is not the evidence itself.
     x_px, y_px : float64 arrays, shape (n,)
         Candidate centres, pixel-index coordinates of the working grid.
     """
@@ -90,8 +94,10 @@ def centre_features(
         maps["green"] = found.green
     for name, image in maps.items():
         before: NDArray[np.float32] | None = None
-        for sigma in SIGMAS_PX:
-            value = sample_gaussian(image, sigma, rows, cols)
+        # The finest width costs most and tells least where the map is noisy.
+        sigmas = SIGMAS_PX if name in _FINE else SIGMAS_PX[1:]
+        values = sample_gaussians(image, sigmas, rows, cols)
+        for sigma, value in zip(sigmas, values, strict=True):
             if sigma in RAW_SIGMAS_PX:
                 columns[f"{name}@{sigma:g}"] = value
             if before is not None:
@@ -99,6 +105,10 @@ def centre_features(
             before = value
     _crown_mask(columns, found, rows, cols)
     _support(columns, support, x_px, y_px)
+    if dark_support is not None:
+        votes = dark_support.at(x_px, y_px)
+        columns["dark_support_best"] = votes.max(axis=1)
+        columns["dark_support_radius"] = dark_support.radii_px[votes.argmax(axis=1)]
     return _table(columns, x_px.size)
 
 
@@ -135,15 +145,17 @@ def _crown_mask(
     cols: NDArray[np.intp],
 ) -> None:
     """Shape of what is green (or dark) around the centre."""
-    image = gaussian(found.evidence, 1.0)
+    # Half the resolution: depths and areas need no finer one.
+    image = gaussian(shrink(found.evidence, 2), 0.6)
+    rows, cols = rows // 2, cols // 2
     for level in (0.5, 1.5):
         mask = image > level
-        depth = ndimage.distance_transform_edt(mask).astype(np.float32)
-        top = ndimage.maximum_filter(depth, 9)
+        depth = 2 * ndimage.distance_transform_edt(mask).astype(np.float32)
+        top = ndimage.maximum_filter(depth, 5)
         columns[f"crown_depth_{level:g}"] = depth[rows, cols]
         columns[f"crown_depth_share_{level:g}"] = depth[rows, cols] / np.maximum(top[rows, cols], 1)
         labels, count = ndimage.label(mask)
-        area = np.bincount(labels.ravel(), minlength=count + 1).astype(np.float32)
+        area = 4 * np.bincount(labels.ravel(), minlength=count + 1).astype(np.float32)
         area[0] = 0
         columns[f"crown_area_{level:g}"] = np.log1p(area[labels[rows, cols]])
 

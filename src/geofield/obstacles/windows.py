@@ -10,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon, box
 
+from geofield.grid import Grid
+from geofield.model.field import Field
 from geofield.model.scene import Scene
 from geofield.obstacles.auto import (
     Trees,
@@ -22,6 +26,8 @@ from geofield.obstacles.auto import (
     picture_channels,
 )
 from geofield.obstacles.channels import Variant
+from geofield.obstacles.checks import disc_means, inside
+from geofield.obstacles.circles import Circles
 from geofield.obstacles.verifier import FloatArray, Verifier, strongest
 from geofield.obstacles.working import working_picture
 
@@ -31,6 +37,8 @@ CORE_PX = 1024
 OVERLAP_PX = 128
 """More than twice the window of the background median and its deviation."""
 _ALIGN_PX = 16
+_OVERVIEW_PX = 1024
+Polarity = Literal["dark", "bright", "both"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +59,71 @@ def variant_of(scene: Scene) -> Variant:
     return "nir" if scene.nir is not None else "rgb"
 
 
-def windows_over(
-    region: NDArray[np.bool_], factor: float, core_px: int = CORE_PX, overlap_px: int = OVERLAP_PX
-) -> Iterator[Window]:
-    """Yield windows that cover the region, aligned to the working grid of the whole scene.
+@runtime_checkable
+class PictureReader(Protocol):
+    """A picture that is read window by window, for instance `geofield.imagery.SceneReader`."""
 
-    Windows without any pixel of the region are left out.
+    @property
+    def grid(self) -> Grid:
+        """Of the whole picture."""
+
+    def read(
+        self,
+        window: tuple[int, int, int, int] | None = None,
+        *,
+        shape_px: tuple[int, int] | None = None,
+        scaling: tuple[float, float] | None = None,
+    ) -> Scene:
+        """Read a window (column, row, width, height)."""
+
+
+Picture = Scene | PictureReader
+
+
+def overview(picture: Picture) -> Scene:
+    """Return a small version of a picture: its bands and, for a reader, its scaling."""
+    if isinstance(picture, Scene):
+        return picture
+    rows, cols = picture.grid.shape
+    step = max(rows, cols) / min(max(rows, cols), _OVERVIEW_PX)
+    return picture.read(shape_px=(max(int(rows / step), 1), max(int(cols / step), 1)))
+
+
+def part_of(
+    picture: Picture, window: tuple[int, int, int, int], scaling: tuple[float, float] | None
+) -> Scene:
+    """Return a window (column, row, width, height) of a picture."""
+    if isinstance(picture, Scene):
+        return picture.crop(*window)
+    return picture.read(window, scaling=scaling)
+
+
+def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
+    """Return the pixels (rows, cols) on which an obstacle's centre may lie."""
+    if field is None:
+        return scene.valid
+    return field.mask(scene.grid, holes=False) & scene.valid
+
+
+def windows_over(
+    grid: Grid,
+    field: Field | None,
+    factor: float,
+    core_px: int = CORE_PX,
+    overlap_px: int = OVERLAP_PX,
+) -> Iterator[Window]:
+    """Yield windows that cover the field, or the picture, aligned to the working grid.
+
+    Windows that the field does not reach are left out.
     """
-    rows, cols = region.shape
+    rows, cols = grid.shape
     step = core_px * factor
-    # A whole number of scene pixels and of working blocks, where the factor allows it.
+    outline = None if field is None else Polygon(field.polygon_px(grid).exterior)
     for j in range(max(int(np.ceil(rows / step)), 1)):
         for i in range(max(int(np.ceil(cols / step)), 1)):
             x0, x1 = i * step, min((i + 1) * step, cols)
             y0, y1 = j * step, min((j + 1) * step, rows)
-            if not region[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))].any():
+            if outline is not None and not outline.intersects(box(x0, y0, x1, y1)):
                 continue
             c0 = _aligned(x0 / factor - overlap_px, factor)
             r0 = _aligned(y0 / factor - overlap_px, factor)
@@ -81,26 +139,32 @@ def _aligned(start_px: float, factor: float) -> int:
 
 
 def detect_trees(
-    scene: Scene,
-    region: NDArray[np.bool_],
+    picture: Picture,
+    field: Field | None,
     verifier: Verifier,
     *,
     factor: float,
     min_confidence: float,
+    polarity: Polarity = "both",
+    scaling: tuple[float, float] | None = None,
     core_px: int = CORE_PX,
     progress: Progress | None = None,
 ) -> Trees:
-    """Find the trees of a scene window by window.
+    """Find the trees of a picture window by window.
 
     Parameters
     ----------
-    scene : Scene
-    region : bool array (rows, cols)
-        Where a centre may lie.
+    picture : Scene or PictureReader
+    field : Field or None
+        Only centres inside its outer ring count.
     verifier : Verifier
     factor : float
         Scene pixels per working pixel.
     min_confidence : float
+    polarity : {"dark", "bright", "both"}
+        Against the ring around each crown.
+    scaling : (float, float), optional
+        Of a reader's values.
     core_px : int
         Side of a window without overlap, working pixels.
     progress : callable, optional
@@ -111,26 +175,14 @@ def detect_trees(
         Positions and radii in pixel-index coordinates of the scene.
     """
     parts: list[FloatArray] = []
-    todo = list(windows_over(region, factor, core_px))
+    todo = list(windows_over(picture.grid, field, factor, core_px))
     for done, window in enumerate(todo):
-        part = scene.crop(window.col, window.row, window.width, window.height)
-        rows = slice(window.row, window.row + window.height)
-        cols = slice(window.col, window.col + window.width)
-        picture = working_picture(part, region[rows, cols], factor)
-        found = picture_channels(picture.luma, picture.rgb, picture.nir)
-        trees = decide(measure(found, verifier, picture.region), verifier, min_confidence)
-        x = picture.to_scene_px(trees.x_px) + window.col
-        y = picture.to_scene_px(trees.y_px) + window.row
-        x0, y0, x1, y1 = window.core
-        own = (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
-        columns = (
-            x - 0.5,
-            y - 0.5,
-            trees.radius_px * factor,
-            trees.confidence,
-            trees.reach_px * factor,
-        )
-        parts.append(np.column_stack(columns)[own])
+        part = part_of(picture, (window.col, window.row, window.width, window.height), scaling)
+        region = search_region(part, field)
+        if region.any():
+            parts.append(
+                _in_window(part, region, window, verifier, factor, min_confidence, polarity)
+            )
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
     table = np.concatenate(parts) if parts else np.empty((0, 5))
@@ -138,3 +190,33 @@ def detect_trees(
     # Two windows may see one tree on different sides of their common border.
     keep = strongest(x, y, confidence, 0.5 * reach)
     return Trees(x[keep], y[keep], radius[keep], confidence[keep], reach[keep])
+
+
+def _in_window(
+    part: Scene,
+    region: NDArray[np.bool_],
+    window: Window,
+    verifier: Verifier,
+    factor: float,
+    min_confidence: float,
+    polarity: Polarity,
+) -> FloatArray:
+    """Return the trees of a window's core: x, y, radius, confidence, reach."""
+    picture = working_picture(part, region, factor)
+    found = picture_channels(picture.luma, picture.rgb, picture.nir)
+    trees = decide(measure(found, verifier, picture.region), verifier, min_confidence)
+    x, y = picture.to_scene_px(trees.x_px), picture.to_scene_px(trees.y_px)
+    keep = np.ones(len(trees), dtype=bool)
+    if polarity != "both":
+        discs = Circles(trees.x_px, trees.y_px, trees.radius_px, trees.confidence)
+        wide = Circles(trees.x_px, trees.y_px, 1.6 * trees.radius_px, trees.confidence)
+        bright = disc_means(picture.luma, discs) > disc_means(picture.luma, wide)
+        keep &= bright == (polarity == "bright")
+    # The fit moves centres a little: they must still lie in the field.
+    centres = Circles(x - 0.5, y - 0.5, trees.radius_px, trees.confidence)
+    keep &= inside(centres, region)
+    x, y = x + window.col, y + window.row
+    x0, y0, x1, y1 = window.core
+    keep &= (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
+    size = (trees.radius_px * factor, trees.confidence, trees.reach_px * factor)
+    return np.column_stack((x - 0.5, y - 0.5, *size))[keep]

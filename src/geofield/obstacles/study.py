@@ -1,0 +1,188 @@
+"""The study's detectors on a scene: its strategies, its three presets, its grey check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from geofield.errors import ObstacleError
+from geofield.model.scene import Scene
+from geofield.obstacles.accumulator import otsu_threshold
+from geofield.obstacles.checks import (
+    GREY_LIMIT,
+    dark_enough,
+    first_of_duplicates,
+    inside,
+    relative_grey_limit,
+)
+from geofield.obstacles.circles import Circles
+from geofield.obstacles.edges import EdgeMethod
+from geofield.obstacles.phase_code import CircleMethod, find_circles
+from geofield.obstacles.strategies import (
+    EdgeCircles,
+    Progress,
+    StrategyResult,
+    StudyStrategy,
+    ThresholdRange,
+    run_strategy,
+)
+
+GreyCheck = Literal["none", "absolute", "relative"]
+StudyDetector = StudyStrategy | Literal["study_text", "study_listing", "study_dlc"]
+
+STUDY_RADIUS_PX = (4.0, 18.0)
+STUDY_SMOOTHED_RADIUS_PX = (4.0, 16.0)
+STUDY_EDGE_THRESHOLD = 0.27
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """What can be varied; see :func:`geofield.obstacles.detect_obstacles`."""
+
+    edge_method: EdgeMethod | None = None
+    threshold: float | None = None
+    threshold_range: ThresholdRange | None = None
+    circle_method: CircleMethod = "phase_code"
+    sensitivity: float = 0.85
+    grey_check: GreyCheck | float | None = None
+    min_share: float = 0.1
+
+
+def detect_by_study(
+    scene: Scene,
+    region: NDArray[np.bool_],
+    strategy: StudyDetector,
+    radius_px: tuple[float, float],
+    options: StudyOptions,
+    progress: Progress | None = None,
+) -> tuple[Circles, NDArray[np.float64] | None, dict[str, Any]]:
+    """Run one of the study's detectors.
+
+    Returns
+    -------
+    circles : Circles
+        Pixel-index coordinates of the scene.
+    share : float64 array or None
+        ``consensus``: the share of the settings that saw each circle.
+    detection : dict
+        The winning setting, the counts per threshold, the grey limit.
+    """
+    grey = filled(scene.grey, scene.valid)
+    if strategy == "study_listing":
+        result = _listing(grey, region, options)
+    elif strategy == "study_text":
+        result = _text(grey, region, options)
+    else:
+        result = _scan(grey, region, strategy, radius_px, options, progress)
+    circles, share = result.circles, result.share
+    detection: dict[str, Any] = {
+        "method": result.method or options.circle_method,
+        "threshold": result.threshold,
+        "counts": {name: [list(row) for row in rows] for name, rows in result.counts.items()},
+    }
+    if options.grey_check is not None and options.grey_check != "none":
+        limit = _grey_limit(options.grey_check, grey, region)
+        dark = dark_enough(grey, circles, limit, scene.valid)
+        circles = circles.take(dark)
+        share = None if share is None else share[dark]
+        detection["grey_limit"] = limit
+    return circles, share, detection
+
+
+def filled(grey: NDArray[np.floating], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return a picture whose missing pixels repeat the nearest one, so that they add no edge."""
+    picture: NDArray[np.float64] = grey.astype(np.float64)
+    if valid.all() or not valid.any():
+        return picture
+    nearest = ndimage.distance_transform_edt(~valid, return_distances=False, return_indices=True)
+    return cast("NDArray[np.float64]", picture[tuple(nearest)])
+
+
+def _listing(
+    grey: NDArray[np.float64], region: NDArray[np.bool_], options: StudyOptions
+) -> StrategyResult:
+    """The study's first listing: dark circles on the grey picture."""
+    circles = find_circles(
+        grey / 255,
+        STUDY_RADIUS_PX,
+        polarity="dark",
+        sensitivity=options.sensitivity,
+        method=options.circle_method,
+        warn=False,
+    )
+    return _checked(circles, region)
+
+
+def _text(
+    grey: NDArray[np.float64], region: NDArray[np.bool_], options: StudyOptions
+) -> StrategyResult:
+    """The study's text: bright circles on the inverted binary field."""
+    smooth = ndimage.median_filter(grey, 3)
+    values = smooth[region]
+    level = 255 * otsu_threshold(values / 255)
+    circles = find_circles(
+        smooth <= level,
+        STUDY_RADIUS_PX,
+        polarity="bright",
+        sensitivity=options.sensitivity,
+        edge_threshold=STUDY_EDGE_THRESHOLD,
+        method=options.circle_method,
+        warn=False,
+    )
+    return _checked(circles, region)
+
+
+def _checked(circles: Circles, region: NDArray[np.bool_]) -> StrategyResult:
+    circles = circles.take(inside(circles, region))
+    return StrategyResult(circles.take(first_of_duplicates(circles)), None, None)
+
+
+def _scan(
+    grey: NDArray[np.float64],
+    region: NDArray[np.bool_],
+    strategy: StudyDetector,
+    radius_px: tuple[float, float],
+    options: StudyOptions,
+    progress: Progress | None,
+) -> StrategyResult:
+    """One of the strategies on edge maps, or the study's DLC listing with its second pass."""
+    preset = strategy == "study_dlc"
+    how = EdgeCircles(
+        STUDY_RADIUS_PX if preset else radius_px,
+        sensitivity=options.sensitivity,
+        method=options.circle_method,
+        smoothed_radius_px=STUDY_SMOOTHED_RADIUS_PX if preset else None,
+    )
+    ranges: dict[EdgeMethod, ThresholdRange] | None = None
+    if options.threshold_range is not None:
+        span = options.threshold_range
+        ranges = {"sobel": span, "prewitt": span, "roberts": span, "canny": span}
+    return run_strategy(
+        grey / 255,
+        region,
+        "dlc" if preset else cast("StudyStrategy", strategy),
+        how,
+        methods=None if options.edge_method is None else (options.edge_method,),
+        threshold=options.threshold,
+        ranges=ranges,
+        min_share=options.min_share,
+        progress=progress,
+    )
+
+
+def _grey_limit(
+    check: GreyCheck | float, grey: NDArray[np.float64], region: NDArray[np.bool_]
+) -> float:
+    if check == "absolute":
+        return GREY_LIMIT
+    if check == "relative":
+        return relative_grey_limit(grey, region)
+    if isinstance(check, int | float):
+        return float(check)
+    raise ObstacleError(
+        f"Unknown grey check {check!r}.", hint="Choose absolute, relative or a grey level."
+    )
