@@ -93,7 +93,8 @@ def detect_obstacles(
     sensitivity : float
         Of the circle search, 0..1.
     grey_check : {"none", "absolute", "relative"} or float, optional
-        Drop discs brighter than 127.37, than the field's mean, or than a grey level.
+        The study's strategies: drop discs brighter than 127.37, than the field's mean, or
+        than a grey level.
     min_share : float
         ``consensus``: the share of the settings that must see a circle.
     progress : callable, optional
