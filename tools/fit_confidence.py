@@ -39,7 +39,7 @@ SEED = 7
 HIT_PX = 10.0
 NEAR_PX = 3.5
 GATE_LOSS = 0.01
-SPACING_SHARE, SPACING_PX = 0.7, (6.0, 14.0)
+SPACING_SHARE, SPACING_PX = 0.8, (6.0, 14.0)
 SCORE = {
     "objective": "cross_entropy",
     "learning_rate": 0.08,
