@@ -114,7 +114,7 @@ class FieldSettings(Section):
         json_schema_extra={"option": "--min-hole"},
     )
     tolerance_px: NonNegative = Field(
-        1.5,
+        3.0,
         description="How far the straightened outline may leave the pixels; 0 keeps them all.",
     )
     smooth: Literal["none", "diffusion"] = Field(

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import FieldError
-from geofield.field.choice import Candidate, candidates, certainty, scores
+from geofield.field.choice import SMALLEST_SHARE, Candidate, candidates, certainty, scores
 from geofield.field.evidence import channels, gradient, whiten
-from geofield.field.hierarchy import merge
+from geofield.field.hierarchy import MergeTree, merge
 from geofield.field.refine import enlarge, snap
 from geofield.field.segmentation import Segmentation
 from geofield.field.superpixels import borders, superpixels
@@ -20,6 +20,8 @@ from geofield.model import Scene
 _COARSE_PX = 400
 #: Side of a superpixel's cell, pixels.
 _STEP_PX = 5
+#: How far from the seed open ground is looked for, pixels.
+_STRAY_PX = 20
 #: A border weaker than this, in units of what the field has inside, is none.
 _WEAK = 1.6
 
@@ -45,16 +47,44 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
         raise FieldError("The picture is too small to find a field in.")
     pairs = lines.pairs(count)
     sizes = np.bincount(labels.ravel(), minlength=count).astype(float)
-    found = candidates(labels, merge(sizes, *pairs), lines, pairs, seed)
+    tree = merge(sizes, *pairs)
+    footing = _footing(labels, tree, seed)
+    found = candidates(labels, tree, lines, pairs, footing)
     if not found:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     score = scores(found)
     best = int(np.argmax(score))
     chosen = found[best]
-    mask = _finer(scene, chosen, stack, factor, seed)
+    mask = _finer(scene, chosen, stack, factor, footing)
     notes, figures = _evidence(chosen, certainty(found, score, best))
+    if footing != seed:
+        notes = ("the point lies on something small (a tree, a hut, a track?)", *notes)
     return Segmentation(mask & scene.valid, notes, figures)
+
+
+def _footing(
+    labels: NDArray[np.int32], tree: MergeTree, seed: tuple[float, float]
+) -> tuple[float, float]:
+    """The seed, or the nearest place on open ground where it is on a crown or the like."""
+    x, y = int(seed[0]), int(seed[1])
+    smallest = max(200.0, SMALLEST_SHARE * labels.size)
+    if not tree.is_speck(int(labels[y, x]), smallest):
+        return seed
+    top, left = max(y - _STRAY_PX, 0), max(x - _STRAY_PX, 0)
+    near = labels[top : y + _STRAY_PX + 1, left : x + _STRAY_PX + 1]
+    row, column = np.indices(near.shape)
+    distance = np.hypot(row + top - y, column + left - x).ravel()
+    order = np.argsort(distance, kind="stable")
+    specks: dict[int, bool] = {}
+    for place in order:
+        leaf = int(near.ravel()[place])
+        if leaf not in specks:
+            specks[leaf] = tree.is_speck(leaf, smallest)
+        if not specks[leaf]:
+            down, right = divmod(int(place), near.shape[1])
+            return (left + right + 0.5, top + down + 0.5)
+    return seed
 
 
 def _finer(

@@ -24,7 +24,7 @@ from geofield.field.superpixels import Borders
 BoolArray = NDArray[np.bool_]
 
 #: Regions below this share of the picture are patches of ground, not fields.
-_SMALLEST_SHARE = 0.006
+SMALLEST_SHARE = 0.006
 #: A part below this share of the region joins it without being asked.
 _TRIFLE_SHARE = 0.03
 #: Openings and notches narrower than twice this are no part of an outline, pixels.
@@ -72,7 +72,7 @@ def candidates(
         other = parts[1] if parts[0] == region else parts[0]
         size, joins = tree.size_px[region], tree.size_px[other]
         share = size / labels.size
-        if size < 200 or share < _SMALLEST_SHARE or (joins < _TRIFLE_SHARE * size and share < 0.9):
+        if size < 200 or share < SMALLEST_SHARE or (joins < _TRIFLE_SHARE * size and share < 0.9):
             continue
         member = np.zeros(count, bool)
         member[tree.leaves(region)] = True

@@ -36,11 +36,11 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
     the vegetation index, each spread over about the range of brightness.
     """
     valid = scene.valid
-    red, green, blue = (
-        (block_mean(scene.rgb[..., i], factor) for i in range(3 if scene.is_colour else 1))
-        if scene.is_colour
-        else (block_mean(scene.grey, factor),) * 3
-    )
+    if scene.is_colour:
+        bands = (scene.bands[scene.roles.index(role)] for role in ("red", "green", "blue"))
+        red, green, blue = (block_mean(band, factor) for band in bands)
+    else:
+        red = green = blue = block_mean(scene.grey, factor)
     layers = [0.298 * red + 0.587 * green + 0.114 * blue]
     if scene.is_colour:
         layers += [red - green, 0.5 * (red + green) - blue]

@@ -33,7 +33,7 @@ def extract_field(
     regions: Sequence[int] = (),
     holes: Holes | None = None,
     min_hole_m2: float = 20.0,
-    tolerance_px: float = 1.5,
+    tolerance_px: float = 3.0,
     smooth: Smoothing = "none",
     name: str = "",
 ) -> Field:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 #: Regions below this size merge as if their border were weaker: specks are no parts.
 _SPECK_PX = 150.0
+#: Border strength around what stands out of a surface; inside surfaces it is 2 to 4.
+_STANDS_OUT = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,24 @@ class MergeTree:
         while self.parent[found[-1]] != -1:
             found.append(self.parent[found[-1]])
         return found
+
+    def is_speck(self, leaf: int, smallest_px: float) -> bool:
+        """Whether a superpixel belongs to something small that stands out of a large surface.
+
+        A crown, a hut: its region joins a far larger one across a border much stronger than
+        any that it has inside.
+        """
+        region = leaf
+        while self.size_px[region] < smallest_px and self.parent[region] != -1:
+            up = self.parent[region]
+            one, two = self.parts[up] or (region, region)
+            other = two if one == region else one
+            if self.size_px[other] >= 4 * self.size_px[region] and self.height[up] > max(
+                _STANDS_OUT, 2.5 * self.height[region]
+            ):
+                return True
+            region = up
+        return False
 
     def leaves(self, region: int) -> NDArray[np.int64]:
         """The superpixels of a region."""

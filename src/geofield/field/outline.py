@@ -28,6 +28,8 @@ _PARALLEL_SINE = 0.12
 _CORNER_REACH = 2.5
 #: Pieces of fewer steps than this, in tolerances, say nothing about a direction.
 _SHORT = 4.5
+#: Steps from which a piece is long enough to tell its outliers.
+_ROBUST_FROM = 16
 
 
 def mask_polygon(mask: BoolArray) -> Polygon:
@@ -53,7 +55,7 @@ def mask_polygon(mask: BoolArray) -> Polygon:
     return cast(Polygon, polygon)
 
 
-def straight_outline(mask: BoolArray, *, tolerance_px: float = 1.5) -> Polygon:
+def straight_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
     """A mask's outline in pixel coordinates, straightened.
 
     Parameters
@@ -171,16 +173,32 @@ _Line = tuple[FloatArray, FloatArray]
 
 
 def _fit(points: FloatArray) -> _Line:
-    """Total least squares line: a point on it and its direction."""
+    """Total least squares line, robust: a point on it and its direction.
+
+    A crown or a bay beside a straight border pulls no line: points farther from it than
+    usual are left out, twice.
+    """
     if len(points) > 8:
         points = points[2:-2]  # the ends belong half to the neighbours
     elif len(points) > 4:
         points = points[1:-1]
+    centre, direction = _least_squares(points)
+    for _ in range(3 if len(points) >= _ROBUST_FROM else 0):
+        offset = np.abs((points - centre) @ np.array([-direction[1], direction[0]]))
+        near = offset <= max(0.75, 1.5 * float(np.median(offset)))
+        if near.sum() < len(points) // 2:
+            break
+        centre, direction = _least_squares(points[near])
+    return centre, direction
+
+
+def _least_squares(points: FloatArray) -> _Line:
     centre = points.mean(axis=0)
     if len(points) < 3:
         direction = points[-1] - points[0]
     else:
-        direction = np.linalg.svd(points - centre, full_matrices=False)[2][0]
+        spread = points - centre
+        direction = np.linalg.eigh(spread.T @ spread)[1][:, -1]
     return centre, direction / max(float(np.hypot(*direction)), 1e-12)
 
 

@@ -7,6 +7,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.plausible import doubts
 from geofield.field.segmentation import Segmentation
 from geofield.model import FieldQuality, Scene
 
@@ -38,11 +39,14 @@ def judge(
         The point, pixel coordinates.
     """
     area_m2 = outline_px.area * scene.grid.ground_resolution_m**2
+    strange, look = doubts(scene, mask)
     touching = edge_share(outline_px, mask.shape[1], mask.shape[0])
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
     score = min(1.0, 0.3 + measured.get("certainty", 1.0)) - 0.25 * len(reasons)
+    reasons.extend(strange)
+    score -= 0.55 * len(strange)
     if touching > 0.02:
         reasons.append(
             f"it touches the picture's edge along {touching:.0%} of its length, so the field "
@@ -63,6 +67,7 @@ def judge(
         ("edge_share", touching),
         ("covered_share", covered),
         ("area_m2", area_m2),
+        *look,
         *found.figures,
     )
     return FieldQuality(score, tuple(reasons), figures, trusted=score >= 0.5)

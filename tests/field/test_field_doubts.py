@@ -1,0 +1,116 @@
+"""Bad input: a clear message or a flagged result, never a silent wrong polygon."""
+
+import warnings
+
+import numpy as np
+import pytest
+from affine import Affine
+
+from geofield.errors import FieldWarning, GeofieldError
+from geofield.field import extract_field
+from geofield.grid import Grid
+from geofield.model import Scene
+from geofield.simulate import SimulationSettings, simulate_field
+
+ROLES = ("red", "green", "blue", "nir")
+
+
+def scene_of(bands, valid=None):
+    rows, columns = bands.shape[1:]
+    grid = Grid(columns, rows, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), "EPSG:32633")
+    valid = np.ones((rows, columns), bool) if valid is None else valid
+    return Scene(grid, np.clip(bands, 0, 255).astype(np.uint8), ROLES, valid)
+
+
+def judged(scene, x, y, method="auto"):
+    lon, lat = scene.grid.to_lonlat(x, y)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FieldWarning)
+        try:
+            field = extract_field(scene, lat=lat, lon=lon, method=method)
+        except GeofieldError:
+            return None
+    assert field.polygon.is_valid
+    return field
+
+
+def flat(colour, shape=(200, 200), noise=3.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.array(colour, float)[:, None, None] + rng.normal(0, noise, (4, *shape))
+
+
+def test_one_surface_that_fills_the_picture():
+    field = judged(scene_of(flat([120, 130, 80, 150])), 100, 100)
+    assert field is None or not field.quality.trusted
+
+
+def test_a_wood():
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(2)
+    crowns = gaussian_filter(rng.normal(size=(200, 200)), 2.5)
+    bands = flat([60, 80, 50, 120]) + 28 * crowns / crowns.std()
+    field = judged(scene_of(bands), 100, 100)
+    assert field is None or not field.quality.trusted
+
+
+def test_a_lake():
+    bands = flat([110, 125, 70, 160])
+    bands[:, 40:160, 40:170] = flat([40, 60, 70, 15], (120, 130), seed=1)
+    field = judged(scene_of(bands), 100, 100)
+    assert field is not None
+    assert not field.quality.trusted
+    assert any("water" in reason for reason in field.quality.reasons)
+
+
+def test_a_road():
+    bands = flat([110, 125, 70, 160])
+    bands[:, 95:105] = flat([150, 148, 145, 120], (10, 200), seed=1)
+    field = judged(scene_of(bands), 100, 100)
+    assert field is None or not field.quality.trusted or field.area_ha > 0.5
+
+
+@pytest.mark.parametrize("position", [(0.2, 100), (199.9, 0.1), (100, 199.5)])
+def test_the_pictures_edge(position):
+    bands = flat([110, 125, 70, 160])
+    bands[:, :, 120:] = flat([150, 130, 100, 140], (200, 80), seed=1)
+    field = judged(scene_of(bands), *position)
+    assert field is not None
+    assert any("edge" in reason for reason in field.quality.reasons)
+
+
+def test_no_data_ends_a_field():
+    bands = flat([110, 125, 70, 160])
+    valid = np.ones((200, 200), bool)
+    valid[:, 150:] = False
+    field = judged(scene_of(bands, valid), 60, 100)
+    assert field is not None
+    assert field.polygon_px(scene_of(bands).grid).bounds[2] <= 152
+    assert judged(scene_of(bands, valid), 180, 100) is None
+
+
+def test_a_seed_on_a_crown_finds_the_field_and_says_so():
+    truth = simulate_field(700_021, SimulationSettings(width_px=400, height_px=400))
+    crown = truth.obstacles.sort_values("radius_m").iloc[-1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FieldWarning)
+        field = extract_field(truth.scene, lat=crown["lat"], lon=crown["lon"])
+    true = truth.field.polygon
+    assert field.polygon.intersection(true).area / field.polygon.union(true).area > 0.9
+    assert any("small" in reason for reason in field.quality.reasons)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 50), (20, 20)])
+def test_tiny_pictures_do_not_crash(shape):
+    field = judged(scene_of(flat([110, 125, 70, 160], shape)), shape[1] / 2, shape[0] / 2)
+    assert field is None or not field.quality.trusted
+
+
+def test_grey_pictures_work():
+    grey = np.full((200, 200), 90.0) + np.random.default_rng(0).normal(0, 3, (200, 200))
+    grey[40:160, 50:170] += 60
+    grid = Grid(200, 200, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), "EPSG:32633")
+    scene = Scene(grid, grey.astype(np.uint8)[None], ("grey",), np.ones((200, 200), bool))
+    field = judged(scene, 100, 100)
+    assert field is not None
+    assert field.polygon_px(grid).area == pytest.approx(120 * 120, rel=0.02)
