@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import geopandas as gpd
@@ -168,14 +167,10 @@ def assert_same(mine: list[np.ndarray], theirs: list[np.ndarray], ends_m: float 
             assert np.abs(a - b).max() <= ends_m, f"track {track}: {a} against {b}"
 
 
-@pytest.fixture(scope="module")
-def parcels() -> gpd.GeoDataFrame:
+@pytest.fixture
+def parcels(shared: Path) -> gpd.GeoDataFrame:
     """Real parcels with real holes, from beside the project."""
-    beside = Path(__file__).resolve().parents[2].parent / "shared" / "data"
-    path = Path(os.environ.get("GEOFIELD_SHARED", beside)) / "fields" / "fields.gpkg"
-    if not path.exists():
-        pytest.skip(f"the real parcels are not at {path}")
-    return gpd.read_file(path)
+    return gpd.read_file(shared / "data" / "fields" / "fields.gpkg")
 
 
 @settings(max_examples=150, deadline=None)

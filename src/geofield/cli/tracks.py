@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @click.command(
     epilog="""\b
-Examples (the first on the project's own sample):
-  geofield tracks out/field.gpkg --spacing 6 -o wider.gpkg
+Examples (the first two on the project's own sample):
+  geofield tracks sample_data/field_1.gpkg --spacing 4 -o tracks.gpkg
+  geofield tracks sample_data/field_1.gpkg --direction 45 --headland 8 --route shortest \\
+      --turning-radius 4 -o route.gpkg
   geofield tracks parcels.shp --obstacles trees.shp --clearance 1 --spacing 3 -o plans/
-  geofield tracks parcel.geojson --direction 45 --headland 12 --route shortest \\
-      --turning-radius 6 -o plan.gpkg
 """
 )
 @click.argument("file", metavar="FILE", type=click.Path(exists=True, path_type=Path))
