@@ -201,6 +201,17 @@ def test_a_second_window_takes_the_first_ones_scaling(tmp_path: Path) -> None:
     assert np.array_equal(large.bands[:, 40:56, 40:56], small.bands)
 
 
+def test_a_given_scaling_is_applied_to_bytes_too(tmp_path: Path) -> None:
+    path = write(tmp_path / "x.tif", ground(), photometric="RGB")
+    scene = read_scene(path, scaling=(0, 127.5))
+    assert np.array_equal(scene.bands, np.clip(ground().astype(int) * 2, 0, 255))
+    # What it says of itself is not applied a second time when it is read again.
+    again = read_scene(write_scene(scene, tmp_path / "y.tif"))
+    assert again.scaling == (0, 127.5)
+    assert np.array_equal(again.bands, scene.bands)
+    assert np.array_equal(read_scene(tmp_path / "y.tif", scaling=(0, 127.5)).bands, scene.bands)
+
+
 def test_float_with_nan_and_infinity(tmp_path: Path) -> None:
     values = ground().astype(np.float32) / 255
     values[:, 10:14, 10:20] = np.nan

@@ -717,6 +717,7 @@ def test_jpeg_and_webp_tiles(tmp_path: Path) -> None:
         assert np.abs(read_scene(done.path).bands.astype(int) - 99).max() <= 2
 
 
+@pytest.mark.real
 def test_real_chips_as_a_folder(shared: Path, tmp_path: Path) -> None:
     # Different UTM zones and years in one folder: the chip that holds the point is shown.
     for name in ("riverside_2018_89", "chico_2018_77", "claremont_2020_75"):

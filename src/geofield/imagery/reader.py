@@ -16,28 +16,26 @@ from typing import Any
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
-from pyproj import CRS
-from rasterio.enums import ColorInterp, MaskFlags, Resampling
+from rasterio.enums import MaskFlags, Resampling
 from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
 from geofield.crs import parse_crs
-from geofield.errors import CRSError, ImageryError, PointOutsideError
+from geofield.errors import ImageryError, PointOutsideError
 from geofield.grid import Grid
-from geofield.imagery.bands import BandRoles, find_roles, looks_like_mask
+from geofield.imagery.bands import BandRoles
+from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of
 from geofield.imagery.gdal import (
     display_name,
     gdal_env,
     open_picture,
     reading,
-    to_pyproj,
     to_rasterio,
 )
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.scaling import scale_limits, to_uint8
 from geofield.imagery.tags import (
     notes_from_tags,
-    roles_from_tags,
     scaling_from_tags,
     source_from_tags,
 )
@@ -45,7 +43,6 @@ from geofield.model.scene import ImagerySource, Scene, outside_message
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
-_SAMPLE_PX = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +76,8 @@ class SceneReader:
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
     has_mask: bool = False
+    # The scaling that made the file's own bytes.
+    scaled_before: tuple[float, float] | None = None
     # Set where the file is read through a warp: its own CRS, control points or transform.
     warped_from: WarpOrigin | None = None
 
@@ -137,9 +136,9 @@ class SceneReader:
                     hint="Give an optical picture.",
                 )
             with reading(path):
-                palette = _palette(dataset)
-                roles = _roles(dataset, bands) if not palette else BandRoles(("red",))
-            own_crs = parse_crs(crs) if crs is not None else _crs_of(dataset, path)
+                palette = palette_of(dataset)
+                roles = roles_of(dataset, bands) if not palette else BandRoles(("red",))
+            own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
             flags = dataset.mask_flag_enums[0]
             reader = cls(
                 path=path,
@@ -153,8 +152,8 @@ class SceneReader:
                 palette=palette,
                 has_mask=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
             )
-            if reader.dtype == "uint8" and scaling is None:
-                reader = replace(reader, scaling=scaling_from_tags(dataset.tags()))
+            if reader.dtype == "uint8":
+                reader = replace(reader, scaled_before=scaling_from_tags(dataset.tags()))
             point = None if lat is None or lon is None else (lon, lat)
             place = find_place(dataset, own_crs, point=point)
             return replace(
@@ -279,9 +278,9 @@ class SceneReader:
         valid: NDArray[np.bool_],
         scaling: tuple[float, float] | None,
     ) -> tuple[NDArray[np.uint8], tuple[float, float] | None, tuple[str, ...]]:
-        if values.dtype == np.uint8:
-            # A scaling here is what an earlier reading did to the pixels: kept, not repeated.
-            return values, scaling, ()
+        if values.dtype == np.uint8 and scaling in (None, self.scaled_before):
+            # What an earlier reading did to the pixels is kept, not repeated.
+            return values, self.scaled_before, ()
         colour = [i for i, role in enumerate(roles) if role != "nir"]
         limits = scaling or scale_limits(values[colour or [0]], valid)
         scaled = to_uint8(values, limits)
@@ -318,7 +317,7 @@ class SceneReader:
                 valid &= raster.read(raster.count, **nearest) > 0
             elif self.roles.alpha is not None:
                 alpha = raster.read(self.roles.alpha + 1, **nearest)
-                valid &= _opaque(alpha)
+                valid &= opaque(alpha)
             elif self.has_mask:
                 valid &= raster.read_masks(1, **nearest) > 0
         if self.warped_from is None and self.nodata is not None and not np.isnan(self.nodata):
@@ -360,63 +359,3 @@ class SceneReader:
             **options,
         ) as warped:
             yield warped
-
-
-# -- facts of a file ---------------------------------------------------------------------------
-
-
-def _palette(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
-    if dataset.colorinterp[0] != ColorInterp.palette:
-        return ()
-    table = dataset.colormap(1)
-    size = max(256, max(table) + 1)
-    return tuple(tuple(table.get(i, (0, 0, 0, 0))) for i in range(size))
-
-
-def _roles(dataset: Any, given: Sequence[str] | None) -> BandRoles:
-    remembered = roles_from_tags(dataset.tags())
-    if not given and remembered and len(remembered) == dataset.count:
-        given = remembered
-    marked = [interpretation.name for interpretation in dataset.colorinterp]
-    asked = [False] * dataset.count
-    if not given:
-        unnamed = {"alpha", "undefined"}
-        asked = [
-            name in unnamed and looks_like_mask(_sample(dataset, i + 1))
-            for i, name in enumerate(marked)
-        ]
-    return find_roles(dataset.descriptions, marked, asked, given)
-
-
-def _sample(dataset: Any, band: int) -> NDArray[Any]:
-    """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
-    parts = []
-    width, height = min(_SAMPLE_PX, dataset.width), min(_SAMPLE_PX, dataset.height)
-    for fraction_y in (0.0, 0.5, 1.0):
-        for fraction_x in (0.0, 0.5, 1.0):
-            column = round((dataset.width - width) * fraction_x)
-            row = round((dataset.height - height) * fraction_y)
-            window = Window(column, row, width, height)
-            parts.append(dataset.read(band, window=window).ravel())
-    return np.concatenate(parts)
-
-
-def _opaque(alpha: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether an alpha band hides less than half."""
-    if alpha.dtype.kind in "ui":
-        top = 1 if alpha.max(initial=0) <= 1 else np.iinfo(alpha.dtype).max
-        if alpha.dtype == np.uint16 and alpha.max(initial=0) <= 255:
-            top = 255
-        return np.asarray(alpha.astype(np.float64) * 2 > top)
-    return np.asarray(alpha > 0)
-
-
-def _crs_of(dataset: Any, path: str) -> CRS:
-    gcps, gcp_crs = dataset.gcps
-    found = dataset.crs or (gcp_crs if gcps else None)
-    if not found:
-        raise CRSError(
-            f"The picture {display_name(path)} does not name its coordinate reference system.",
-            hint="Name it: --crs EPSG:32633, or crs=... in Python.",
-        )
-    return to_pyproj(found)

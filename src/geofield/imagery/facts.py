@@ -1,0 +1,79 @@
+"""What a raster file says about itself: palette, band roles, CRS; and whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import CRS
+from rasterio.enums import ColorInterp
+from rasterio.windows import Window
+
+from geofield.errors import CRSError
+from geofield.imagery.bands import BandRoles, find_roles, looks_like_mask
+from geofield.imagery.gdal import display_name, to_pyproj
+from geofield.imagery.tags import roles_from_tags
+
+_SAMPLE_PX = 128
+
+
+def palette_of(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
+    """Red, green, blue, alpha of each value; empty for pictures without a palette."""
+    if dataset.colorinterp[0] != ColorInterp.palette:
+        return ()
+    table = dataset.colormap(1)
+    size = max(256, max(table) + 1)
+    return tuple(tuple(table.get(i, (0, 0, 0, 0))) for i in range(size))
+
+
+def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
+    """What each band shows: as given, as our own tag says, or as found."""
+    remembered = roles_from_tags(dataset.tags())
+    if not given and remembered and len(remembered) == dataset.count:
+        given = remembered
+    marked = [interpretation.name for interpretation in dataset.colorinterp]
+    asked = [False] * dataset.count
+    if not given:
+        unnamed = {"alpha", "undefined"}
+        asked = [
+            name in unnamed and looks_like_mask(_sample(dataset, i + 1))
+            for i, name in enumerate(marked)
+        ]
+    return find_roles(dataset.descriptions, marked, asked, given)
+
+
+def _sample(dataset: Any, band: int) -> NDArray[Any]:
+    """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
+    parts = []
+    width, height = min(_SAMPLE_PX, dataset.width), min(_SAMPLE_PX, dataset.height)
+    for fraction_y in (0.0, 0.5, 1.0):
+        for fraction_x in (0.0, 0.5, 1.0):
+            column = round((dataset.width - width) * fraction_x)
+            row = round((dataset.height - height) * fraction_y)
+            window = Window(column, row, width, height)
+            parts.append(dataset.read(band, window=window).ravel())
+    return np.concatenate(parts)
+
+
+def opaque(alpha: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether an alpha band hides less than half."""
+    if alpha.dtype.kind in "ui":
+        top = 1 if alpha.max(initial=0) <= 1 else np.iinfo(alpha.dtype).max
+        if alpha.dtype == np.uint16 and alpha.max(initial=0) <= 255:
+            top = 255
+        return np.asarray(alpha.astype(np.float64) * 2 > top)
+    return np.asarray(alpha > 0)
+
+
+def crs_of(dataset: Any, path: str) -> CRS:
+    """The CRS of the file or of its ground control points."""
+    gcps, gcp_crs = dataset.gcps
+    found = dataset.crs or (gcp_crs if gcps else None)
+    if not found:
+        raise CRSError(
+            f"The picture {display_name(path)} does not name its coordinate reference system.",
+            hint="Name it: --crs EPSG:32633, or crs=... in Python.",
+        )
+    return to_pyproj(found)
