@@ -148,6 +148,13 @@ def test_a_broken_file_is_found_and_the_thing_named(sound, tmp_path, profile, na
     assert line in {p.line for p in problems} or named[0].subject != full
 
 
+def test_an_ill_typed_number_leaves_no_traceback_in_the_log(sound, tmp_path, caplog):
+    path = tmp_path / "broken.ttl"
+    path.write_text(broken_file(sound["geosparql"], *BROKEN["radius a word"][:4])[0])
+    assert validate(path)
+    assert caplog.records == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("profile", write.PROFILES)
 def test_the_quick_check_never_hides_what_pyshacl_finds(sound, tmp_path, profile, monkeypatch):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -91,9 +93,21 @@ def _distinct(problems: list[Problem]) -> list[Problem]:
 def _shape_problems(quads: list[ox.Quad]) -> Iterator[Problem]:
     for batch in _batches(quads):
         data = rdflib.Graph()
-        for quad in batch:
-            data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
+        with _quiet_rdflib():
+            for quad in batch:
+                data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
         yield from _run_shapes(data)
+
+
+@contextmanager
+def _quiet_rdflib() -> Iterator[None]:
+    """Rdflib logs a traceback for each ill-typed literal; the shapes tell it in words."""
+    logger = logging.getLogger("rdflib.term")
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before
 
 
 def _batches(quads: list[ox.Quad]) -> Iterator[list[ox.Quad]]:
