@@ -30,7 +30,7 @@ _REQUIRED = {
 _IDS = ("CTR", "FRM", "PFD", "GGP", "GPN")
 #: The codes that are allowed, by version, element and attribute.
 _CODES = {
-    3: {("PLN", "A"): range(1, 10), ("LSG", "A"): range(1, 7), ("PNT", "A"): range(1, 6)},
+    3: {("PLN", "A"): range(1, 9), ("LSG", "A"): range(1, 9), ("PNT", "A"): range(1, 3)},
     4: {
         ("PLN", "A"): range(1, 13),
         ("LSG", "A"): range(1, 10),
