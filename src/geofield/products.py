@@ -92,7 +92,8 @@ def write_products(
 def _draw(dataset: Dataset, scene: Scene | None, path: Path) -> None:
     from geofield.mapping import draw_map
 
-    draw_map(dataset, scene).save(path)
+    # Less than half the time of the usual level for a tenth more bytes.
+    draw_map(dataset, scene).save(path, compress_level=3)
 
 
 def make_report(
