@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
+import os
 import random
 import sqlite3
 import subprocess
@@ -464,6 +465,63 @@ def test_the_cache_is_an_mbtiles_file(tmp_path: Path) -> None:
     again = acquire(source, HERE, tmp_path / "b.tif")
     with rasterio.open(again.path) as file:
         assert np.array_equal(file.read(), expected(done.grid, 18))
+
+
+@pytest.mark.qgis
+def test_qgis_opens_the_cache(tmp_path: Path) -> None:
+    python = Path("/usr/bin/python3")
+    environment = {
+        "QT_QPA_PLATFORM": "offscreen",
+        "HOME": str(tmp_path),
+        "XDG_RUNTIME_DIR": str(tmp_path),
+        "PATH": "/usr/bin:/bin",
+    }
+    code = (
+        "import sys\n"
+        "from qgis.core import QgsApplication, QgsRasterLayer\n"
+        "app = QgsApplication([], False)\n"
+        "app.initQgis()\n"
+        "for path, provider in ((sys.argv[1], 'gdal'),\n"
+        "                       ('type=mbtiles&url=file://' + sys.argv[1], 'wms')):\n"
+        "    layer = QgsRasterLayer(path, 'tiles', provider)\n"
+        "    box = layer.extent()\n"
+        "    print(layer.isValid(), layer.crs().authid(), box.xMinimum(), box.yMinimum(),\n"
+        "          box.xMaximum(), box.yMaximum())\n"
+        "app.exitQgis()\n"
+    )
+    found = python.exists() and (
+        subprocess.run(
+            [python, "-c", "import qgis.core"], env=environment, capture_output=True, check=False
+        ).returncode
+        == 0
+    )
+    if not found:
+        if os.environ.get("CI"):
+            pytest.fail("QGIS is missing: apt-get install qgis python3-qgis python3-gdal")
+        pytest.skip("needs QGIS: apt-get install qgis python3-qgis python3-gdal")
+    cached = replace(FAST, cache_dir=tmp_path / "cache")
+    where = replace(HERE, whole_tiles=True)
+    with serving() as server:
+        done = acquire(_named(server), where, tmp_path / "a.tif", options=cached)
+    copy = tmp_path / "copy.mbtiles"
+    copy.write_bytes(cache_infos(tmp_path / "cache")[0].path.read_bytes())
+    shown = subprocess.run(
+        [python, "-c", code, str(copy)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    ).stdout
+    left, top = done.grid.to_native(0, 0)
+    right, bottom = done.grid.to_native(done.grid.width_px, done.grid.height_px)
+    lines = shown.splitlines()
+    assert len(lines) == 2
+    for line in lines:
+        valid, crs, *numbers = line.split()
+        assert (valid, crs) == ("True", "EPSG:3857")
+        got = [float(number) for number in numbers]
+        assert got == pytest.approx([left, bottom, right, top], abs=0.1)
 
 
 def test_a_damaged_cache_is_set_aside_and_rebuilt(tmp_path: Path) -> None:

@@ -253,6 +253,7 @@ def _fetcher(
                 metadata=_cache_metadata(source),
             )
         )
+        stack.callback(cache.note_bounds)
         stack.callback(cache.trim)
     if options.offline and cache is None:
         why = (

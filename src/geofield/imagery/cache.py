@@ -7,6 +7,7 @@ file is set aside and a new one begun.
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import sqlite3
 import time
@@ -196,6 +197,29 @@ class TileCache:
                 raise
 
         self._guarded(insert)
+
+    def note_bounds(self) -> None:
+        """Write the ground covered into the metadata: QGIS zooms to it."""
+
+        def note(connection: sqlite3.Connection) -> None:
+            zoom, west, east, south, north = connection.execute(
+                "SELECT MAX(zoom_level), MIN(tile_column), MAX(tile_column) + 1, MIN(tile_row), "
+                "MAX(tile_row) + 1 FROM tiles "
+                "WHERE zoom_level = (SELECT MAX(zoom_level) FROM tiles)"
+            ).fetchone()
+            if zoom is None:
+                return
+            world = 2.0**zoom
+            lons = [column / world * 360.0 - 180.0 for column in (west, east)]
+            lats = [
+                math.degrees(math.atan(math.sinh(math.pi * (2.0 * row / world - 1.0))))
+                for row in (south, north)
+            ]
+            bounds = f"{lons[0]:.7f},{lats[0]:.7f},{lons[1]:.7f},{lats[1]:.7f}"
+            connection.execute("INSERT OR REPLACE INTO metadata VALUES ('bounds', ?)", (bounds,))
+
+        if "crs" not in self._metadata:
+            self._guarded(note)
 
     def trim(self) -> int:
         """Remove the oldest tiles until the size limit holds; how many went."""
