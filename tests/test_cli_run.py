@@ -98,6 +98,25 @@ def test_stage_by_stage_gives_the_same_plan(
     assert exported == (ran / "geojson/segments.geojson").read_bytes()
 
 
+def test_an_own_boundary_is_taken_as_it_is(
+    simulated: SimulatedField, simulated_tif: Path, tmp_path: Path
+) -> None:
+    import geopandas as gpd
+
+    shape = simulated.field.polygon.buffer(-10)
+    parcels = tmp_path / "parcels.geojson"
+    table = gpd.GeoDataFrame({"name": ["mine"]}, geometry=[shape], crs=simulated.field.crs)
+    table.to_crs(4326).to_file(parcels, driver="GeoJSON", COORDINATE_PRECISION=9)
+    out = tmp_path / "out"
+    run = ["run", simulated_tif, *point(simulated), "--spacing", 8, "--out", out]
+    assert geofield(*run, "--boundary", parcels) == 0
+    plan = read_plan(out / "field.gpkg")
+    assert plan.field.method == "boundary"
+    assert plan.field.polygon.symmetric_difference(shape).area < 0.01 * shape.area
+    assert plan.tracks is not None
+    assert all(shape.buffer(0.01).covers(each) for each in plan.tracks.segments.geometry)
+
+
 def test_overwriting_keeps_a_persons_edits(
     ran: Path, simulated: SimulatedField, simulated_tif: Path
 ) -> None:

@@ -37,6 +37,7 @@ def plan_field(
     lon: float,
     settings: Settings | None = None,
     previous: Plan | None = None,
+    boundary: Field | None = None,
     progress: Progress | None = None,
     timings_s: MutableMapping[str, float] | None = None,
 ) -> Plan:
@@ -52,6 +53,8 @@ def plan_field(
     previous : Plan, optional
         An earlier plan of the same field: its outline, where a person drew it, and its
         reviewed obstacles are kept.
+    boundary : Field, optional
+        The user's own outline; nothing is extracted then.
     progress : callable, optional
         Called with (done, total, what) at each stage.
     timings_s : mutable mapping, optional
@@ -70,7 +73,12 @@ def plan_field(
         # A window of a size that was asked for may grow: the stage reads it itself.
         whole = isinstance(scene, Scene) or settings.imagery.size_m is None
         plan = run_field(
-            picture if whole else scene, lat=lat, lon=lon, settings=settings, previous=previous
+            picture if whole else scene,
+            lat=lat,
+            lon=lon,
+            settings=settings,
+            previous=previous,
+            boundary=boundary,
         )
         picture = plan.scene or picture
     with _timed("obstacles", timings, tell):

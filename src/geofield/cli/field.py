@@ -9,7 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.options import point_options, section_options, section_values, settings_option
-from geofield.errors import FieldError
+from geofield.cli.parcels import boundary_options, own_parcel
 
 if TYPE_CHECKING:
     from geofield.model import Field, Scene
@@ -53,13 +53,7 @@ Examples (on the project's own sample):
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the study's pictures: grey, binary, numbered regions, reconstruction.",
 )
-@click.option(
-    "--boundary",
-    type=click.Path(exists=True, path_type=Path),
-    help="Your own parcels (any vector file, any CRS): take the one that contains the point.",
-)
-@click.option("--boundary-layer", help="Layer of --boundary, where it has several.")
-@click.option("--boundary-name", help="Take the parcel of this name or id instead.")
+@boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @settings_option
 @section_options("imagery")
@@ -114,7 +108,7 @@ def field(
                 regions=regions,
                 parcel=None
                 if boundary is None
-                else _parcel(boundary, boundary_layer, boundary_name, lat, lon),
+                else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
                 as_json=as_json,
             )
 
@@ -180,23 +174,6 @@ def _extract(
         for reason in found.quality.reasons:
             say(f"           {reason}")
     say(f"File       {output}")
-
-
-def _parcel(path: Path, layer: str | None, name: str | None, lat: float, lon: float) -> Field:
-    """The user's own parcel from any vector file."""
-    import geopandas as gpd
-    from pyogrio.errors import DataLayerError, DataSourceError
-
-    from geofield.field import field_from_boundary
-
-    try:
-        table = gpd.read_file(path, layer=layer)
-    except (DataSourceError, DataLayerError) as error:
-        raise FieldError(
-            f"The boundary file {path} cannot be read: {error}",
-            hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
-        ) from None
-    return field_from_boundary(table, lat=lat, lon=lon, name=name)
 
 
 def _study(

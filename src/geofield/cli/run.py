@@ -9,6 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.options import point_options, section_options, section_values, settings_option
+from geofield.cli.parcels import boundary_options, own_parcel
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -21,6 +22,8 @@ Examples (on the project's own sample):
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/ \\
       --buffer 2 --format gpkg --format geojson --overwrite
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out own/ \\
+      --boundary sample_data/field_1.gpkg --boundary-layer field
 """
 )
 @click.argument("imagery", type=click.Path(path_type=str))
@@ -43,6 +46,7 @@ Examples (on the project's own sample):
     help="You have permission to derive geodata, though the source's terms forbid it.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
+@boundary_options
 @settings_option
 @section_options("imagery")
 @section_options("field")
@@ -59,6 +63,9 @@ def run(
     overwrite: bool,
     fresh: bool,
     acknowledge_terms: bool,
+    boundary: Path | None,
+    boundary_layer: str | None,
+    boundary_name: str | None,
     as_json: bool,
     settings_file: str | None,
     **options: Any,
@@ -94,10 +101,18 @@ def run(
             lon=lon,
             settings=settings,
             previous=previous,
+            boundary=None
+            if boundary is None
+            else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
             progress=progress,
             timings_s=timings,
         )
-        files = plan.write(out, overwrite=overwrite, timings_s=timings, inputs=[imagery])
+        files = plan.write(
+            out,
+            overwrite=overwrite,
+            timings_s=timings,
+            inputs=[imagery, *([boundary] if boundary else [])],
+        )
     if as_json:
         import json
 

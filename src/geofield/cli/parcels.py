@@ -1,0 +1,48 @@
+"""The user's own parcels as field boundaries, for the commands that take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from geofield.errors import FieldError
+
+if TYPE_CHECKING:
+    from geofield.model import Field
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def boundary_options(command: Command) -> Command:
+    """Add ``--boundary``, ``--boundary-layer`` and ``--boundary-name``."""
+    for option in (
+        click.option("--boundary-name", help="Take the parcel of this name or id instead."),
+        click.option("--boundary-layer", help="Layer of --boundary, where it has several."),
+        click.option(
+            "--boundary",
+            type=click.Path(exists=True, path_type=Path),
+            help="Your own parcels (any vector file, any CRS): the one with the point is taken.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def own_parcel(path: Path, layer: str | None, name: str | None, lat: float, lon: float) -> Field:
+    """The user's own parcel from any vector file."""
+    import geopandas as gpd
+    from pyogrio.errors import DataLayerError, DataSourceError
+
+    from geofield.field import field_from_boundary
+
+    try:
+        table = gpd.read_file(path, layer=layer)
+    except (DataSourceError, DataLayerError) as error:
+        raise FieldError(
+            f"The boundary file {path} cannot be read: {error}",
+            hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
+        ) from None
+    return field_from_boundary(table, lat=lat, lon=lon, name=name)
