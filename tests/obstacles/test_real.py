@@ -1,0 +1,53 @@
+"""The default detector on labelled aerial imagery of sites the verifier never saw."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+
+import geofield as gf
+from geofield.evaluation import match_points, reliability
+from geofield.imagery import read_scene
+from geofield.model.scene import Scene
+
+pytestmark = pytest.mark.real
+
+
+def detections(shared, bands):
+    """Per chip: centres, confidences and labels inside the area, pixels."""
+    folder = shared / "data" / "trees"
+    labels = pd.read_csv(folder / "trees.csv")
+    for row in pd.read_csv(folder / "areas.csv").itertuples():
+        scene = read_scene(folder / f"{row.image}.tif")
+        assert scene.roles == ("red", "green", "blue", "nir")
+        scene = Scene(scene.grid, scene.bands[:bands], scene.roles[:bands], scene.valid)
+        found = gf.detect_obstacles(scene)
+        area = shapely.Polygon(json.loads(row.area_px))
+        xy = found[["x_px", "y_px"]].to_numpy(float)
+        # Labels are pixel indices: half a pixel from the corner-based coordinates.
+        truth = labels[labels.image == row.image][["x_px", "y_px"]].to_numpy(float) + 0.5
+        keep = shapely.contains_xy(area, *xy.T)
+        truth = truth[shapely.contains_xy(area, *truth.T)]
+        yield xy[keep], found["confidence"].to_numpy()[keep], truth
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.74, 0.68), (3, 0.68, 0.61)])
+def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
+    hits = {6: 0, 10: 0}
+    found = labelled = 0
+    confidences, good = [], []
+    for xy, confidence, truth in detections(shared, bands):
+        found += len(xy)
+        labelled += len(truth)
+        for limit in hits:
+            match = match_points(xy, truth, limit)
+            hits[limit] += len(match.truth_index)
+        confidences.append(confidence)
+        good.append(np.isin(np.arange(len(xy)), match.detected_index))
+    assert 2 * hits[10] / (found + labelled) > least_10
+    assert 2 * hits[6] / (found + labelled) > least_6
+    # Open land is easier than the cities the curve was fitted on: it errs on the safe side.
+    assert reliability(np.concatenate(confidences), np.concatenate(good))[3] < 0.25
