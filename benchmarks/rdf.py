@@ -35,8 +35,6 @@ CASES = (
     ("write_jsonld", STUDY_POINTS, "geosparql"),
     ("write_ntriples", STUDY_POINTS, "geosparql"),
     ("rdflib xml", STUDY_POINTS, "geosparql"),
-    ("rdflib pretty-xml", STUDY_POINTS, "geosparql"),
-    ("rdflib turtle", STUDY_POINTS, "geosparql"),
     ("rdflib nt", STUDY_POINTS, "geosparql"),
     ("read", STUDY_POINTS, "geosparql"),
     ("rdflib parse", STUDY_POINTS, "geosparql"),
@@ -117,15 +115,16 @@ def main() -> None:
         if arguments.quick and name.startswith("rdflib"):
             continue
         large = points > STUDY_POINTS or name.startswith("rdflib")
-        runs = [_run(name, points, profile) for _ in range(1 if arguments.quick or large else 5)]
+        runs = [_run(name, points, profile) for _ in range(1 if arguments.quick or large else 3)]
         median = {key: statistics.median(run[key] for run in runs) for key in runs[0]}
         lines.append(
             f"| {name} | {points} | {profile} | {median['s']:.2f} | {median['cpu_s']:.2f} | "
             f"{median['MB']:.1f} | {median['peak']:.0f} | {median['before']:.0f} |"
         )
+        print(lines[-1], file=sys.stderr, flush=True)
     lines += [
         "",
-        "Medians of five runs; the million points and rdflib once. MB is the size of what",
+        "Medians of three runs; the million points and rdflib once. MB is the size of what",
     ]
     lines += ["was written (for `read` and the rdflib rows, of their input and output)."]
     write_page("rdf", "Linked data", lines)
