@@ -279,6 +279,17 @@ def test_retry_after_is_honoured(tmp_path: Path) -> None:
     assert set(server.asked.values()) == {2}
 
 
+def test_a_proxy_is_used_for_far_hosts_only(tmp_path: Path) -> None:
+    with serving() as near, serving() as proxy:
+        options = replace(FAST, proxy=proxy.address)
+        acquire(_named(near), HERE, tmp_path / "a.tif", options=options)
+        assert not proxy.paths
+        far = XYZSource("far", "http://tiles.example/{z}/{x}/{y}.png")
+        done = acquire(far, HERE, tmp_path / "b.tif", options=options)
+        assert len(proxy.paths) == done.report.wanted
+        assert all(path.startswith("http://tiles.example/18/") for path in proxy.paths)
+
+
 def test_a_user_agent_is_sent(tmp_path: Path) -> None:
     with serving(tile_server.no_agent) as server:
         done = acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)

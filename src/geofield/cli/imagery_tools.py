@@ -100,6 +100,7 @@ def fetch_options(settings: Settings, cache_dir: Path | None) -> FetchOptions:
         cache_max_bytes=int(settings.fetch.cache_max_mb * 1e6),
         cache_max_age_s=settings.fetch.cache_max_days * 86400.0,
         proxy=proxies.get("https") or proxies.get("http"),
+        no_proxy=tuple(part.strip() for part in proxies.get("no", "").split(",")),
     )
 
 
@@ -110,7 +111,7 @@ def resolve(
     point: tuple[float, float] | None = None,
     layer: str = "",
     offline: bool = False,
-    proxy: str | None = None,
+    options: FetchOptions | None = None,
 ) -> Source:
     """The source that the user names."""
     from geofield.imagery.client import Client
@@ -118,7 +119,13 @@ def resolve(
 
     catalogue = catalogue_of(settings)
     keys = keys_of(settings, catalogue)
-    client = None if offline else Client(secrets=keys.values(), proxy=proxy)
+    client = None
+    if not offline:
+        client = Client(
+            secrets=keys.values(),
+            proxy=options.proxy if options else None,
+            no_proxy=options.no_proxy if options else (),
+        )
     try:
         return find_source(
             what, catalogue=catalogue, keys=keys, client=client, layer=layer, point=point
@@ -147,7 +154,7 @@ def as_picture(
         yield what
         return
     options = fetch_options(settings, cache_dir_of(settings))
-    source = resolve(what, settings, point=(lon, lat), proxy=options.proxy)
+    source = resolve(what, settings, point=(lon, lat), options=options)
     if isinstance(source, PictureSource):
         check_terms(source.name, source.terms, acknowledged=acknowledged)
         if settings.imagery.bands or source.terms.attribution + source.terms.licence == "":

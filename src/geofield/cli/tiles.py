@@ -155,7 +155,7 @@ def tiles(
         point=(middle_lon, middle_lat),
         layer=layer,
         offline=offline,
-        proxy=options.proxy,
+        options=options,
     )
     with progress_bar(quiet=as_json) as progress:
         done = acquire(found, where, out, options=options, overwrite=overwrite, progress=progress)

@@ -117,6 +117,7 @@ class FetchOptions:
     acknowledged : bool
         The user answers for terms that forbid deriving geodata.
     proxy : str or None
+    no_proxy : tuple of str
     """
 
     cache_dir: Path | None = None
@@ -130,6 +131,7 @@ class FetchOptions:
     cache_max_age_s: float | None = 90 * 86400.0
     acknowledged: bool = False
     proxy: str | None = None
+    no_proxy: tuple[str, ...] = ()
 
 
 def acquire(
@@ -274,6 +276,7 @@ def _fetcher(
             rate_per_s=source.rate_per_s,
             secrets=source.secrets,
             proxy=options.proxy,
+            no_proxy=options.no_proxy,
         )
         stack.callback(client.close)
     return TileFetcher(source, client=client, cache=cache, threads=options.threads)

@@ -32,6 +32,7 @@ _NOTHING = frozenset({204, 404, 410})
 _MAX_BODY = 128 * 2**20
 #: A server that asks for a longer pause has said no.
 _MAX_PAUSE_S = 120.0
+_THIS_MACHINE = ("localhost", "127.0.0.1", "::1")
 _LOGGERS = ("urllib3.connectionpool", "urllib3.poolmanager", "urllib3.connection")
 
 
@@ -91,7 +92,9 @@ class Client:
     backoff_s : float
         The first pause; doubled each time.
     proxy : str, optional
-        Address of an HTTP proxy.
+        Address of an HTTP proxy; never used for this machine itself.
+    no_proxy : tuple of str
+        Endings of host names that are asked without the proxy.
     """
 
     def __init__(
@@ -104,6 +107,7 @@ class Client:
         secrets: Iterable[str] = (),
         backoff_s: float = 0.25,
         proxy: str | None = None,
+        no_proxy: tuple[str, ...] = (),
     ) -> None:
         self.attempts = attempts
         self.redact = Redactor(secrets)
@@ -123,11 +127,13 @@ class Client:
             "timeout": urllib3.Timeout(connect=timeout_s, read=timeout_s),
             "headers": {"User-Agent": USER_AGENT, "Accept": "image/*,*/*;q=0.5"},
         }
-        self._pool = (
+        self._direct = urllib3.PoolManager(**options)  # type: ignore[arg-type]
+        self._proxied = (
             urllib3.ProxyManager(proxy, **options)  # type: ignore[arg-type]
             if proxy
-            else urllib3.PoolManager(**options)  # type: ignore[arg-type]
+            else self._direct
         )
+        self._no_proxy = (*_THIS_MACHINE, *(each.lstrip(".") for each in no_proxy if each))
         self._log_filter = _KeylessLog(self.redact)
         for name in _LOGGERS:
             logging.getLogger(name).addFilter(self._log_filter)
@@ -139,7 +145,8 @@ class Client:
 
     def close(self) -> None:
         """Close the connections."""
-        self._pool.clear()
+        self._direct.clear()
+        self._proxied.clear()
         for name in _LOGGERS:
             logging.getLogger(name).removeFilter(self._log_filter)
 
@@ -235,8 +242,11 @@ class Client:
         self, url: str, headers: Mapping[str, str] | None
     ) -> tuple[int, str, float | None, bytes]:
         """Status, content type, the pause asked for, body."""
-        merged = {**self._pool.headers, **headers} if headers else None
-        response = self._pool.request(
+        host = urlsplit(url).hostname or ""
+        near = any(host == each or host.endswith("." + each) for each in self._no_proxy)
+        pool = self._direct if near else self._proxied
+        merged = {**pool.headers, **headers} if headers else None
+        response = pool.request(
             "GET", url, headers=merged, preload_content=False, retries=self._retries
         )
         deadline = time.monotonic() + 3 * self._timeout_s
