@@ -76,7 +76,8 @@ def _command(command: click.Command, name: str, parent: click.Context, level: in
         if (record := each.get_help_record(context)) is not None
     ]
     for flags, text in options:
-        lines += [f"`{flags}`", f":   {_cell(text) or 'No description.'}", ""]
+        if text:
+            lines += [f"`{flags}`", f":   {_cell(text)}", ""]
     if command.epilog:
         lines += _epilog(command.epilog)
     if isinstance(command, click.Group):
