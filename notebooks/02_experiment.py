@@ -206,13 +206,16 @@ plt.show()
 #   study.
 # - The grey-level check at 127.37 helps where trees are dark on a bright field and deletes true
 #   trees on other pictures.
-# - geofield's default, `auto`, does not choose by counting. It is the best of the rows on
-#   simulated fields, where every method does well, and what counts is that it is so on real
-#   trees too. Its figures there say how much a person still has to check.
+# - geofield's default, `auto`, does not choose by counting. It weighs what speaks for each single
+#   candidate (darkness, greenness, roundness, shadow) with weights that were fitted on labelled
+#   pictures of other places. That pays on real trees; on simulated fields, where dark round discs
+#   are all there is, counting circles does about as well.
+# - No row is near 1 on real pictures: a person has to look.
 
 # %%
 best = on_simulated.F1.idxmax()
 print("best on simulated fields:", best)
 if real is not None:
     print("best on real chips:", real.F1.idxmax())
-assert on_simulated.loc["auto", "F1"] >= on_simulated.loc["DLC", "F1"]
+    assert real.loc["auto", "F1"] > real.loc["DLC + grey check", "F1"]
+assert on_simulated.loc["auto", "F1"] > 0.8
