@@ -73,7 +73,12 @@ def polygon_edges(
     """
     if isinstance(polygons, BaseGeometry):
         polygons = [polygons]
-    parts, source = shapely.get_parts(np.asarray(polygons, dtype=object), return_index=True)
+    shapes = np.asarray(polygons, dtype=object)
+    if (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON.value).all():
+        # Taking parts copies every polygon, which costs more than clipping.
+        parts, source = shapes[~shapely.is_empty(shapes)], np.flatnonzero(~shapely.is_empty(shapes))
+    else:
+        parts, source = shapely.get_parts(shapes, return_index=True)
     if len(parts) == 0:
         empty = np.empty(0)
         return Edges(empty, empty, empty, empty, np.empty(0, np.int8), np.empty(0, np.int64))
