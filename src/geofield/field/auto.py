@@ -17,9 +17,9 @@ from geofield.field.superpixels import borders, superpixels
 from geofield.model import Scene
 
 #: The hierarchy works on a picture reduced to at most this many pixels a side.
-_COARSE_PX = 400
+COARSE_PX = 400
 #: Side of a superpixel's cell, pixels.
-_STEP_PX = 5
+STEP_PX = 5
 #: How far from the seed open ground is looked for, pixels.
 _STRAY_PX = 20
 #: A border weaker than this, in units of what the field has inside, is none.
@@ -36,11 +36,11 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
         The seed, pixel coordinates.
     """
     rows, columns = scene.grid.shape
-    factor = max(1, math.ceil(max(rows, columns) / _COARSE_PX))
+    factor = max(1, math.ceil(max(rows, columns) / COARSE_PX))
     seed = (x_px / factor, y_px / factor)
     raw = channels(scene, factor)
     stack = whiten(raw, seed)
-    labels = superpixels(gradient(stack), _STEP_PX)
+    labels = superpixels(gradient(stack), STEP_PX)
     count = int(labels.max()) + 1
     lines = borders(labels, stack)
     if not len(lines.first):
@@ -48,22 +48,22 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
     pairs = lines.pairs(count)
     sizes = np.bincount(labels.ravel(), minlength=count).astype(float)
     tree = merge(sizes, *pairs)
-    footing = _footing(labels, tree, seed)
-    found = candidates(labels, tree, lines, pairs, footing)
+    ground = footing(labels, tree, seed)
+    found = candidates(labels, tree, lines, pairs, ground)
     if not found:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     score = scores(found)
     best = int(np.argmax(score))
     chosen = found[best]
-    mask = _finer(scene, chosen, stack, factor, footing)
+    mask = _finer(scene, chosen, stack, factor, ground)
     notes, figures = _evidence(chosen, certainty(found, score, best))
-    if footing != seed:
+    if ground != seed:
         notes = ("the point lies on something small (a tree, a hut, a track?)", *notes)
     return Segmentation(mask & scene.valid, notes, figures)
 
 
-def _footing(
+def footing(
     labels: NDArray[np.int32], tree: MergeTree, seed: tuple[float, float]
 ) -> tuple[float, float]:
     """The seed, or the nearest place on open ground where it is on a crown or the like."""

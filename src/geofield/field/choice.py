@@ -119,11 +119,18 @@ def candidates(
 
 def scores(found: list[Candidate]) -> NDArray[np.float64]:
     """The score of each candidate; only differences mean something."""
-    own = np.array([_own(one.figures) for one in found]) @ OWN_WEIGHTS
-    seams = np.array([_seam(one.figures) for one in found])
+    seams, own = features(found)
     toll = np.cumsum(seams @ TOLL_WEIGHTS)
     before = np.concatenate([[0.0], toll[:-1]])
-    return np.asarray(own + before + seams @ NEXT_WEIGHTS)
+    return np.asarray(own @ OWN_WEIGHTS + before + seams @ NEXT_WEIGHTS)
+
+
+def features(found: list[Candidate]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What each candidate's next merge shows, and its own outline, as numbers to weigh."""
+    return (
+        np.array([_seam(one.figures) for one in found]),
+        np.array([_own(one.figures) for one in found]),
+    )
 
 
 def certainty(found: list[Candidate], score: NDArray[np.float64], best: int) -> float:
