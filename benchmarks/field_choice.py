@@ -16,6 +16,7 @@ import csv
 import json
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -92,22 +93,28 @@ def measured(case: Case) -> tuple[np.ndarray, np.ndarray] | None:
     overlap = [(one.mask & true).sum() / (one.mask | true).sum() for one in found]
     seams, own = choice.features(found)
     before = np.vstack([np.zeros(seams.shape[1]), np.cumsum(seams, axis=0)[:-1]])
-    return np.hstack([before, seams, own]), np.array(overlap)
+    return np.hstack([before, own]), np.array(overlap)
 
 
-def learn(cases: list[tuple[np.ndarray, np.ndarray]], tries: int = 3) -> np.ndarray:
+def learn(
+    cases: list[tuple[np.ndarray, np.ndarray]], sites: list[str], tries: int = 3
+) -> np.ndarray:
+    # Every site counts the same, however many pictures and seeds it has.
+    often = Counter(sites)
+    share = np.array([(3.0 if s.startswith("sim") else 1.0) / often[s] for s in sites])
+    share /= share.sum()
+
     def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
         total, slope = 0.0, np.zeros_like(weights)
-        for features, overlap in cases:
+        for part, (features, overlap) in zip(share, cases, strict=True):
             score = features @ weights
             belief = np.exp(score - score.max())
             belief /= belief.sum()
             worth = overlap - 0.5 * np.maximum(0, overlap.max() - BAD - overlap)
             mean = belief @ worth
-            total -= mean
-            slope -= (belief * (worth - mean)) @ features
-        size = len(cases)
-        return total / size + RIDGE * weights @ weights, slope / size + 2 * RIDGE * weights
+            total -= part * mean
+            slope -= part * (belief * (worth - mean)) @ features
+        return total + RIDGE * weights @ weights, slope + 2 * RIDGE * weights
 
     found = [
         minimize(
@@ -140,10 +147,11 @@ def main() -> None:
                     cases.append(row)
     scale = np.concatenate([features for features, _ in cases]).std(axis=0) + 1e-9
     cases = [(features / scale, overlap) for features, overlap in cases]
-    weights = learn(cases, 6)
+    weights = learn(cases, sites, 6)
     left_out = np.zeros(len(cases))
     for site in sorted(set(sites)):
-        rest = learn([c for s, c in zip(sites, cases, strict=True) if s != site], 2)
+        kept = [i for i, name in enumerate(sites) if name != site]
+        rest = learn([cases[i] for i in kept], [sites[i] for i in kept], 2)
         for index in np.flatnonzero(np.array(sites) == site):
             left_out[index] = picked(cases[index], rest)
     is_real = np.array([not site.startswith("simulated") for site in sites])
@@ -156,10 +164,9 @@ def main() -> None:
             print(f"| {name} ({len(at)}) | {best:.3f} | {chosen:.3f} | {left_out[at].mean():.3f} |")
     if options.write:
         count = len(choice.TOLL_WEIGHTS)
-        parts = np.split(weights / scale, [count, 2 * count])
+        parts = np.split(weights / scale, [count])
         names = (
             ("Of what the merges so far show.", "TOLL_WEIGHTS"),
-            ("Of what the next merge would show.", "NEXT_WEIGHTS"),
             ("Of the region's own outline.", "OWN_WEIGHTS"),
         )
         text = (

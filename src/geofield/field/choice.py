@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.field.choice_weights import NEXT_WEIGHTS, OWN_WEIGHTS, TOLL_WEIGHTS
+from geofield.field.choice_weights import OWN_WEIGHTS, TOLL_WEIGHTS
 from geofield.field.hierarchy import MergeTree
 from geofield.field.superpixels import Borders
 
@@ -122,7 +122,7 @@ def scores(found: list[Candidate]) -> NDArray[np.float64]:
     seams, own = features(found)
     toll = np.cumsum(seams @ TOLL_WEIGHTS)
     before = np.concatenate([[0.0], toll[:-1]])
-    return np.asarray(own @ OWN_WEIGHTS + before + seams @ NEXT_WEIGHTS)
+    return np.asarray(own @ OWN_WEIGHTS + before)
 
 
 def features(found: list[Candidate]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
