@@ -229,8 +229,8 @@ def main() -> None:
         notes += [
             "",
             f"GeoPackage without points, with styles, project, origin: {ratio:.2f} times the "
-            "processor time of geopandas' `to_file` for the bare tables. Load of the machine at the "
-            f"end: {os.getloadavg()[1]:.1f}.",
+            "processor time of geopandas' `to_file` for the bare tables. Load of the machine at "
+            f"the end: {os.getloadavg()[1]:.1f}.",
         ]
     write_page("formats", "Writing a very large plan", notes)
 
