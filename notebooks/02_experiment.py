@@ -206,10 +206,10 @@ plt.show()
 #   study.
 # - The grey-level check at 127.37 helps where trees are dark on a bright field and deletes true
 #   trees on other pictures.
-# - geofield's default, `auto`, does not choose by counting. It weighs what speaks for each single
-#   candidate (darkness, greenness, roundness, shadow) with weights that were fitted on labelled
-#   pictures of other places. That pays on real trees; on simulated fields, where dark round discs
-#   are all there is, counting circles does about as well.
+# - geofield's default, `auto`, does not choose by counting. It judges each single candidate by what
+#   speaks for it (darkness, greenness, the perimeter, the surroundings), with trees of decisions
+#   fitted on labelled pictures of other places. That pays on real trees; on simulated fields, where
+#   dark round discs are all there is, counting circles does about as well.
 # - No row is near 1 on real pictures: a person has to look.
 
 # %%
