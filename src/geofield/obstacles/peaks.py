@@ -9,7 +9,7 @@ the dynamics", 1992).
 
 from __future__ import annotations
 
-from typing import cast
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,52 +36,71 @@ def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.in
     if height.size == 0 or float(height.max()) <= h:
         return labels, 0
     basin, tops = _basins(height)
-    first, second, passes = _passes(height, basin)
-    neighbours: dict[int, list[tuple[int, float]]] = {}
-    for a, b, level in zip(first.tolist(), second.tolist(), passes.tolist(), strict=True):
-        neighbours.setdefault(a, []).append((b, level))
-        neighbours.setdefault(b, []).append((a, level))
-
-    flat_basin = basin.ravel()
-    flat_height = height.ravel()
-    order = np.argsort(flat_basin, kind="stable")
-    starts = np.searchsorted(flat_basin[order], np.arange(tops.size + 1))
-    flat_labels = labels.ravel()
+    neighbours = _Neighbours.of(*_passes(height, basin), tops.size)
+    tallest = np.argsort(-tops, kind="stable")
+    # A basin belongs to one plateau at most: two that shared it would reach each other.
+    label = np.zeros(tops.size, dtype=np.intp)
+    floor = np.full(tops.size, np.inf)
     count = 0
-    for peak in np.argsort(-tops, kind="stable").tolist():
-        top = float(tops[peak])
-        if top <= h:
-            break
-        plateau = _reach(peak, top, h, tops, neighbours)
+    heights = tops.tolist()
+    for peak in tallest[: int(np.count_nonzero(tops > h))].tolist():
+        plateau = _reach(peak, h, heights, neighbours)
         if plateau is None:
             continue
         count += 1
-        for member in plateau:
-            pixels = order[starts[member] : starts[member + 1]]
-            flat_labels[pixels[flat_height[pixels] >= top - h]] = count
+        label[plateau] = count
+        floor[plateau] = heights[peak] - h
+    rows, cols = np.nonzero(height >= floor[basin])
+    labels[rows, cols] = label[basin[rows, cols]]
     return labels, count
 
 
-def _reach(
-    peak: int,
-    top: float,
-    h: float,
-    tops: NDArray[np.float64],
-    neighbours: dict[int, list[tuple[int, float]]],
-) -> list[int] | None:
+@dataclass(frozen=True, slots=True)
+class _Neighbours:
+    """Which basins touch, and how high the passes are: those of basin i from start i on."""
+
+    start: list[int]
+    other: list[int]
+    level: list[float]
+
+    @classmethod
+    def of(
+        cls,
+        first: NDArray[np.intp],
+        second: NDArray[np.intp],
+        level: NDArray[np.float64],
+        count: int,
+    ) -> _Neighbours:
+        here = np.concatenate([first, second])
+        order = np.argsort(here, kind="stable")
+        start = np.concatenate([[0], np.cumsum(np.bincount(here, minlength=count))])
+        other = np.concatenate([second, first])[order]
+        return cls(start.tolist(), other.tolist(), np.concatenate([level, level])[order].tolist())
+
+
+def _reach(peak: int, h: float, tops: list[float], neighbours: _Neighbours) -> list[int] | None:
     """Return the basins reachable without going down by more than h, or None if one is higher."""
+    start, other, level = neighbours.start, neighbours.other, neighbours.level
+    top = tops[peak]
     seen = {peak}
     stack = [peak]
     while stack:
-        for other, level in neighbours.get(stack.pop(), ()):
-            if level < top - h or other in seen:
+        at = stack.pop()
+        for k in range(start[at], start[at + 1]):
+            there = other[k]
+            if level[k] < top - h or there in seen:
                 continue
             # Of two equal peaks on one plateau the first stands for both.
-            if tops[other] > top or (tops[other] == top and other < peak):
+            if tops[there] > top or (tops[there] == top and there < peak):
                 return None
-            seen.add(other)
-            stack.append(other)
+            seen.add(there)
+            stack.append(there)
     return list(seen)
+
+
+_STEPS = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+_BLOCK_ROWS = 32
+"""Rows that are looked at together: few enough to stay in the processor's cache."""
 
 
 def _basins(height: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
@@ -89,31 +108,30 @@ def _basins(height: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.f
     rows, cols = height.shape
     padded = np.full((rows + 2, cols + 2), -np.inf)
     padded[1:-1, 1:-1] = height
-    index = np.arange(rows * cols).reshape(rows, cols)
-    best = height.copy()
-    target = index.copy()
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            if dy == 0 and dx == 0:
-                continue
-            seen = padded[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + cols]
-            step = index + dy * cols + dx
-            # Equal neighbours are climbed towards the smaller index, so that flat ground
-            # ends in one place and never runs in a circle.
-            better = (seen > best) | ((seen == best) & (step < target) & (step >= 0))
-            best = np.where(better, seen, best)
-            target = np.where(better, step, target)
+    target = np.arange(rows * cols, dtype=np.intp).reshape(rows, cols)
+    offset = np.array([dy * cols + dx for dy, dx in _STEPS], dtype=np.intp)
+    for row in range(0, rows, _BLOCK_ROWS):
+        part = padded[row : row + _BLOCK_ROWS + 2]
+        depth = part.shape[0] - 2
+        best = part[:depth, :cols].copy()
+        which = np.zeros(best.shape, dtype=np.int8)
+        # Of equal neighbours the one of the smallest index is climbed to, so that flat ground
+        # ends in one place and never runs in a circle.
+        for k, (dy, dx) in enumerate(_STEPS[1:], start=1):
+            seen = part[1 + dy : 1 + dy + depth, 1 + dx : 1 + dx + cols]
+            np.copyto(which, np.int8(k), where=seen > best)
+            np.maximum(best, seen, out=best)
+        target[row : row + depth] += offset[which]
     climb = target.ravel()
     while True:
         further = climb[climb]
         if np.array_equal(further, climb):
             break
         climb = further
-    peaks, basin = np.unique(climb, return_inverse=True)
-    return (
-        cast("NDArray[np.intp]", basin.reshape(rows, cols).astype(np.intp)),
-        height.ravel()[peaks],
-    )
+    peaks = np.flatnonzero(climb == np.arange(climb.size))
+    number = np.zeros(climb.size, dtype=np.intp)
+    number[peaks] = np.arange(peaks.size)
+    return number[climb].reshape(rows, cols), height.ravel()[peaks]
 
 
 def _passes(
@@ -132,15 +150,18 @@ def _passes(
     ]
     for here, there in shifts:
         a, b = basin[here], basin[there]
-        level = np.minimum(height[here], height[there])
-        border = (a != b) & (level > 0)
-        low, high = np.minimum(a, b)[border], np.maximum(a, b)[border]
-        pairs.append(low * count + high)
-        levels.append(level[border])
+        border = np.nonzero(a != b)
+        low, high = a[border], b[border]
+        level = np.minimum(height[here][border], height[there][border])
+        above = level > 0
+        low, high = low[above], high[above]
+        pairs.append(np.minimum(low, high) * count + np.maximum(low, high))
+        levels.append(level[above])
     key, level = np.concatenate(pairs), np.concatenate(levels)
-    order = np.lexsort((-level, key))
-    key, level = key[order], level[order]
-    first = np.ones(key.size, dtype=bool)
-    first[1:] = key[1:] != key[:-1]
+    if key.size == 0:
+        return key, key, level
+    order = np.argsort(key)
+    key = key[order]
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
     key = key[first]
-    return key // count, key % count, level[first]
+    return key // count, key % count, np.maximum.reduceat(level[order], first)
