@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -103,7 +104,7 @@ def voting_pixels(
     if image.dtype == np.bool_:
         grey = smooth(grey, 9, 1.5, "nearest")
     gx, gy = gradient(grey, "sobel")
-    magnitude = np.hypot(gx, gy)
+    magnitude = np.sqrt(gx * gx + gy * gy)
     if region is not None:
         magnitude = np.where(region, magnitude, 0.0)
     top = float(magnitude.max(initial=0.0))
@@ -112,13 +113,14 @@ def voting_pixels(
         none = np.empty(0)
         return EdgePixels(none, none, none, none, (grey.shape[0], grey.shape[1]))
     tau = otsu_threshold(magnitude / top) if edge_threshold is None else edge_threshold
-    rows, cols = np.nonzero(magnitude > tau * top)
-    strength = magnitude[rows, cols]
+    at = np.flatnonzero(magnitude > tau * top)
+    rows, cols = np.divmod(at, grey.shape[1])
+    strength = magnitude.ravel()[at]
     return EdgePixels(
         cols.astype(np.float64),
         rows.astype(np.float64),
-        gx[rows, cols] / strength,
-        gy[rows, cols] / strength,
+        gx.ravel()[at] / strength,
+        gy.ravel()[at] / strength,
         (grey.shape[0], grey.shape[1]),
     )
 
@@ -129,21 +131,62 @@ def radii_between(low_px: float, high_px: float) -> NDArray[np.float64]:
     return low_px + RADIUS_STEP_PX * np.arange(count, dtype=np.float64)
 
 
-def spokes(
-    edges: EdgePixels, radii_px: NDArray[np.float64], polarity: Polarity
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return where each edge pixel votes: flat pixel index, and index of the radius.
+def accumulate(
+    edges: EdgePixels,
+    radii_px: NDArray[np.float64],
+    polarity: Polarity,
+    weights: Sequence[NDArray[np.float64]],
+) -> list[NDArray[np.float64]]:
+    """Add up the votes of all edge pixels at all radii.
 
-    Votes that leave the picture are dropped.
+    Parameters
+    ----------
+    edges : EdgePixels
+    radii_px : float64 array, shape (r,)
+    polarity : {"dark", "bright"}
+    weights : sequence of float64 arrays, shape (r,)
+        What a vote of each radius weighs, for every accumulator that is asked for.
+
+    Returns
+    -------
+    list of float64 arrays, shape (rows, cols)
+        One accumulator for each of the weights. Votes that leave the picture are dropped.
     """
     sign = _sign(polarity)
     rows, cols = edges.shape
-    reach = sign * radii_px[:, None]
-    x = np.floor(edges.x_px[None, :] + reach * edges.ux[None, :] + 0.5).astype(np.intp)
-    y = np.floor(edges.y_px[None, :] + reach * edges.uy[None, :] + 0.5).astype(np.intp)
-    inside = (x >= 0) & (x < cols) & (y >= 0) & (y < rows)
-    which = np.broadcast_to(np.arange(radii_px.size)[:, None], x.shape)[inside]
-    return (y * cols + x)[inside], which
+    # With a margin as wide as the largest radius no vote needs to be asked where it falls.
+    margin = int(np.ceil(radii_px[-1])) + 1
+    width, height = cols + 2 * margin, rows + 2 * margin
+    where = np.empty((radii_px.size, len(edges)), dtype=np.intp)
+    x, y = np.empty(len(edges)), np.empty(len(edges))
+    for i, radius in enumerate(radii_px):
+        _step(edges.x_px, edges.ux, sign * radius, x)
+        _step(edges.y_px, edges.uy, sign * radius, y)
+        # Whole numbers far below 2^53: exact as floats.
+        y *= width
+        y += x
+        y += margin * width + margin
+        where[i] = y
+    flat = where.ravel()
+    inner = (slice(margin, margin + rows), slice(margin, margin + cols))
+    votes: list[NDArray[np.float64]] = []
+    for weight in weights:
+        total = np.bincount(flat, np.repeat(weight, len(edges)), minlength=width * height)
+        votes.append(total.astype(np.float64, copy=False).reshape(height, width)[inner])
+    return votes
+
+
+def _step(
+    start: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    length: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Write the pixels that a step leads to into an array."""
+    np.multiply(direction, length, out=out)
+    out += start
+    out += 0.5
+    np.floor(out, out=out)
 
 
 def _sign(polarity: Polarity) -> float:

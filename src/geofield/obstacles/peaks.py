@@ -50,8 +50,8 @@ def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.in
         count += 1
         label[plateau] = count
         floor[plateau] = heights[peak] - h
-    rows, cols = np.nonzero(height >= floor[basin])
-    labels[rows, cols] = label[basin[rows, cols]]
+    at = np.flatnonzero(height >= floor[basin])
+    labels.ravel()[at] = label[basin.ravel()[at]]
     return labels, count
 
 
@@ -141,20 +141,19 @@ def _passes(
     pairs: list[NDArray[np.intp]] = []
     levels: list[NDArray[np.float64]] = []
     count = int(basin.max()) + 1
-    whole = slice(None)
-    shifts = [
-        ((whole, slice(None, -1)), (whole, slice(1, None))),
-        ((slice(None, -1), whole), (slice(1, None), whole)),
-        ((slice(None, -1), slice(None, -1)), (slice(1, None), slice(1, None))),
-        ((slice(None, -1), slice(1, None)), (slice(1, None), slice(None, -1))),
-    ]
-    for here, there in shifts:
-        a, b = basin[here], basin[there]
-        border = np.nonzero(a != b)
-        low, high = a[border], b[border]
-        level = np.minimum(height[here][border], height[there][border])
+    rows, cols = basin.shape
+    flat_basin, flat_height = basin.ravel(), height.ravel()
+    border = np.empty(basin.shape, dtype=np.bool_)
+    for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        here = (slice(0, rows - dy), slice(max(-dx, 0), cols - max(dx, 0)))
+        there = (slice(dy, rows), slice(max(dx, 0), cols - max(-dx, 0)))
+        border[:] = False
+        np.not_equal(basin[here], basin[there], out=border[here])
+        at = np.flatnonzero(border)
+        step = at + (dy * cols + dx)
+        level = np.minimum(flat_height[at], flat_height[step])
         above = level > 0
-        low, high = low[above], high[above]
+        low, high = flat_basin[at[above]], flat_basin[step[above]]
         pairs.append(np.minimum(low, high) * count + np.maximum(low, high))
         levels.append(level[above])
     key, level = np.concatenate(pairs), np.concatenate(levels)

@@ -18,9 +18,9 @@ from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.obstacles.accumulator import (
     EdgePixels,
     Polarity,
+    accumulate,
     radii_between,
     smooth,
-    spokes,
     voting_pixels,
 )
 from geofield.obstacles.circles import Circles, checked_range
@@ -102,32 +102,26 @@ def circles_from_edges(
 ) -> Circles:
     """Find circles from the pixels that vote; see :func:`find_circles`."""
     radii = radii_between(*radius_px)
-    where, which = spokes(edges, radii, polarity)
-    if where.size == 0:
-        return Circles()
-    size = edges.shape[0] * edges.shape[1]
     weight = 1.0 / radii
     if method == "phase_code":
         span = float(np.log(radii[-1]) - np.log(radii[0])) or 1.0
         phase = 2 * np.pi * (np.log(radii) - np.log(radii[0])) / span
-        vote = weight * np.exp(1j * phase)
-        real = np.bincount(where, weights=vote.real[which], minlength=size)
-        imaginary = np.bincount(where, weights=vote.imag[which], minlength=size)
-        votes = (real + 1j * imaginary).reshape(edges.shape)
-        height = np.abs(votes)
+        weights = [weight * np.cos(phase), weight * np.sin(phase)]
+        votes = accumulate(edges, radii, polarity, weights)
+        height = np.sqrt(votes[0] * votes[0] + votes[1] * votes[1])
     else:
-        votes = None
-        height = np.bincount(where, weights=weight[which], minlength=size).reshape(edges.shape)
+        votes = []
+        (height,) = accumulate(edges, radii, polarity, [weight])
     height = smooth(height, 9, 2.0, "constant")
     x, y, strength = _centres(height, (1.0 - sensitivity) * 2 * np.pi)
     if x.size == 0:
         return Circles()
-    if votes is None:
+    if not votes:
         radius = _radii_by_histogram(edges, x, y, radii)
     else:
         rows = np.clip(np.floor(y + 0.5).astype(np.intp), 0, edges.shape[0] - 1)
         cols = np.clip(np.floor(x + 0.5).astype(np.intp), 0, edges.shape[1] - 1)
-        theta = np.mod(np.angle(votes[rows, cols]), 2 * np.pi)
+        theta = np.mod(np.arctan2(votes[1][rows, cols], votes[0][rows, cols]), 2 * np.pi)
         radius = np.exp(theta / (2 * np.pi) * np.log(radii[-1] / radii[0]) + np.log(radii[0]))
     order = np.argsort(-strength, kind="stable")
     return Circles(x, y, radius, strength).take(order)
@@ -141,8 +135,9 @@ def _centres(
     if count == 0:
         none = np.empty(0)
         return none, none, none
-    rows, cols = np.nonzero(labels)
-    label = labels[rows, cols] - 1
+    at = np.flatnonzero(labels)
+    rows, cols = np.divmod(at, labels.shape[1])
+    label = labels.ravel()[at] - 1
     total = np.bincount(label, minlength=count)
     x = np.bincount(label, weights=cols, minlength=count) / total
     y = np.bincount(label, weights=rows, minlength=count) / total

@@ -171,7 +171,9 @@ def run_strategy(
     seen: list[Circles] = []
     before: tuple[NDArray[np.bool_], Circles] | None = None
     for done, (method, setting) in enumerate(plan):
-        scan = scans.setdefault(method, EdgeScan.of(grey, method))
+        if method not in scans:
+            scans[method] = EdgeScan.of(grey, method)
+        scan = scans[method]
         at = scan.default_threshold if setting is None else setting
         edges = scan.at(at)
         # Neighbouring thresholds often give the very same map.
