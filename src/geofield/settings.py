@@ -7,6 +7,7 @@ arguments of its stage, so that each figure is described once, here.
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +21,6 @@ from pydantic import (
     SecretStr,
     ValidationError,
 )
-from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from geofield.errors import SettingsError
 
@@ -240,19 +240,6 @@ class Settings(Section):
     fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
 
 
-class _Environment(BaseSettings):
-    """Names the environment variables; only its parsing is used."""
-
-    model_config = SettingsConfigDict(env_prefix="GEOFIELD_", env_nested_delimiter="__")
-
-    imagery: ImagerySettings = ImagerySettings()
-    field: FieldSettings = FieldSettings()
-    obstacles: ObstacleSettings = ObstacleSettings()
-    tracks: TrackSettings = TrackSettings()
-    export: ExportSettings = ExportSettings()
-    fetch: FetchSettings = FetchSettings()
-
-
 SECTIONS = ("imagery", "field", "obstacles", "tracks", "export", "fetch")
 Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
 
@@ -277,7 +264,7 @@ def load_settings(
     """
     merged: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
     try:
-        for source in (_read_toml(path), EnvSettingsSource(_Environment)(), overrides or {}):
+        for source in (_read_toml(path), _from_environment(), overrides or {}):
             for section, settings in source.items():
                 if section not in SECTIONS:
                     raise SettingsError(
@@ -301,6 +288,27 @@ def from_mapping(values: Mapping[str, Any]) -> Settings:
         return Settings(**known)
     except ValidationError as error:
         raise SettingsError(_explain(error)) from None
+
+
+def _from_environment() -> dict[str, Any]:
+    """What variables such as ``GEOFIELD_TRACKS__SPACING_M`` say, by section."""
+    if not any(name.upper().startswith("GEOFIELD_") for name in os.environ):
+        return {}
+    from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
+
+    class Environment(BaseSettings):
+        """Names the variables; only its parsing is used."""
+
+        model_config = SettingsConfigDict(env_prefix="GEOFIELD_", env_nested_delimiter="__")
+
+        imagery: ImagerySettings = ImagerySettings()
+        field: FieldSettings = FieldSettings()
+        obstacles: ObstacleSettings = ObstacleSettings()
+        tracks: TrackSettings = TrackSettings()
+        export: ExportSettings = ExportSettings()
+        fetch: FetchSettings = FetchSettings()
+
+    return EnvSettingsSource(Environment)()
 
 
 def _read_toml(path: str | Path | None) -> dict[str, Any]:

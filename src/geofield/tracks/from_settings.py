@@ -13,7 +13,6 @@ from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
 from geofield.tracks.outline import metric
 from geofield.tracks.planner import plan_tracks
-from geofield.tracks.route import plan_route
 
 
 def plan_with_settings(
@@ -59,6 +58,8 @@ def plan_with_settings(
     if settings.route == "none":
         return tracks
     start = settings.start_lonlat
+    from geofield.tracks.route import plan_route
+
     return plan_route(
         tracks,
         pattern=settings.route,
