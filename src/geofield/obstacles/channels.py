@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -161,10 +162,10 @@ def gaussian(image: Image, sigma_px: float) -> Image:
     """Smooth by a Gaussian; wide ones on a coarser picture, at a fraction of the time."""
     factor = 1 if sigma_px < 2 else 2 if sigma_px < 5 else 4
     if factor == 1:
-        return _gaussian(image, sigma_px)
+        return smoothed(image, sigma_px)
     # Block means have a variance of their own, (f^2 - 1) / 12 of a pixel squared.
     rest = np.sqrt(max(sigma_px**2 - (factor**2 - 1) / 6, 0.25)) / factor
-    return enlarge(_gaussian(shrink(image, factor), float(rest)), factor, image.shape)
+    return enlarge(smoothed(shrink(image, factor), float(rest)), factor, image.shape)
 
 
 def sample_gaussians(
@@ -179,13 +180,13 @@ def sample_gaussians(
     for sigma in sigmas_px:
         factor = 1 if sigma < 1.2 else 2 if sigma < 4 else 4
         if factor == 1:
-            out.append(_gaussian(image, sigma)[rows, cols])
+            out.append(smoothed(image, sigma)[rows, cols])
             continue
         if factor not in levels:
             half = levels.setdefault(2, shrink(image, 2))
             levels.setdefault(4, shrink(half, 2))
         rest = np.sqrt(max(sigma**2 - (factor**2 - 1) / 6, 0.25)) / factor
-        coarse = _gaussian(levels[factor], float(rest))
+        coarse = smoothed(levels[factor], float(rest))
         y = np.clip((rows + 0.5) / factor - 0.5, 0, coarse.shape[0] - 1)
         x = np.clip((cols + 0.5) / factor - 0.5, 0, coarse.shape[1] - 1)
         out.append(bilinear(coarse, x, y))
@@ -202,12 +203,27 @@ def bilinear(image: Image, x: NDArray[np.floating], y: NDArray[np.floating]) -> 
     return cast("NDArray[np.float32]", top * (1 - fy) + bottom * fy)
 
 
-def _gaussian(image: Image, sigma_px: float) -> Image:
-    return cast("Image", ndimage.gaussian_filter(image, sigma_px, mode="nearest", truncate=3.0))
+def smoothed(
+    image: Image,
+    sigma_px: float,
+    truncate: float = 3.0,
+    border: Literal["nearest", "zero"] = "nearest",
+) -> Image:
+    """Smooth by a Gaussian, cut off at so many sigma, the border repeated or followed by zeros."""
+    reach = int(truncate * sigma_px + 0.5)
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma_px) ** 2)
+    window = (window / window.sum()).astype(np.float32)
+    kind = cv2.BORDER_REPLICATE if border == "nearest" else cv2.BORDER_CONSTANT
+    return np.asarray(cv2.sepFilter2D(image, -1, window, window, borderType=kind), np.float32)
+
+
+def box_mean(image: Image, size_px: int) -> Image:
+    """Return the mean over a square around each pixel, the border repeated."""
+    mean = cv2.blur(image, (size_px, size_px), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(mean, dtype=np.float32)
 
 
 def _texture(luma: Image) -> Image:
     """Return the standard deviation of luma in 5 x 5 pixels."""
-    mean = ndimage.uniform_filter(luma, 5, mode="nearest")
-    square = ndimage.uniform_filter(luma * luma, 5, mode="nearest")
-    return cast("Image", np.sqrt(np.maximum(square - mean * mean, 0)))
+    mean = box_mean(luma, 5)
+    return cast("Image", np.sqrt(np.maximum(box_mean(luma * luma, 5) - mean * mean, 0)))

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from geofield.obstacles.channels import Image, is_peak, shrink
+from geofield.obstacles.channels import Image, is_peak, shrink, smoothed
 from geofield.obstacles.circles import Circles
 
 RADII = 12
@@ -83,8 +82,11 @@ class _Votes:
 
     @classmethod
     def of(cls, image: Image) -> _Votes:
-        smooth = ndimage.gaussian_filter(image, 1.0, mode="nearest", truncate=3.0)
-        gy, gx = np.gradient(smooth) if min(image.shape) > 1 else (smooth * 0, smooth * 0)
+        smooth = smoothed(image, 1.0)
+        gx: Image = np.zeros_like(smooth)
+        gy: Image = np.zeros_like(smooth)
+        if min(image.shape) > 1:
+            gy, gx = (np.asarray(part, dtype=np.float32) for part in np.gradient(smooth))
         magnitude = np.hypot(gx, gy)
         threshold = VOTE_THRESHOLD
         rows, cols = np.nonzero(magnitude > threshold)
@@ -92,8 +94,8 @@ class _Votes:
         return cls(
             cols.astype(np.float32),
             rows.astype(np.float32),
-            gx[rows, cols] / strength,
-            gy[rows, cols] / strength,
+            np.asarray(gx[rows, cols] / strength, dtype=np.float32),
+            np.asarray(gy[rows, cols] / strength, dtype=np.float32),
             np.minimum(1, strength / (2 * threshold)),
             (image.shape[0], image.shape[1]),
         )
@@ -108,7 +110,7 @@ class _Votes:
         votes = np.bincount(flat, weights=self.weight[inside], minlength=rows * cols)
         sigma = max(0.8, 0.22 * radius)
         accumulator = votes.astype(np.float32).reshape(rows, cols)
-        smooth = ndimage.gaussian_filter(accumulator, sigma, mode="constant", truncate=2.5)
+        smooth = smoothed(accumulator, sigma, 2.5, "zero")
         # An edge is about two pixels wide and its votes spread over 2 pi sigma^2 pixels.
         scale = 2 * np.pi * sigma**2 / (2 * np.pi * radius * 2.0)
         return np.asarray(smooth * np.float32(scale), dtype=np.float32)

@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.obstacles.channels import Channels, Variant, gaussian, sample_gaussians, shrink
+from geofield.obstacles.channels import (
+    Channels,
+    Variant,
+    box_mean,
+    gaussian,
+    sample_gaussians,
+    shrink,
+)
 from geofield.obstacles.evidence import Support
 
 SIGMAS_PX = (0.8, 1.5, 2.5, 4.0, 7.0, 12.0)
@@ -193,7 +200,7 @@ def _rings(
     cols = np.rint(x_px).astype(np.intp) + reach
     harmonic = np.exp(-1j * angle).astype(np.complex64)
     for name in _RINGED[found.variant]:
-        smooth = ndimage.uniform_filter(found.maps[name], 3, mode="nearest")
+        smooth = box_mean(found.maps[name], 3)
         padded = np.pad(smooth, reach, mode="edge")
         width = padded.shape[1]
         flat = (rows * width + cols)[:, None, None] + (dy * width + dx)[None]
