@@ -198,33 +198,39 @@ def _rings(
     reach = int(rings[-1]) + 2
     rows = np.rint(y_px).astype(np.intp) + reach
     cols = np.rint(x_px).astype(np.intp) + reach
-    harmonic = np.exp(-1j * angle).astype(np.complex64)
     for name in _RINGED[found.variant]:
         smooth = box_mean(found.maps[name], 3)
         padded = np.pad(smooth, reach, mode="edge")
         width = padded.shape[1]
-        flat = (rows * width + cols)[:, None, None] + (dy * width + dx)[None]
+        # Candidates last: sums over directions then run along whole rows of memory.
+        flat = (dy * width + dx)[..., None] + (rows * width + cols)
         ring = padded.ravel()[flat]
-        ring -= padded[rows, cols][:, None, None]
-        mean = ring.mean(axis=2)
-        std = np.sqrt(np.maximum((ring * ring).mean(axis=2) - mean * mean, 0))
-        low, high = ring.min(axis=2), ring.max(axis=2)
-        tilt = (ring @ harmonic) / DIRECTIONS
+        ring -= padded[rows, cols]
+        mean = ring.mean(axis=1)
+        std = np.sqrt(np.maximum((ring * ring).mean(axis=1) - mean * mean, 0))
+        low, high = ring.min(axis=1), ring.max(axis=1)
+        tilt = np.hypot(_along(ring, np.cos(angle)), _along(ring, np.sin(angle))) / DIRECTIONS
         for i, r in enumerate(RINGS_PX):
-            columns[f"{name}ring_{r:g}_mean"] = mean[:, i]
-            columns[f"{name}ring_{r:g}_std"] = std[:, i]
-            columns[f"{name}ring_{r:g}_low"] = low[:, i]
-            columns[f"{name}ring_{r:g}_high"] = high[:, i]
+            columns[f"{name}ring_{r:g}_mean"] = mean[i]
+            columns[f"{name}ring_{r:g}_std"] = std[i]
+            columns[f"{name}ring_{r:g}_low"] = low[i]
+            columns[f"{name}ring_{r:g}_high"] = high[i]
             if i >= 1:
-                columns[f"{name}tilt_{r:g}"] = np.abs(tilt[:, i])
+                columns[f"{name}tilt_{r:g}"] = tilt[i]
         if name in ("ndvi", "exg") or (found.variant == "grey" and name == "luma"):
             # How far the crown reaches in each direction: its radius, and whether it is round.
             sign = -1.0 if name == "luma" else 1.0
             fall = -sign * ring > _CROWN_FALL[name]
-            extent = np.where(fall.any(axis=1), rings[fall.argmax(axis=1)], 1.3 * rings[-1])
+            extent = np.where(fall.any(axis=0), rings[fall.argmax(axis=0)], 1.3 * rings[-1])
+            extent = np.ascontiguousarray(extent.T)
             columns["extent_mean"] = extent.mean(axis=1)
             columns["extent_std"] = extent.std(axis=1)
             columns["extent_low"] = extent.min(axis=1)
             across = extent[:, : DIRECTIONS // 2] + extent[:, DIRECTIONS // 2 :]
             columns["extent_across_low"] = across.min(axis=1)
             columns["extent_across_ratio"] = across.min(axis=1) / across.max(axis=1)
+
+
+def _along(ring: NDArray[np.float32], wave: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return the sum over the directions (second axis), each weighted by a wave."""
+    return np.asarray(np.einsum("rdn,d->rn", ring, wave.astype(np.float32)), dtype=np.float32)

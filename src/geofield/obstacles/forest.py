@@ -90,11 +90,11 @@ class Forest:
         first = _FIRST_BIT
         for tree in self.trees:
             possible = np.full(total.size, 0xFFFF, dtype=np.uint16)
-            for feature, threshold, keep in zip(
-                tree.feature, tree.threshold, tree.keep, strict=True
+            for feature, threshold, drop in zip(
+                tree.feature, tree.threshold, ~tree.keep, strict=True
             ):
-                goes_left = columns[feature] <= threshold
-                possible &= np.where(goes_left, np.uint16(0xFFFF), keep)
+                # What is dropped times whether it goes right: far quicker than a choice.
+                possible &= ~(~(columns[feature] <= threshold) * drop)
             total += tree.leaf[first[possible]]
         return total
 
