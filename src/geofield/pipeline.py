@@ -13,11 +13,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 
 from geofield import schema
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError, GeofieldError
+from geofield.errors import FieldError, GeofieldError, TrackError
 from geofield.model.field import Field
 from geofield.model.review import complete_review, merge_reviewed
 from geofield.model.scene import Scene
@@ -225,9 +226,15 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
 
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     obstacles = None if plan.obstacles is None else complete_review(plan.obstacles, plan.grid)
+    _refuse_too_wide(field, settings.tracks.spacing_m)
     tracks = plan_with_settings(
         field.polygon, obstacles, settings.tracks, crs=field.crs, grid=plan.grid
     )
+    if not len(tracks.lines) and not tracks.blocked_count:
+        raise TrackError(
+            f"The field of {field.area_ha:.4f} ha is smaller than one track.",
+            hint="Choose a smaller spacing or headland, or check the outline.",
+        )
     evidence = dict(plan.evidence)
     if field is not plan.field:
         evidence["field"] = _field_evidence(field)
@@ -239,6 +246,17 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence={**evidence, "tracks": tracks.evidence()},
     )
+
+
+def _refuse_too_wide(field: Field, spacing_m: float) -> None:
+    """A spacing beyond the field's whole length is a slip of the keyboard, not a plan."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(field.polygon))
+    longest_m = float(np.hypot(*np.diff(corners, axis=0).T).max())
+    if spacing_m > longest_m:
+        raise TrackError(
+            f"A spacing of {spacing_m:g} m is larger than the field ({longest_m:.0f} m long).",
+            hint="Give the distance between two tracks in metres, for instance --spacing 3.",
+        )
 
 
 def keeps_outline(previous: Plan) -> bool:

@@ -66,7 +66,7 @@ def read_scene(
 
     Examples
     --------
-    >>> scene = read_scene("sample_data/field.tif", lat=35.0753, lon=33.5311)  # doctest: +SKIP
+    >>> scene = read_scene("sample_data/field_1.tif", lat=35.0754, lon=33.5311)  # doctest: +SKIP
     """
     if (lat is None) != (lon is None):
         raise ImageryError("A point needs both lat and lon.", hint="Give both, or neither.")
