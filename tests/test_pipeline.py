@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 import geofield as gf
-from geofield.errors import FieldError, OutputExistsError
+from geofield.errors import FieldError, OutputExistsError, TrackError
 from geofield.model.review import complete_review
 from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
 from geofield.plan import Plan, read_plan
@@ -255,3 +255,11 @@ def test_plans_differ_when_anything_differs(plan: Plan) -> None:
     moved = plan.obstacles.copy()
     moved.loc[0, "radius_m"] = np.nextafter(moved.loc[0, "radius_m"], 99)
     assert replace(plan, obstacles=moved) != plan
+
+
+@pytest.mark.parametrize("tracks", [{"spacing_m": 30.0}, {"spacing_m": 3.0, "headland_m": 11.0}])
+def test_a_field_smaller_than_one_track_is_refused(tracks: dict[str, float]) -> None:
+    small = Plan(gf.Field(shapely.box(500_000, 3_900_000, 500_020, 3_900_020), crs="EPSG:32636"))
+    assert run_tracks(small, settings=load_settings(None, {"tracks": {"spacing_m": 3.0}})).tracks
+    with pytest.raises(TrackError):
+        run_tracks(small, settings=load_settings(None, {"tracks": tracks}))

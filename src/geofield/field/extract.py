@@ -93,6 +93,11 @@ def extract_field(
     if smooth not in ("none", "diffusion"):
         raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
     x_px, y_px = scene.pixel_of(lat=lat, lon=lon)
+    if scene.is_blank:
+        raise FieldError(
+            "The picture is empty: all its pixels have the same value.",
+            hint="Check the source, the band and the scaling, for instance with QGIS.",
+        )
     picture = diffused(scene) if smooth == "diffusion" else scene
     found = METHODS[method](picture, x_px, y_px, tuple(regions))
     keep = holes == "keep" or (holes is None and method == "study")

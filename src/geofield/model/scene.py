@@ -95,6 +95,12 @@ class Scene:
         return self.bands[self.roles.index(role)] if role in self.roles else None
 
     @property
+    def is_blank(self) -> bool:
+        """Whether all pixels with data have one and the same value, or none has data."""
+        values = self.bands[:, self.valid]
+        return values.size == 0 or bool((values == values[:, :1]).all())
+
+    @property
     def is_colour(self) -> bool:
         """Whether red, green and blue are all there."""
         return {"red", "green", "blue"} <= set(self.roles)
