@@ -193,14 +193,20 @@ def sample_gaussians(
     return out
 
 
+_REMAP_WIDTH = 4096
+
+
 def bilinear(image: Image, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Sample a picture between its pixels; positions must lie within their centres."""
-    x0, y0 = x.astype(np.intp), y.astype(np.intp)
-    x1, y1 = np.minimum(x0 + 1, image.shape[1] - 1), np.minimum(y0 + 1, image.shape[0] - 1)
-    fx, fy = (x - x0).astype(np.float32), (y - y0).astype(np.float32)
-    top = image[y0, x0] * (1 - fx) + image[y0, x1] * fx
-    bottom = image[y1, x0] * (1 - fx) + image[y1, x1] * fx
-    return cast("NDArray[np.float32]", top * (1 - fy) + bottom * fy)
+    """Sample a picture between its pixels, positions beyond its border at the border."""
+    # OpenCV takes maps of limited height: the positions go in long rows.
+    width = min(max(x.size, 1), _REMAP_WIDTH)
+    maps = np.zeros((2, -(-x.size // width) * width), dtype=np.float32)
+    maps[0, : x.size], maps[1, : x.size] = x.ravel(), y.ravel()
+    columns, rows = maps.reshape(2, -1, width)
+    if x.size == 0:
+        return np.zeros(x.shape, dtype=np.float32)
+    values = cv2.remap(image, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(values, dtype=np.float32).ravel()[: x.size].reshape(x.shape)
 
 
 def smoothed(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
-from geofield.obstacles.channels import Channels, Image, bilinear
+from geofield.obstacles.channels import Channels, Image, bilinear, smoothed
 
 FloatArray = NDArray[np.float64]
 
@@ -76,7 +74,7 @@ def fit_circles(
 
 
 def _smooth(image: Image) -> Image:
-    return cast("Image", ndimage.gaussian_filter(image, _SMOOTHING_PX, mode="nearest"))
+    return smoothed(image, _SMOOTHING_PX, truncate=4.0)
 
 
 def _radius_limit(x_px: FloatArray, y_px: FloatArray, largest_px: float) -> FloatArray:
@@ -108,8 +106,8 @@ def _mixture_shift(
 
 def _ring_mean(image: Image, x_px: FloatArray, y_px: FloatArray, radius: FloatArray) -> FloatArray:
     angle = 2 * np.pi * np.arange(16) / 16
-    x = np.clip(x_px[:, None] + radius[:, None] * np.cos(angle), 0, image.shape[1] - 1)
-    y = np.clip(y_px[:, None] + radius[:, None] * np.sin(angle), 0, image.shape[0] - 1)
+    x = x_px[:, None] + radius[:, None] * np.cos(angle)
+    y = y_px[:, None] + radius[:, None] * np.sin(angle)
     return np.asarray(bilinear(image, x, y).mean(axis=1), dtype=np.float64)
 
 
@@ -130,8 +128,7 @@ def _fit_once(image: Image, x_px: FloatArray, y_px: FloatArray, limit: FloatArra
     cos, sin = np.cos(angle), np.sin(angle)
     x = x_px[:, None, None] + radii[:, None] * cos
     y = y_px[:, None, None] + radii[:, None] * sin
-    rows, cols = image.shape
-    profile = bilinear(image, np.clip(x, 0, cols - 1), np.clip(y, 0, rows - 1))
+    profile = bilinear(image, x, y)
     fall = profile[:, :-2] - profile[:, 2:]
     middle = radii[1:-1]
     mean = fall.mean(axis=2)
