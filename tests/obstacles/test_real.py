@@ -34,7 +34,7 @@ def detections(shared, bands):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.74, 0.68), (3, 0.68, 0.61)])
+@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.77, 0.70), (3, 0.70, 0.62)])
 def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
     hits = {6: 0, 10: 0}
     found = labelled = 0
@@ -50,4 +50,4 @@ def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
     assert 2 * hits[10] / (found + labelled) > least_10
     assert 2 * hits[6] / (found + labelled) > least_6
     # Open land is easier than the cities the curve was fitted on: it errs on the safe side.
-    assert reliability(np.concatenate(confidences), np.concatenate(good))[3] < 0.25
+    assert reliability(np.concatenate(confidences), np.concatenate(good))[3] < 0.15

@@ -1,6 +1,6 @@
 """Boosted regression trees as a table of numbers: reading and evaluating them with numpy.
 
-A tree has at most 16 leaves, numbered from left to right. A node that sends a candidate to
+A tree has at most 32 leaves, numbered from left to right. A node that sends a candidate to
 the right rules out all leaves of its left branch, so the nodes can be asked in any order, for
 all candidates at once, and the leaf is the first one that nobody ruled out (C. Lucchese et
 al., "QuickScorer", SIGIR 2015).
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from geofield.errors import ObstacleError
 from geofield.obstacles.features import FeatureTable
 
-MAX_LEAVES = 16
+MAX_LEAVES = 32
+_ALL = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,7 @@ class Tree:
     feature : intp array (nodes,)
         Index into the forest's features.
     threshold : float32 array (nodes,)
-    keep : uint16 array (nodes,)
+    keep : uint32 array (nodes,)
         The leaves that remain possible after going right.
     leaf : float64 array (leaves,)
         What each leaf adds.
@@ -38,7 +39,7 @@ class Tree:
 
     feature: NDArray[np.intp]
     threshold: NDArray[np.float32]
-    keep: NDArray[np.uint16]
+    keep: NDArray[np.uint32]
     leaf: NDArray[np.float64]
 
 
@@ -51,11 +52,14 @@ class Forest:
     features : tuple of str
     trees : tuple of Tree
     base : float
+    early : (int, float)
+        After so many trees, candidates below this sum are not asked further.
     """
 
     features: tuple[str, ...]
     trees: tuple[Tree, ...]
     base: float = 0.0
+    early: tuple[int, float] = (0, -np.inf)
 
     @classmethod
     def read(cls, table: Mapping[str, Any]) -> Forest:
@@ -66,10 +70,11 @@ class Forest:
         """
         features = tuple(str(name) for name in table["features"])
         trees = tuple(_tree(item["nodes"], item["leaves"]) for item in table["trees"])
-        return cls(features, trees, float(table.get("base", 0.0)))
+        count, least = table.get("early", (0, -np.inf))
+        return cls(features, trees, float(table.get("base", 0.0)), (int(count), float(least)))
 
     def evaluate(self, measured: FeatureTable) -> NDArray[np.float64]:
-        """Return the sum of the trees for every candidate.
+        """Return the sum of the trees for every candidate, minus infinity for the hopeless.
 
         Raises
         ------
@@ -82,26 +87,32 @@ class Forest:
                 f"The verifier's table asks for the unknown feature {missing[0]!r}.",
                 hint="Fit it again with this version.",
             )
-        total = np.full(measured.values.shape[0], self.base)
         position = {name: i for i, name in enumerate(measured.names)}
-        columns = np.ascontiguousarray(
-            measured.values[:, [position[name] for name in self.features]].T
-        )
-        first = _FIRST_BIT
-        for tree in self.trees:
-            possible = np.full(total.size, 0xFFFF, dtype=np.uint16)
-            for feature, threshold, drop in zip(
-                tree.feature, tree.threshold, ~tree.keep, strict=True
-            ):
-                # What is dropped times whether it goes right: far quicker than a choice.
-                possible &= ~(~(columns[feature] <= threshold) * drop)
-            total += tree.leaf[first[possible]]
+        columns = measured.values.T[[position[name] for name in self.features]]
+        count, least = self.early
+        total = self.base + _sum(self.trees[:count], columns)
+        hopeful = np.flatnonzero(total >= least)
+        total[total < least] = -np.inf
+        total[hopeful] += _sum(self.trees[count:], np.take(columns, hopeful, axis=1))
         return total
+
+
+def _sum(trees: Sequence[Tree], columns: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the sum of trees for candidates, an array (features, candidates)."""
+    total = np.zeros(columns.shape[1])
+    for tree in trees:
+        possible = np.full(total.size, _ALL, dtype=np.uint32)
+        for feature, threshold, drop in zip(tree.feature, tree.threshold, ~tree.keep, strict=True):
+            # What is dropped times whether it goes right: far quicker than a choice.
+            possible &= ~(~(columns[feature] <= threshold) * drop)
+        # The lowest bit that is set: as many as there are unset ones below it.
+        total += tree.leaf[np.bitwise_count(~possible & (possible - np.uint32(1)))]
+    return total
 
 
 def _tree(nodes: Sequence[Sequence[float]], leaves: Sequence[float]) -> Tree:
     if len(leaves) > MAX_LEAVES:
-        raise ObstacleError(f"A tree of the verifier has {len(leaves)} leaves; 16 are the limit.")
+        raise ObstacleError(f"A tree of the verifier has {len(leaves)} leaves; 32 are the limit.")
     order: list[int] = []
     left_leaves: dict[int, list[int]] = {}
 
@@ -114,21 +125,10 @@ def _tree(nodes: Sequence[Sequence[float]], leaves: Sequence[float]) -> Tree:
         return left_leaves[branch] + walk(int(right))
 
     walk(0 if nodes else -1)
-    keep = [0xFFFF & ~sum(1 << leaf for leaf in left_leaves[i]) for i in range(len(nodes))]
+    keep = [_ALL & ~sum(1 << leaf for leaf in left_leaves[i]) for i in range(len(nodes))]
     return Tree(
         np.array([int(node[0]) for node in nodes], dtype=np.intp),
         np.array([node[1] for node in nodes], dtype=np.float32),
-        np.array(keep, dtype=np.uint16),
+        np.array(keep, dtype=np.uint32),
         np.array([leaves[k] for k in order], dtype=np.float64),
     )
-
-
-def _first_bits() -> NDArray[np.uint8]:
-    values = np.arange(1 << 16, dtype=np.uint32)
-    first = np.zeros(values.size, dtype=np.uint8)
-    for bit in range(15, -1, -1):
-        first[(values >> bit) & 1 == 1] = bit
-    return first
-
-
-_FIRST_BIT = _first_bits()

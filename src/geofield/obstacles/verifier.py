@@ -1,11 +1,12 @@
 """The verifier: from measured candidates to trees with a calibrated confidence.
 
-Three small models, read from one JSON table per set of bands (``tables/verifier_*.json``,
+Four small models, read from one JSON table per set of bands (``tables/verifier_*.json``,
 written by ``tools/fit_confidence.py``): a *gate* (logistic, cheap features) that drops what
-is clearly nothing, a *score* (boosted trees) of how near a tree's centre a candidate is, and
-a *spacing* (boosted trees) of how far the next tree will be, which decides how wide a
-detection suppresses others. The confidence is the score put through a logistic curve that
-was fitted to hits and misses on sites the score had not seen.
+is clearly nothing; a *score* (boosted trees) of how near a tree's centre a candidate is; a
+*spacing* (boosted trees) of how far the next tree will be, which decides how wide a detection
+suppresses others; and a *decision* (boosted trees) on the detections that are left, which
+sees what is around each. The confidence is the decision put through a logistic curve that was
+fitted to hits and misses on sites it had not seen.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class Gate:
     weight: FloatArray
     threshold: float
 
-    def passes(self, measured: FeatureTable) -> NDArray[np.bool_]:
-        """Return which candidates are worth measuring fully."""
+    def evaluate(self, measured: FeatureTable) -> FloatArray:
+        """Return how much each candidate looks like a crown, on a logistic scale."""
         position = {name: i for i, name in enumerate(measured.names)}
         total = np.zeros(measured.values.shape[0])
         for name, mean, scale, weight in zip(
@@ -48,7 +49,11 @@ class Gate:
         ):
             value = np.clip((measured.values[:, position[name]] - mean) / scale, -5, 5)
             total += weight * value
-        return np.asarray(total >= self.threshold)
+        return total
+
+    def passes(self, value: FloatArray) -> NDArray[np.bool_]:
+        """Return which candidates are worth measuring fully."""
+        return np.asarray(value >= self.threshold)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,7 @@ class Verifier:
     gate: Gate
     score: Forest
     spacing: Forest
+    decision: Forest
     calibration: tuple[float, float]
     spacing_share: float
     spacing_px: tuple[float, float]
@@ -81,21 +87,22 @@ class Verifier:
             ),
             Forest.read(table["score"]),
             Forest.read(table["spacing"]),
+            Forest.read(table["decision"]),
             (float(slope), float(offset)),
             float(table["spacing_share"]),
             (float(low), float(high)),
             float(table["threshold"]),
         )
 
-    def reach_px(self, measured: FeatureTable) -> FloatArray:
-        """Return how far each candidate suppresses weaker ones, working pixels."""
+    def reach_px(self, spacing: FloatArray) -> FloatArray:
+        """Return how far candidates with this spacing suppress weaker ones, working pixels."""
         low, high = self.spacing_px
-        return np.clip(self.spacing_share * self.spacing.evaluate(measured), low, high)
+        return np.clip(self.spacing_share * spacing, low, high)
 
-    def confidence(self, score: FloatArray) -> FloatArray:
-        """Return the probability that a detection with this score is a tree."""
+    def confidence(self, decision: FloatArray) -> FloatArray:
+        """Return the probability that a detection with this decision is a tree."""
         slope, offset = self.calibration
-        return 1 / (1 + np.exp(-np.clip(slope * score + offset, -30, 30)))
+        return 1 / (1 + np.exp(-np.clip(slope * decision + offset, -30, 30)))
 
 
 @cache

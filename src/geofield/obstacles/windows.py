@@ -2,7 +2,8 @@
 
 Everything that is measured at a candidate comes from less than the overlap around it, and
 windows start at multiples of the coarsest grid used inside, so that a window gives the same
-figures as the whole picture away from the picture's own borders. A window decides over its
+figures as the whole picture away from the picture's own borders. Where shade falls is found
+once, for the whole picture. A window decides over its
 overlap too but keeps its core, so neighbours agree on what lies at their common border.
 """
 
@@ -21,9 +22,11 @@ from geofield.model.field import Field
 from geofield.model.scene import Scene
 from geofield.obstacles.auto import (
     Trees,
+    cheap_measures,
     decide,
     measure,
     picture_channels,
+    shade_of,
 )
 from geofield.obstacles.channels import Variant
 from geofield.obstacles.checks import disc_means, inside
@@ -38,6 +41,9 @@ OVERLAP_PX = 128
 """More than twice the window of the background median and its deviation."""
 _ALIGN_PX = 16
 _OVERVIEW_PX = 1024
+_SHADE_PLACES = 4
+_SHADE_PLACE_PX = 512
+"""Where shade falls is found at so many places, working pixels."""
 Polarity = Literal["dark", "bright", "both"]
 
 
@@ -132,6 +138,36 @@ def windows_over(
             yield Window(c0, r0, c1 - c0, r1 - r0, (x0, y0, x1, y1))
 
 
+def common_shade(
+    picture: Picture,
+    field: Field | None,
+    verifier: Verifier,
+    factor: float,
+    scaling: tuple[float, float] | None = None,
+) -> complex:
+    """Return the votes on where shade falls, from a few places whatever the windows are."""
+    windows = list(windows_over(picture.grid, field, factor))
+    places = [(w.col, w.row, w.width, w.height) for w in windows]
+    if len(windows) > 1:
+        step = max(len(windows) // _SHADE_PLACES, 1)
+        places = [_middle(w.core, factor) for w in windows[step // 2 :: step][:_SHADE_PLACES]]
+    votes = 0j
+    for place in places:
+        part = part_of(picture, place, scaling)
+        working = working_picture(part, part.valid, factor)
+        cheap = cheap_measures(picture_channels(working.luma, working.rgb, working.nir))
+        votes += shade_of(cheap, verifier.gate.evaluate(cheap.table))
+    return votes
+
+
+def _middle(core: tuple[float, float, float, float], factor: float) -> tuple[int, int, int, int]:
+    """Return the middle of a window's core (column, row, width, height)."""
+    x0, y0, x1, y1 = core
+    width = max(int(min(x1 - x0, _SHADE_PLACE_PX * factor)), 1)
+    height = max(int(min(y1 - y0, _SHADE_PLACE_PX * factor)), 1)
+    return int((x0 + x1 - width) / 2), int((y0 + y1 - height) / 2), width, height
+
+
 def _aligned(start_px: float, factor: float) -> int:
     """Return a start (working pixels) as scene pixels, on a block of the coarsest grid."""
     block = max(int(np.floor(start_px / _ALIGN_PX)), 0) * _ALIGN_PX
@@ -176,12 +212,16 @@ def detect_trees(
     """
     parts: list[FloatArray] = []
     todo = list(windows_over(picture.grid, field, factor, core_px))
+    # One window sees for itself.
+    shade = None
+    if len(todo) > 1:
+        shade = common_shade(picture, field, verifier, factor, scaling)
     for done, window in enumerate(todo):
         part = part_of(picture, (window.col, window.row, window.width, window.height), scaling)
         region = search_region(part, field)
         if region.any():
             parts.append(
-                _in_window(part, region, window, verifier, factor, min_confidence, polarity)
+                _in_window(part, region, window, verifier, factor, min_confidence, polarity, shade)
             )
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
@@ -200,11 +240,12 @@ def _in_window(
     factor: float,
     min_confidence: float,
     polarity: Polarity,
+    shade: complex | None,
 ) -> FloatArray:
     """Return the trees of a window's core: x, y, radius, confidence, reach."""
     picture = working_picture(part, region, factor)
     found = picture_channels(picture.luma, picture.rgb, picture.nir)
-    trees = decide(measure(found, verifier, picture.region), verifier, min_confidence)
+    trees = decide(measure(found, verifier, picture.region, shade), verifier, min_confidence)
     x, y = picture.to_scene_px(trees.x_px), picture.to_scene_px(trees.y_px)
     keep = np.ones(len(trees), dtype=bool)
     if polarity != "both":
