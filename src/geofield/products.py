@@ -15,10 +15,10 @@ from typing import Any
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.formats import format_named, write_dataset
-from geofield.formats.atomic import staged_folder
 from geofield.formats.export import dropped
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
+from geofield.staging import staged_folder
 
 SCENE_FILE = "scene.tif"
 MAP_FILE = "map.png"

@@ -10,9 +10,10 @@ import sqlite3
 import pytest
 import shapely
 
+import geofield.staging as staging_module
 from geofield.errors import FormatError, FormatWarning, OutputExistsError
-from geofield.formats import FORMATS, atomic, detect, format_named, read_dataset, write_dataset
-from geofield.formats.atomic import staged_file, staged_folder
+from geofield.formats import FORMATS, detect, format_named, read_dataset, write_dataset
+from geofield.staging import staged_file, staged_folder
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*cannot carry.*:geofield.errors.FormatWarning")
 
@@ -62,14 +63,14 @@ def test_one_failing_format_leaves_nothing(dataset, tmp_path):
 def test_a_failed_move_puts_everything_back(dataset, tmp_path, monkeypatch):
     for name in ("a", "b", "c"):
         (tmp_path / name).write_text(f"old {name}")
-    keep = atomic._keep
+    keep = staging_module._keep
 
     def failing(place, kept):
         if place.name == "c":
             raise OSError(errno.ENOSPC, "No space left on device", str(place))
         keep(place, kept)
 
-    monkeypatch.setattr(atomic, "_keep", failing)
+    monkeypatch.setattr(staging_module, "_keep", failing)
 
     def work():
         with staged_folder(tmp_path, overwrite=True) as staging:
@@ -132,7 +133,7 @@ def test_read_only_folder(dataset, tmp_path, monkeypatch):
         # Not by permissions: the tests may run as root, who may write everywhere.
         raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path))
 
-    monkeypatch.setattr(atomic.tempfile, "mkdtemp", refused)
+    monkeypatch.setattr(staging_module.tempfile, "mkdtemp", refused)
     with pytest.raises(FormatError, match="cannot be written"):
         write_dataset(dataset, tmp_path, ["gpkg"])
     with pytest.raises(FormatError, match="cannot be written"):

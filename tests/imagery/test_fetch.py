@@ -623,6 +623,6 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Staging, "fill", full)
-    with serving() as server, pytest.raises(Exception, match="free space"):
+    with serving() as server, pytest.raises(Exception, match="disk is full"):
         acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)
     assert list(tmp_path.iterdir()) == []

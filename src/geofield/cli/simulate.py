@@ -100,8 +100,8 @@ def simulate(
 
     The truth has the layers field and obstacles, as `geofield evaluate` reads them.
     """
-    from geofield.formats.atomic import staged_folder
     from geofield.simulate import SimulationSettings, simulate_fields
+    from geofield.staging import staged_folder
 
     settings = SimulationSettings(
         width_px=size_px,

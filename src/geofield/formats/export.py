@@ -11,9 +11,9 @@ from typing import Any
 import shapely
 
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.atomic import staged_folder
 from geofield.formats.registry import Format, format_named
 from geofield.model import Dataset
+from geofield.staging import staged_folder
 
 
 def write_dataset(

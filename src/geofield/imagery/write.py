@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -19,6 +17,7 @@ from geofield.errors import FormatError, OutputExistsError
 from geofield.imagery.gdal import gdal_env, to_rasterio
 from geofield.imagery.tags import tags_of
 from geofield.model.scene import Scene
+from geofield.staging import staged_file
 
 #: Creation options of GDAL's COG driver.
 COG_OPTIONS: dict[str, Any] = {
@@ -96,34 +95,26 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
 
 @contextmanager
 def replacing(path: str | Path, *, overwrite: bool) -> Iterator[Path]:
-    """A temporary file beside the target that takes its place when all went well."""
+    """A path to write a picture at, which takes its place when all went well.
+
+    What is there already is refused at once, not after the work.
+    """
     target = Path(path)
+    if not target.parent.is_dir():
+        raise FormatError(
+            f"{target} cannot be written.",
+            hint="Check that the folder exists and that you may write there.",
+        )
+    if target.is_dir():
+        raise FormatError(f"{target} is a folder.", hint="Give the name of a file.")
     if target.exists() and not overwrite:
         raise OutputExistsError(
             f"{target} exists already.", hint="Choose another name, or say --overwrite."
         )
-    if target.is_dir():
-        raise FormatError(f"{target} is a folder.", hint="Give the name of a file.")
     try:
-        with NamedTemporaryFile(
-            dir=target.parent, prefix=f".{target.name}.", suffix=".part.tif", delete=False
-        ) as handle:
-            temporary = Path(handle.name)
-    except OSError as error:
-        raise FormatError(
-            f"{target} cannot be written: {error.strerror}.",
-            hint="Check that the folder exists and that you may write there.",
-        ) from None
-    try:
-        yield temporary
-        # Readable like any other new file, not only by its owner.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(target)
-    except (RasterioError, OSError) as error:
+        with staged_file(target, overwrite=overwrite) as temporary:
+            yield temporary
+    except RasterioError as error:
         raise FormatError(
             f"{target} cannot be written: {error}.", hint="Check the free space on the disk."
         ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
