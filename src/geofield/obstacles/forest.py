@@ -99,14 +99,17 @@ class Forest:
 
 def _sum(trees: Sequence[Tree], columns: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the sum of trees for candidates, an array (features, candidates)."""
-    total = np.zeros(columns.shape[1])
+    count = columns.shape[1]
+    total = np.zeros(count)
+    right, ruled_out = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.uint32)
     for tree in trees:
-        possible = np.full(total.size, _ALL, dtype=np.uint32)
+        dropped = np.zeros(count, dtype=np.uint32)
         for feature, threshold, drop in zip(tree.feature, tree.threshold, ~tree.keep, strict=True):
+            np.greater(columns[feature], threshold, out=right)
             # What is dropped times whether it goes right: far quicker than a choice.
-            possible &= ~(~(columns[feature] <= threshold) * drop)
-        # The lowest bit that is set: as many as there are unset ones below it.
-        total += tree.leaf[np.bitwise_count(~possible & (possible - np.uint32(1)))]
+            dropped |= np.multiply(right, drop, out=ruled_out)
+        # The lowest leaf that is left: as many as were dropped below it.
+        total += tree.leaf[np.bitwise_count(dropped & ~(dropped + np.uint32(1)))]
     return total
 
 
