@@ -1,12 +1,12 @@
-"""Learn the weights with which `auto` chooses a region; says how well they do elsewhere.
+"""Learn the curves with which `auto` scores outlines; says how well they do elsewhere.
 
-    python benchmarks/field_choice.py [--fields 24] [--write]
+    python benchmarks/field_choice.py [--fields 24] [--cache FILE] [--write]
 
 Learned from simulated fields (other seeds than those of `benchmarks/field.py`), the real
-fields of `field_truth.csv` and 20 more that were digitised by eye for this purpose
-(`field_labels.csv` here; pictures beside the project). The weights maximise the expected
-overlap under a softmax over each chain's candidates. "Left out" figures come from weights
-that never saw the site.
+fields of `field_truth.csv` and 35 more that were digitised by eye for this purpose
+(`field_labels.csv` here; pictures beside the project), each with and without near infrared.
+The curves make the beliefs over a picture's outlines as likely as their overlaps with the
+truth say. "Left out" figures come from curves that never saw the site.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ import csv
 import json
 import math
 import os
+import pickle
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,157 +28,310 @@ from rasterio.features import rasterize
 from scipy.optimize import minimize
 
 from geofield.field import auto, choice
-from geofield.field.evidence import channels, gradient, whiten
-from geofield.field.hierarchy import merge
-from geofield.field.superpixels import borders, superpixels
 from geofield.imagery import read_scene
 from geofield.model import Scene
-from geofield.simulate import simulate_fields
+from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
 HERE = Path(__file__).parent
 SHARED = Path(os.environ.get("GEOFIELD_SHARED", HERE.parents[1] / "shared"))
-WEIGHTS = Path(choice.__file__).parent / "choice_weights.py"
+TABLE = Path(choice.__file__).parent / "tables" / "outline.json"
 SIMULATION_SEED = 11
-#: Strength of the pull towards zero.
-RIDGE = 3e-4
-#: A choice this much worse than the best candidate costs half as much again.
-BAD = 0.08
+#: Simulated small fields full of trees, which tear outlines.
+CROWDED_SEED, CROWDED_PX, CROWNS = 9000, 480, (10, 60)
+#: Pull towards zero.
+RIDGE = 3e-3
+#: How much likelier an outline is believed to be for its overlap; less than half is nothing.
+SHARPNESS, WORST = 60.0, 0.5
+#: Weight of a simulated picture against a real one.
+SIMULATED = 0.35
+FOLDS = 8
 
-Case = tuple[str, Scene, float, float, shapely.Polygon]
+
+@dataclass
+class Case:
+    """A picture, a seed and the truth."""
+
+    name: str
+    site: str
+    scene: Scene
+    x_px: float
+    y_px: float
+    truth: shapely.Polygon
+
+
+@dataclass
+class Examples:
+    """Outlines of a case: figures (outlines, names), overlaps with the truth, polygons."""
+
+    name: str
+    site: str
+    figures: np.ndarray
+    overlap: np.ndarray
+    polygons: np.ndarray
+
+    @property
+    def real(self) -> bool:
+        """Whether the picture is no simulation."""
+        return not self.site.startswith("simulated")
+
+
+def colours(scene: Scene) -> Scene:
+    """The scene without its near infrared."""
+    return replace(scene, bands=scene.bands[:3], roles=scene.roles[:3])
+
+
+def grey(scene: Scene) -> Scene:
+    """The scene without its colours."""
+    band = np.clip(np.rint(scene.grey), 0, 255).astype(np.uint8)
+    return replace(scene, bands=band[None], roles=("grey",))
 
 
 def labelled() -> Iterator[Case]:
     data = SHARED / "data"
+    if not (data / "trees").is_dir():
+        return
     tables = [(data / "trees" / "field_truth.csv", "trees"), (HERE / "field_labels.csv", None)]
     for table, folder in tables:
-        if not (data / "trees").is_dir():
-            return
         with table.open(newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 scene = read_scene(data / (folder or row["folder"]) / f"{row['image']}.tif")
-                place, _, site = row["image"].rpartition("_")
-                site = f"{place.rpartition('_')[0]} {site}"
+                place, _, number = row["image"].rpartition("_")
+                site = f"{place.rpartition('_')[0]} {number}"
                 truth = shapely.Polygon(json.loads(row["polygon_px"]))
-                yield site, scene, float(row["seed_x_px"]), float(row["seed_y_px"]), truth
+                x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
+                mark = "truth" if folder else "own"
+                yield Case(f"{mark} {row['image']} ({x:.0f}, {y:.0f})", site, scene, x, y, truth)
 
 
 def simulated(count: int) -> Iterator[Case]:
-    for index, one in enumerate(simulate_fields(count, SIMULATION_SEED)):
-        x, y = one.scene.grid.from_lonlat(one.lon, one.lat)
-        yield f"simulated {index % 4}", one.scene, x, y, one.field.polygon_px(one.scene.grid)
+    rng = np.random.default_rng(CROWDED_SEED)
+    crowded = (
+        simulate_field(
+            CROWDED_SEED + index,
+            SimulationSettings(
+                width_px=CROWDED_PX,
+                height_px=CROWDED_PX,
+                obstacles=int(rng.integers(*CROWNS)),
+                equal_brightness=index % 3 == 0,
+            ),
+        )
+        for index in range(count)
+    )
+    plain = simulate_fields(count, SIMULATION_SEED)
+    for kind, fields in (("plain", plain), ("crowded", crowded)):
+        for index, one in enumerate(fields):
+            x, y = one.scene.grid.from_lonlat(one.lon, one.lat)
+            truth = one.field.polygon_px(one.scene.grid)
+            site = f"simulated {index % 4}"
+            yield Case(f"{kind} {index}", site, one.scene, x, y, truth)
 
 
-def more_seeds(case: Case, count: int, rng: np.random.Generator) -> Iterator[Case]:
-    site, scene, *_, truth = case
-    yield case
-    row, column = np.nonzero(rasterize([(truth.buffer(-5), 1)], scene.grid.shape))
-    for at in rng.integers(0, len(row), count):
-        yield site, scene, column[at] + 0.5, row[at] + 0.5, truth
+def cases(fields: int) -> Iterator[Case]:
+    """All cases: two seeds each, near infrared also left out, once also colour."""
+    rng = np.random.default_rng(0)
+    for case in labelled():
+        for one in (case, reseeded(case, rng)):
+            yield one
+            yield replace(one, name=f"{one.name} rgb", scene=colours(one.scene))
+        yield replace(case, name=f"{case.name} grey", scene=grey(case.scene))
+    for index, case in enumerate(simulated(fields)):
+        yield case
+        other = reseeded(case, rng)
+        yield replace(other, scene=colours(other.scene)) if index % 2 else other
 
 
-def measured(case: Case) -> tuple[np.ndarray, np.ndarray] | None:
-    """Candidates' features and overlaps."""
-    _, scene, x, y, truth = case
-    factor = max(1, math.ceil(max(scene.grid.shape) / auto.COARSE_PX))
-    seed = (x / factor, y / factor)
-    stack = whiten(channels(scene, factor), seed)
-    labels = superpixels(gradient(stack), auto.STEP_PX)
-    count = int(labels.max()) + 1
-    lines = borders(labels, stack)
-    pairs = lines.pairs(count)
-    tree = merge(np.bincount(labels.ravel(), minlength=count).astype(float), *pairs)
-    found = choice.candidates(labels, tree, lines, pairs, auto.footing(labels, tree, seed))
+def reseeded(case: Case, rng: np.random.Generator) -> Case:
+    row, column = np.nonzero(rasterize([(case.truth.buffer(-5), 1)], case.scene.grid.shape))
+    at = int(rng.integers(len(row)))
+    return replace(case, name=f"{case.name} moved", x_px=column[at] + 0.5, y_px=row[at] + 0.5)
+
+
+def examples(case: Case, rng: np.random.Generator, curves: choice.Curves | None) -> Examples | None:
+    """Outlines that a search may meet: good ones, random ones, and what it now takes for good."""
+    factor = auto.reduction(case.scene)
+    seed = (case.x_px / factor, case.y_px / factor)
+    surface, regions, ground = auto.prepared(case.scene, factor, seed)
+    truth = shapely.transform(case.truth, lambda c: c / factor)
+    found = choice.first_outlines(surface, regions, None)
     if not found:
         return None
-    reduced = shapely.transform(truth, lambda c: c / factor)
-    true = rasterize([(reduced, 1)], labels.shape).astype(bool)
-    overlap = [(one.mask & true).sum() / (one.mask | true).sum() for one in found]
-    seams, own = choice.features(found)
-    before = np.vstack([np.zeros(seams.shape[1]), np.cumsum(seams, axis=0)[:-1]])
-    return np.hstack([before, own]), np.array(overlap)
+    overlap = [_overlap(one.polygon, truth) for one in found]
+    tried: set[int] = set()
+    for _ in range(3):
+        order = np.argsort(overlap)[::-1]
+        chosen = {*order[:2].tolist(), *rng.choice(order[: 2 + len(order) // 2], 2).tolist()}
+        if curves is not None:
+            score = curves.score(np.array([one.figures for one in found]))
+            chosen |= set(np.argsort(-score)[:3].tolist())
+        for at in sorted(chosen - tried):
+            tried.add(at)
+            more = choice.redrawn_outlines(surface, found[at], ground)
+            for one in (more[k] for k in rng.permutation(len(more))[:25]):
+                found.append(one)
+                overlap.append(_overlap(one.polygon, truth))
+    figures = np.array([one.figures for one in found], np.float32)
+    polygons = np.array([one.polygon for one in found])
+    return Examples(case.name, case.site, figures, np.array(overlap), polygons)
 
 
-def learn(
-    cases: list[tuple[np.ndarray, np.ndarray]], sites: list[str], tries: int = 3
-) -> np.ndarray:
-    # Every site counts the same, however many pictures and seeds it has.
-    often = Counter(sites)
-    share = np.array([(3.0 if s.startswith("sim") else 1.0) / often[s] for s in sites])
+def _overlap(one: shapely.Polygon, other: shapely.Polygon) -> float:
+    common = one.intersection(other).area
+    return common / (one.area + other.area - common)
+
+
+def learn(known: list[Examples]) -> choice.Curves:
+    """Curves under which beliefs follow overlaps (cross entropy, ridge; convex)."""
+    every = np.concatenate([one.figures for one in known]).astype(float)
+    usual, spread = every.mean(axis=0), every.std(axis=0) + 1e-9
+    # A site counts by the root of its pictures: years and seeds of one site are much alike.
+    often = Counter(one.site for one in known)
+    share = np.array([(1 if one.real else SIMULATED) / often[one.site] ** 0.5 for one in known])
     share /= share.sum()
+    bent, wanted = [], []
+    for one in known:
+        parts = choice.bends((one.figures - usual) / spread)
+        bent.append(np.concatenate(list(parts), axis=1))
+        regret = np.minimum(one.overlap.max() - one.overlap, WORST)
+        belief = np.exp(-SHARPNESS * regret)
+        wanted.append(belief / belief.sum())
 
-    def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
-        total, slope = 0.0, np.zeros_like(weights)
-        for part, (features, overlap) in zip(share, cases, strict=True):
-            score = features @ weights
-            belief = np.exp(score - score.max())
-            belief /= belief.sum()
-            worth = overlap - 0.5 * np.maximum(0, overlap.max() - BAD - overlap)
-            mean = belief @ worth
-            total -= part * mean
-            slope -= part * (belief * (worth - mean)) @ features
-        return total + RIDGE * weights @ weights, slope + 2 * RIDGE * weights
+    def loss(slope: np.ndarray) -> tuple[float, np.ndarray]:
+        total, gradient = RIDGE * float(slope @ slope), 2 * RIDGE * slope
+        for weight, figures, target in zip(share, bent, wanted, strict=True):
+            score = figures @ slope
+            score -= score.max()
+            belief = np.exp(score)
+            mass = belief.sum()
+            total += weight * (math.log(mass) - float(target @ score))
+            gradient = gradient + weight * (figures.T @ (belief / mass - target))
+        return total, gradient
 
-    found = [
-        minimize(
-            loss,
-            np.random.default_rng(start).normal(0, 0.5, cases[0][0].shape[1]),
-            jac=True,
-            method="L-BFGS-B",
+    size = bent[0].shape[1]
+    found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": 400})
+    return choice.Curves(usual, spread, found.x.reshape(3, -1))
+
+
+def left_out(known: list[Examples]) -> tuple[np.ndarray, np.ndarray]:
+    """Overlap of each case's chosen outline, expected and true, its site not learned from."""
+    sites = sorted({one.site for one in known})
+    order = np.random.default_rng(1).permutation(len(sites))
+    fold = {site: int(at) % FOLDS for site, at in zip(sites, order, strict=True)}
+    expected, true = np.zeros(len(known)), np.zeros(len(known))
+    for number in range(FOLDS):
+        rest = learn([one for one in known if fold[one.site] != number])
+        for at, one in enumerate(known):
+            if fold[one.site] == number:
+                expected[at], true[at] = chosen(one, rest)
+    return expected, true
+
+
+def chosen(one: Examples, curves: choice.Curves) -> tuple[float, float]:
+    score = curves.score(one.figures.astype(float))
+    order = np.argsort(-score)
+    best, expected = choice.choose(one.polygons[order], score[order])
+    return expected, float(one.overlap[order[best]])
+
+
+def trusting(expected: np.ndarray, true: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """The logistic curve from expected overlap to the share of good outlines."""
+    z = np.column_stack([choice.odds(expected), np.ones_like(expected)])
+    good = true >= choice.GOOD
+
+    def loss(line: np.ndarray) -> float:
+        odds = z @ line
+        return float(weight @ (np.logaddexp(0, odds) - good * odds)) + 1e-3 * float(line @ line)
+
+    slope, offset = minimize(loss, np.array([1.0, 0.0])).x
+    return float(slope), float(offset)
+
+
+def report(known: list[Examples], curves: choice.Curves) -> choice.Curves:
+    """Print how well outlines are chosen; returns the curves with what their doubt is worth."""
+    expected, away = left_out(known)
+    print("| cases | best outline | chosen | chosen, site left out | worst |")
+    print("|---|---|---|---|---|")
+    for mark in ("truth", "own", "plain", "crowded"):
+        for bands in ("", " rgb", " grey"):
+            at = [
+                i
+                for i, one in enumerate(known)
+                if one.name.startswith(mark) and _bands(one.name) == bands
+            ]
+            if not at:
+                continue
+            best = np.mean([known[i].overlap.max() for i in at])
+            taken = np.mean([chosen(known[i], curves)[1] for i in at])
+            print(
+                f"| {mark}{bands} ({len(at)}) | {best:.3f} "
+                f"| {taken:.3f} | {away[at].mean():.3f} | {away[at].min():.3f} |"
+            )
+
+    real = np.array([one.real for one in known])
+    weight = np.where(real, 1.0, 0.15)
+    curves = replace(curves, trust=trusting(expected, away, weight))
+    certain = np.array([curves.certainty(value) for value in expected])
+    print("\n| certainty (real, left out) | cases | mean | share good | mean overlap |")
+    print("|---|---|---|---|---|")
+    for low, high in ((0, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.85), (0.85, 1.01)):
+        at = real & (certain >= low) & (certain < high)
+        if at.any():
+            print(
+                f"| {low} to {min(high, 1)} | {at.sum()} | {certain[at].mean():.2f} "
+                f"| {np.mean(away[at] >= choice.GOOD):.2f} | {away[at].mean():.3f} |"
+            )
+    return curves
+
+
+def _bands(name: str) -> str:
+    return next((end for end in (" rgb", " grey") if name.endswith(end)), "")
+
+
+def write(curves: choice.Curves) -> None:
+    rows = [
+        json.dumps(
+            {
+                "name": name,
+                "usual": round(float(usual), 4),
+                "spread": round(float(spread), 4),
+                "slope": round(float(slope), 4),
+                "above": round(float(above), 4),
+                "below": round(float(below), 4),
+            }
         )
-        for start in range(tries)
+        for name, usual, spread, (slope, above, below) in zip(
+            choice.NAMES, curves.usual, curves.spread, curves.slope.T, strict=True
+        )
     ]
-    return min(found, key=lambda one: one.fun).x
-
-
-def picked(case: tuple[np.ndarray, np.ndarray], weights: np.ndarray) -> float:
-    return float(case[1][np.argmax(case[0] @ weights)])
+    trust = [round(value, 4) for value in curves.trust]
+    text = f'{{"learned_by": "benchmarks/field_choice.py", "trust": {trust}, "figures": [\n'
+    TABLE.parent.mkdir(exist_ok=True)
+    TABLE.write_text(text + ",\n".join(rows) + "\n]}\n", encoding="utf-8")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--fields", type=int, default=24, help="simulated fields")
-    parser.add_argument("--write", action="store_true", help="write choice_weights.py")
+    parser.add_argument("--fields", type=int, default=24, help="simulated fields of each kind")
+    parser.add_argument("--cache", type=Path, help="keep the examples in this file")
+    parser.add_argument("--afresh", action="store_true", help="with no help of the present table")
+    parser.add_argument("--write", action="store_true", help="write tables/outline.json")
     options = parser.parse_args()
-    rng = np.random.default_rng(0)
-    sites, cases = [], []
-    for given, extra in ((labelled(), 3), (simulated(options.fields), 1)):
-        for case in given:
-            for one in more_seeds(case, extra, rng):
-                if (row := measured(one)) is not None:
-                    sites.append(one[0])
-                    cases.append(row)
-    scale = np.concatenate([features for features, _ in cases]).std(axis=0) + 1e-9
-    cases = [(features / scale, overlap) for features, overlap in cases]
-    weights = learn(cases, sites, 6)
-    left_out = np.zeros(len(cases))
-    for site in sorted(set(sites)):
-        kept = [i for i, name in enumerate(sites) if name != site]
-        rest = learn([cases[i] for i in kept], [sites[i] for i in kept], 2)
-        for index in np.flatnonzero(np.array(sites) == site):
-            left_out[index] = picked(cases[index], rest)
-    is_real = np.array([not site.startswith("simulated") for site in sites])
-    print("| cases | best candidate | chosen | chosen, site left out |\n|---|---|---|---|")
-    for name, which in (("real", is_real), ("simulated", ~is_real)):
-        if which.any():
-            at = np.flatnonzero(which)
-            best = np.mean([cases[i][1].max() for i in at])
-            chosen = np.mean([picked(cases[i], weights) for i in at])
-            print(f"| {name} ({len(at)}) | {best:.3f} | {chosen:.3f} | {left_out[at].mean():.3f} |")
+    if options.cache and options.cache.is_file():
+        known = pickle.loads(options.cache.read_bytes())
+    else:
+        rng = np.random.default_rng(2)
+        curves = choice.learned() if TABLE.is_file() and not options.afresh else None
+        known = []
+        for case in cases(options.fields):
+            if (one := examples(case, rng, curves)) is not None:
+                known.append(one)
+            if len(known) % 20 == 0:
+                print(f"{len(known)} cases", flush=True)
+        if options.cache:
+            options.cache.write_bytes(pickle.dumps(known))
+    curves = learn(known)
+    curves = report(known, curves)
     if options.write:
-        count = len(choice.TOLL_WEIGHTS)
-        parts = np.split(weights / scale, [count])
-        names = (
-            ("Of what the merges so far show.", "TOLL_WEIGHTS"),
-            ("Of the region's own outline.", "OWN_WEIGHTS"),
-        )
-        text = (
-            '"""Weights of the choice of a region, as `benchmarks/field_choice.py` learned '
-            'them."""\n\nimport numpy as np\n'
-        )
-        for (words, name), values in zip(names, parts, strict=True):
-            rows = "".join(f"        {value:.4g},\n" for value in values)
-            text += f"\n#: {words}\n{name} = np.array(\n    [\n{rows}    ]\n)\n"
-        WEIGHTS.write_text(text, encoding="utf-8")
+        write(curves)
 
 
 if __name__ == "__main__":

@@ -1,211 +1,255 @@
-"""Choice: which of the nested regions around the seed is the field.
+"""Choice: which of many outlines around the seed is the field.
 
-Each merge along the chain asks: did this cross a field's border? A long, straight, coherent
-border that stands out of what the region has inside speaks for it; the toll of all merges
-so far, and how the region's own outline looks, are its score. The weights were learned by
-`benchmarks/field_choice.py` on simulated and real fields; all figures are ratios or come in
-units of the surface's own variation, so that they carry over to other pictures.
+The regions around the seed are straightened into outlines, the best of them redrawn along
+their own straight sides, the best of those again. An outline's score is a sum of curves,
+one for each figure that is measured on it: bent twice, so that a figure can count more on
+one side of what is usual than on the other. `benchmarks/field_choice.py` learned them from
+simulated and real fields; `tables/outline.json` lists them.
+
+Scores become beliefs (their exponentials, to add up to one). The outline taken is the one
+with the largest expected overlap with the others under these beliefs.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from itertools import pairwise
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy.special import expit, logit
+from shapely import Polygon
 
-from geofield.field.choice_weights import OWN_WEIGHTS, TOLL_WEIGHTS
-from geofield.field.hierarchy import MergeTree
-from geofield.field.superpixels import Borders
+from geofield.errors import FieldError
+from geofield.field.border import FIGURES, Surface, measure
+from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.regions import TOLLS, Region
+from geofield.field.straight import redrawn
 
-BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
 
-#: Regions below this share of the picture are patches of ground, not fields.
-SMALLEST_SHARE = 0.006
-#: A part below this share of the region joins it without being asked.
-_TRIFLE_SHARE = 0.03
-#: Openings and notches narrower than twice this are no part of an outline, pixels.
-_OPEN_PX, _CLOSE_PX = 5.0, 6.0
+NAMES = (*FIGURES, *(f"toll_{name}" for name in TOLLS))
+"""All figures of an outline: its own, and the tolls of the region it began as."""
+
+#: How far the first outlines may leave their regions' borders, pixels.
+_TOLERANCE_PX = 3.0
+#: So many of the regions' outlines get well fitted sides.
+_FITTED = 10
+#: So many outlines are redrawn, so many times.
+_BREADTH, _ROUNDS = 5, 3
+#: So many of the best are weighed against each other in the end.
+_WEIGHED = 40
+#: An outline with this overlap with the truth is a good one.
+GOOD = 0.85
+#: Where a curve bends, and where it ends, in units of the figure's spread.
+BEND, END = 0.5, 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One region of the chain.
+class Outline:
+    """A possible outline of the field.
 
     Attributes
     ----------
-    mask : bool array
-        Holes filled, tendrils cut, notches closed.
-    holes : bool array
-        What was filled.
-    figures : dict
-        The measures behind its score.
+    polygon : Polygon
+        Pixel coordinates.
+    region : Region
+        The region that it began as.
+    figures : float array (names,)
+        In the order of `NAMES`.
     """
 
-    mask: BoolArray
-    holes: BoolArray
-    figures: dict[str, float]
+    polygon: Polygon
+    region: Region
+    figures: FloatArray
+
+    def figure(self, name: str) -> float:
+        """One of the figures."""
+        return float(self.figures[NAMES.index(name)])
 
 
-def candidates(
-    labels: NDArray[np.int32],
-    tree: MergeTree,
-    lines: Borders,
-    pairs: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
-    seed_px: tuple[float, float],
-) -> list[Candidate]:
-    """The regions around the seed that may be the field, from small to large, measured."""
-    first, second, _, strength = pairs
-    count = tree.leaf_count
-    rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    rim_px = np.bincount(rim, minlength=count).astype(float)
-    chain = tree.chain(int(labels[int(seed_px[1]), int(seed_px[0])]))
-    found: list[Candidate] = []
-    highest = 0.0
-    for region, following in pairwise(chain):
-        parts = tree.parts[following]
-        if parts is None:
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The learned sum of curves.
+
+    Attributes
+    ----------
+    usual, spread : float array (names,)
+        Mean and standard deviation of each figure over the outlines learned from.
+    slope : float array (3, names)
+        Everywhere; above the upper bend; below the lower one.
+    trust : (float, float)
+        From the expected overlap to the probability of a good one, see `certainty`.
+    """
+
+    usual: FloatArray
+    spread: FloatArray
+    slope: FloatArray = field(repr=False)
+    trust: tuple[float, float] = (1.0, 0.0)
+
+    def score(self, figures: FloatArray) -> FloatArray:
+        """Scores of outlines, figures (outlines, names); only differences mean something."""
+        bent = bends((figures - self.usual) / self.spread)
+        return np.asarray(np.einsum("bon,bn->o", bent, self.slope))
+
+    def certainty(self, expected: float) -> float:
+        """Probability that an outline overlaps the truth by `GOOD` or more.
+
+        Parameters
+        ----------
+        expected : float
+            Its expected overlap, see `choose`. A logistic curve in it was fitted to outlines
+            on sites that the scores had not been learned from (J. Platt, 1999).
+        """
+        slope, offset = self.trust
+        return float(expit(slope * odds(expected) + offset))
+
+
+def odds(share: FloatArray | float) -> FloatArray:
+    """Logarithm of the odds of a share, within bounds."""
+    return np.asarray(logit(np.clip(share, 0.01, 0.995)))
+
+
+def bends(standard: FloatArray) -> FloatArray:
+    """Standardised figures as the three parts of a curve, (3, ...)."""
+    standard = np.clip(standard, -END, END)
+    return np.stack([standard, np.maximum(standard - BEND, 0), np.maximum(-standard - BEND, 0)])
+
+
+@cache
+def learned() -> Curves:
+    """The curves of `tables/outline.json`.
+
+    Raises
+    ------
+    FieldError
+        When the table is not of this version's figures.
+    """
+    text = (resources.files(__package__) / "tables" / "outline.json").read_text("utf-8")
+    table = json.loads(text)
+    rows = table["figures"]
+    if tuple(row["name"] for row in rows) != NAMES:
+        raise FieldError(
+            "The table of the outlines' figures is of another version.",
+            hint="Run benchmarks/field_choice.py --write.",
+        )
+    usual, spread = (np.array([row[key] for row in rows]) for key in ("usual", "spread"))
+    slope = np.array([[row[key] for row in rows] for key in ("slope", "above", "below")])
+    return Curves(usual, spread, slope, tuple(table["trust"]))
+
+
+def first_outlines(
+    surface: Surface, regions: Sequence[Region], curves: Curves | None
+) -> list[Outline]:
+    """The regions' own outlines, measured; the best also with well fitted sides.
+
+    Parameters
+    ----------
+    surface : Surface
+    regions : sequence of Region
+    curves : Curves or None
+        They say which are the best; None fits the sides of all.
+    """
+    rough = []
+    for region in regions:
+        rough += _measured(surface, [rough_outline(region.mask)], region)
+    best = list(rough)
+    if curves is not None and rough:
+        score = curves.score(np.array([one.figures for one in rough]))
+        best = [rough[at] for at in np.argsort(-score, kind="stable")[:_FITTED]]
+    found = list(rough)
+    for one in best:
+        try:
+            fitted = straight_outline(one.region.mask, tolerance_px=_TOLERANCE_PX)
+        except FieldError:
             continue
-        other = parts[1] if parts[0] == region else parts[0]
-        size, joins = tree.size_px[region], tree.size_px[other]
-        share = size / labels.size
-        if size < 200 or share < SMALLEST_SHARE or (joins < _TRIFLE_SHARE * size and share < 0.9):
-            continue
-        member = np.zeros(count, bool)
-        member[tree.leaves(region)] = True
-        raw = member[labels]
-        filled: BoolArray = ndimage.binary_fill_holes(raw)
-        inside = np.zeros(count, bool)
-        inside[labels[filled]] = True
-        outline = lines.along(np.where(inside, 1, -1).astype(np.int8))
-        if outline is None:
-            continue
-        side = np.zeros(count, np.int8)
-        side[tree.leaves(other)] = -1
-        side[member] = 1
-        seam = lines.along(side)
-        within = strength[member[first] & member[second]]
-        i50, i80, i95 = np.quantile(within, [0.5, 0.8, 0.95]) if len(within) else (1.0, 1.0, 1.0)
-        frame = float(rim_px[inside].sum())
-        around = outline.length_px + frame
-        mask = tidy(filled, seed_px)
-        straight_strength = outline.strength * outline.straight
-        figures = {
-            "share": float(filled.mean()),
-            "merge": tree.height[following],
-            "highest": highest,
-            "joins": joins / size,
-            "seam": 0.0 if seam is None else float(seam.strength.mean()),
-            "seam_straight": 0.0 if seam is None else float(seam.straight.mean()),
-            "seam_both": 0.0 if seam is None else float((seam.strength * seam.straight).mean()),
-            "i50": max(float(i50), 0.5),
-            "i80": max(float(i80), 0.5),
-            "i95": max(float(i95), 0.5),
-            "outline20": float(np.quantile(outline.strength, 0.2)),
-            "outline50": float(np.quantile(outline.strength, 0.5)),
-            "outline_low": float(np.quantile(straight_strength, 0.25)),
-            "straight": float(outline.straight.mean()),
-            "compact": 4 * math.pi * float(filled.sum()) / around**2,
-            "tidy": _overlap(mask, filled),
-            "frame": frame / around,
-        }
-        highest = max(highest, tree.height[following])
-        found.append(Candidate(mask, filled & ~raw, figures))
+        found += _measured(surface, [Polygon(fitted.exterior)], one.region)
     return found
 
 
-def scores(found: list[Candidate]) -> NDArray[np.float64]:
-    """The score of each candidate; only differences mean something."""
-    seams, own = features(found)
-    toll = np.cumsum(seams @ TOLL_WEIGHTS)
-    before = np.concatenate([[0.0], toll[:-1]])
-    return np.asarray(own @ OWN_WEIGHTS + before)
+def redrawn_outlines(
+    surface: Surface, outline: Outline, seed_px: tuple[float, float]
+) -> list[Outline]:
+    """What an outline suggests, measured."""
+    others = redrawn(outline.polygon, seed_px, surface.shape)
+    return _measured(surface, others, outline.region)
 
 
-def features(found: list[Candidate]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What each candidate's next merge shows, and its own outline, as numbers to weigh."""
-    return (
-        np.array([_seam(one.figures) for one in found]),
-        np.array([_own(one.figures) for one in found]),
-    )
+def _measured(surface: Surface, polygons: Sequence[Polygon], region: Region) -> list[Outline]:
+    found = []
+    for polygon in polygons:
+        if polygon.is_empty or not polygon.is_valid:
+            continue
+        if (figures := measure(surface, polygon)) is not None:
+            found.append(Outline(polygon, region, np.concatenate([figures, region.toll])))
+    return found
 
 
-def certainty(found: list[Candidate], score: NDArray[np.float64], best: int) -> float:
-    """Share of the belief that rests on outlines like the chosen one (overlap above 0.85)."""
-    belief = np.exp(score - score.max())
-    alike = np.array([_overlap(one.mask, found[best].mask) > 0.85 for one in found])
-    return float(belief[alike].sum() / belief.sum())
+def search(
+    surface: Surface,
+    regions: Sequence[Region],
+    seed_px: tuple[float, float],
+    curves: Curves | None = None,
+) -> tuple[list[Outline], FloatArray]:
+    """Outlines around the seed and their scores, the best first.
+
+    Parameters
+    ----------
+    surface : Surface
+    regions : sequence of Region
+    seed_px : (float, float)
+        Pixel coordinates of the surface.
+    curves : Curves, optional
+        The learned ones when None.
+    """
+    curves = curves or learned()
+    found = first_outlines(surface, regions, curves)
+    if not found:
+        return [], np.zeros(0)
+    score = curves.score(np.array([one.figures for one in found]))
+    tried: set[int] = set()
+    known = {_key(one.polygon) for one in found}
+    for _ in range(_ROUNDS):
+        best = [at for at in np.argsort(-score)[:_BREADTH].tolist() if at not in tried]
+        more: list[Outline] = []
+        for at in best:
+            tried.add(at)
+            for one in redrawn_outlines(surface, found[at], seed_px):
+                if (key := _key(one.polygon)) not in known:
+                    known.add(key)
+                    more.append(one)
+        if not more:
+            break
+        found += more
+        score = np.concatenate([score, curves.score(np.array([one.figures for one in more]))])
+    order = np.argsort(-score, kind="stable")
+    return [found[at] for at in order], score[order]
 
 
-def _seam(f: dict[str, float]) -> list[float]:
-    """What a merge shows, weighted by how much joins."""
-    seam, merge = math.log(f["seam"] + 0.3), math.log(f["merge"] + 0.3)
-    both = math.log(f["seam_both"] + 0.3)
-    i50, i80 = math.log(f["i50"]), math.log(f["i80"])
-    weight = math.sqrt(min(1.0, f["joins"] / 0.15))
-    values = [
-        1.0,
-        seam,
-        merge,
-        both,
-        f["seam_straight"],
-        i50,
-        i80,
-        max(seam - 1.0, 0.0),
-        max(merge - i80 - 0.6, 0.0),
-        max(both - 0.5, 0.0),
-        math.log(f["share"] + 0.003),
-        max(math.log(f["highest"] + 0.3) - i80 - 0.6, 0.0),
-        max(seam - i50 - 0.7, 0.0),
-        math.log(f["i95"]),
-    ]
-    return [weight * value for value in values]
+def _key(polygon: Polygon) -> tuple[float, ...]:
+    x, y = polygon.centroid.coords[0]
+    return round(polygon.area, 0), round(x, 1), round(y, 1)
 
 
-def _own(f: dict[str, float]) -> list[float]:
-    """What a region's own outline shows."""
-    return [
-        f["straight"],
-        math.log(f["outline20"] + 0.3),
-        math.log(max(f["compact"], 0.02)),
-        float(f["share"] > 0.93),
-        f["tidy"],
-        math.log(f["outline_low"] + 0.2),
-    ]
+def choose(polygons: Sequence[Polygon], score: FloatArray) -> tuple[int, float]:
+    """The outline with the largest expected overlap with the truth, and that overlap.
 
-
-def tidy(mask: BoolArray, seed_px: tuple[float, float]) -> BoolArray:
-    """A mask without tendrils and notches: opened, the part at the seed, closed, filled."""
-    opened = _grown(_shrunk(mask, _OPEN_PX), _OPEN_PX)
-    labels, count = ndimage.label(opened)
-    if count == 0:
-        return mask
-    number = labels[int(seed_px[1]), int(seed_px[0])]
-    if number == 0:
-        number = 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
-    part = labels == number
-    closed = _shrunk(_grown(part, _CLOSE_PX), _CLOSE_PX)
-    filled: BoolArray = ndimage.binary_fill_holes(closed | part)
-    return filled
-
-
-def _shrunk(mask: BoolArray, radius: float) -> BoolArray:
-    """Erosion by a disc; the picture's edge does not erode."""
-    if mask.all():
-        return mask
-    distance = ndimage.distance_transform_edt(mask)
-    return np.asarray(distance > radius)
-
-
-def _grown(mask: BoolArray, radius: float) -> BoolArray:
-    if not mask.any():
-        return mask
-    return np.asarray(ndimage.distance_transform_edt(~mask) <= radius)
-
-
-def _overlap(a: BoolArray, b: BoolArray) -> float:
-    union = int((a | b).sum())
-    return float((a & b).sum()) / union if union else 0.0
+    Parameters
+    ----------
+    polygons : sequence of Polygon
+        The best scored first, as `search` gives them.
+    score : float array
+    """
+    weighed = np.array(polygons[:_WEIGHED])
+    belief = np.exp(score[: len(weighed)] - score[0])
+    belief /= belief.sum()
+    common = shapely.area(shapely.intersection(weighed[:, None], weighed[None]))
+    area = shapely.area(weighed)
+    overlap = common / (area[:, None] + area - common)
+    expected = overlap @ belief
+    best = int(np.argmax(expected))
+    return best, float(expected[best])

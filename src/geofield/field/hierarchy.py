@@ -7,11 +7,14 @@ the mean border strength as the height of a merge).
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 #: Regions below this size merge as if their border were weaker: specks are no parts.
 _SPECK_PX = 150.0
@@ -19,7 +22,7 @@ _SPECK_PX = 150.0
 _STANDS_OUT = 8.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class MergeTree:
     """A binary tree over regions; the first `leaf_count` are superpixels.
 
@@ -67,23 +70,24 @@ class MergeTree:
 
     def leaves(self, region: int) -> NDArray[np.int64]:
         """The superpixels of a region."""
-        stack, found = [region], []
-        while stack:
-            one = stack.pop()
-            parts = self.parts[one]
-            if parts is None:
-                found.append(one)
-            else:
-                stack.extend(parts)
-        return np.array(found, np.int64)
+        here = np.array([region], np.int64)
+        found = []
+        while len(here):
+            found.append(here[here < self.leaf_count])
+            here = self._parts[here[here >= self.leaf_count] - self.leaf_count].ravel()
+        return np.concatenate(found)
+
+    @cached_property
+    def _parts(self) -> IntArray:
+        return np.array(self.parts[self.leaf_count :], np.int64).reshape(-1, 2)
 
 
 def merge(
-    sizes: NDArray[np.float64],
-    first: NDArray[np.int64],
-    second: NDArray[np.int64],
-    length: NDArray[np.float64],
-    strength: NDArray[np.float64],
+    sizes: FloatArray,
+    first: IntArray,
+    second: IntArray,
+    length: FloatArray,
+    strength: FloatArray,
 ) -> MergeTree:
     """Merge neighbours, weakest common border first.
 
@@ -95,56 +99,49 @@ def merge(
         Neighbours.
     length, strength : float array
         Of their common border; a longer border's strength is the mean along it.
+
+    Notes
+    -----
+    In each round every pair merges that is weakest for both its regions: rounds of array
+    work instead of a queue of single merges.
     """
     count = len(sizes)
-    neighbours: list[dict[int, tuple[float, float]]] = [{} for _ in range(count)]
-    for a, b, size, value in zip(
-        first.tolist(), second.tolist(), length.tolist(), strength.tolist(), strict=True
-    ):
-        neighbours[a][b] = neighbours[b][a] = (size * value, size)
-    size_px: list[float] = sizes.tolist()
-    parent = [-1] * count
-    height = [0.0] * count
-    parts: list[tuple[int, int] | None] = [None] * count
-    alive = [True] * count
-
-    def cost(a: int, b: int, border: tuple[float, float]) -> float:
-        smaller = min(size_px[a], size_px[b])
-        speck = 1.0 if smaller >= _SPECK_PX else (smaller / _SPECK_PX) ** 0.5
-        return border[0] / border[1] * speck
-
-    queue = [
-        (cost(a, b, border), a, b)
-        for a in range(count)
-        for b, border in neighbours[a].items()
-        if a < b
-    ]
-    heapq.heapify(queue)
-    while queue:
-        value, a, b = heapq.heappop(queue)
-        if not (alive[a] and alive[b]):
-            continue
-        new = len(parent)
-        one, other = neighbours[a], neighbours[b]
-        del one[b], other[a]
-        if len(one) < len(other):
-            one, other = other, one
-        for c, (total, size) in other.items():
-            known = one.get(c)
-            one[c] = (total + known[0], size + known[1]) if known else (total, size)
-        alive[a] = alive[b] = False
-        alive.append(True)
-        parent[a] = parent[b] = new
-        parent.append(-1)
-        height.append(value)
-        parts.append((a, b))
-        size_px.append(size_px[a] + size_px[b])
-        neighbours.append(one)
-        neighbours[a] = neighbours[b] = {}
-        for c, border in one.items():
-            theirs = neighbours[c]
-            theirs.pop(a, None)
-            theirs.pop(b, None)
-            theirs[new] = border
-            heapq.heappush(queue, (cost(c, new, border), c, new))
-    return MergeTree(parent, height, parts, size_px, count)
+    parent = np.full(2 * count - 1, -1)
+    height = np.zeros(2 * count - 1)
+    parts = np.full((2 * count - 1, 2), -1)
+    size_px = np.concatenate([sizes, np.zeros(count - 1)])
+    a, b, total = first, second, length * strength
+    made = count
+    while len(a):
+        speck = np.sqrt(np.minimum(np.minimum(size_px[a], size_px[b]) / _SPECK_PX, 1.0))
+        cost = total / length * speck
+        # Equal costs must not merge one region twice: order decides.
+        rank = np.empty(len(cost), np.int64)
+        rank[np.argsort(cost, kind="stable")] = np.arange(len(cost))
+        best = np.full(made, len(cost))
+        np.minimum.at(best, a, rank)
+        np.minimum.at(best, b, rank)
+        both = np.flatnonzero((best[a] == rank) & (best[b] == rank))
+        both = both[np.argsort(rank[both])]
+        new = made + np.arange(len(both))
+        parts[new, 0], parts[new, 1] = a[both], b[both]
+        parent[a[both]] = parent[b[both]] = new
+        height[new] = cost[both]
+        size_px[new] = size_px[a[both]] + size_px[b[both]]
+        made += len(both)
+        name = np.arange(made)
+        name[a[both]] = name[b[both]] = new
+        one, other = name[a], name[b]
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        apart = low != high
+        keys, index = np.unique(low[apart] * made + high[apart], return_inverse=True)
+        total = np.bincount(index, total[apart], len(keys)).astype(float)
+        length = np.bincount(index, length[apart], len(keys)).astype(float)
+        a, b = keys // made, keys % made
+    return MergeTree(
+        parent[:made].tolist(),
+        height[:made].tolist(),
+        [None] * count + [(int(x), int(y)) for x, y in parts[count:made]],
+        size_px[:made].tolist(),
+        count,
+    )

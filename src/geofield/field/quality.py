@@ -15,6 +15,9 @@ BoolArray = NDArray[np.bool_]
 
 #: A field below this is hardly one, square metres.
 _SMALL_M2 = 400.0
+#: From this score on an outline is used without a warning. The score is the probability of a
+#: good outline, lowered for every reason to doubt it.
+_TRUSTED = 0.6
 
 
 def judge(
@@ -44,7 +47,7 @@ def judge(
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
-    score = min(1.0, 0.3 + measured.get("certainty", 1.0)) - 0.25 * len(reasons)
+    score = measured.get("certainty", 1.0) - 0.1 * len(reasons)
     reasons.extend(strange)
     score -= 0.55 * len(strange)
     if touching > 0.02:
@@ -52,7 +55,7 @@ def judge(
             f"it touches the picture's edge along {touching:.0%} of its length, so the field "
             "may go on outside"
         )
-        score -= min(0.3, touching)
+        score -= min(0.1, touching)
     if covered > 0.95:
         reasons.append("it fills the whole picture")
         score -= 0.6
@@ -70,7 +73,7 @@ def judge(
         *look,
         *found.figures,
     )
-    return FieldQuality(score, tuple(reasons), figures, trusted=score >= 0.5)
+    return FieldQuality(score, tuple(reasons), figures, trusted=score >= _TRUSTED)
 
 
 def edge_share(outline_px: Polygon, width: int, height: int) -> float:

@@ -1,59 +1,176 @@
-"""Refine: carry a coarse mask to finer pixels, its border onto the strongest edge nearby."""
+"""Refine: an outline found in a reduced picture, set onto the borders of the picture itself.
+
+Each side is moved and turned a little, to where the step across it is strongest along most
+of its length; the sides' meetings are the new corners.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from shapely import Polygon
+from shapely.affinity import scale
 
-from geofield.field.evidence import gradient
+from geofield.field.evidence import channels, whiten
+from geofield.field.straight import on_frame, ring
+from geofield.model import Scene
 
 BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
 
-#: Smoothing of the refined mask's border, pixels.
-_SMOOTH_PX = 1.5
+#: How far a side may move at first, pixels; then so many pixels of the coarser picture.
+_REACH_PX, _REACH_COARSE = 2.5, 1.25
+#: Sides below this length move with their neighbours, pixels.
+_MOVED_PX = 10.0
+#: Spacing of the places tried across a side, pixels.
+_FINE_PX = 0.5
+#: Half the distance over which a step is seen, and the smoothing across it, pixels; the
+#: stretch along a side in which it is averaged.
+_ACROSS_PX, _SMOOTH_PX, _ALONG_PX = 1.0, 1.0, 9
+#: How much a side at the end of its reach has to be stronger than one that stays.
+_STAY = 0.2
+#: Sides whose directions differ less (sine) have no well-defined meeting point.
+_PARALLEL = 0.12
 
 
-def enlarge(mask: BoolArray, factor: int, shape: tuple[int, int]) -> BoolArray:
-    """A mask repeated ``factor`` times each way, cut to a shape."""
+def carried(scene: Scene, outline: Polygon, factor: int, seed_px: tuple[float, float]) -> BoolArray:
+    """The pixels of a scene within an outline that was found in its reduced picture.
+
+    Parameters
+    ----------
+    scene : Scene
+    outline : Polygon
+        Pixel coordinates of the reduced picture.
+    factor : int
+        Pixels of the scene along one of the reduced picture.
+    seed_px : (float, float)
+        The point, pixel coordinates of the reduced picture.
+    """
+    size, reach = factor, _REACH_PX
+    while True:
+        stack = whiten(
+            channels(scene, size), (seed_px[0] * factor / size, seed_px[1] * factor / size)
+        )
+        outline = aligned(outline, stack, reach)
+        if size == 1:
+            return within(outline, scene.grid.shape)
+        finer = 1 if size <= 4 else math.ceil(size / 4)
+        ratio = size / finer
+        outline = scale(outline, ratio, ratio, origin=(0, 0))
+        size, reach = finer, _REACH_COARSE * ratio
+
+
+def within(outline: Polygon, shape: tuple[int, int]) -> BoolArray:
+    """The pixels whose centres are in an outline."""
+    from rasterio.features import rasterize
+
+    return np.asarray(rasterize([(outline, 1)], shape, dtype=np.uint8) > 0)
+
+
+def enlarged(mask: BoolArray, factor: int, shape: tuple[int, ...]) -> BoolArray:
+    """A reduced picture's mask at the pixels of the picture itself, cut to its shape."""
     if factor == 1:
         return mask
     large = np.repeat(np.repeat(mask, factor, axis=0), factor, axis=1)
     return np.ascontiguousarray(large[: shape[0], : shape[1]])
 
 
-def snap(mask: BoolArray, stack: NDArray[np.float32], reach_px: float) -> BoolArray:
-    """Move a mask's border to the strongest gradient within a band around it.
+def aligned(outline: Polygon, stack: NDArray[np.float32], reach_px: float) -> Polygon:
+    """An outline with its sides moved onto the strongest border within reach.
 
     Parameters
     ----------
-    mask : bool array (rows, columns)
+    outline : Polygon
+        Pixel coordinates of the stack.
     stack : float32 array (channels, rows, columns)
-        Whitened channels of the same pixels.
+        Whitened channels.
     reach_px : float
-        Half the band's width, pixels.
     """
-    from skimage.segmentation import watershed
+    shape = stack.shape[1], stack.shape[2]
+    start = np.clip(ring(outline), 0, [shape[1], shape[0]])
+    end = np.roll(start, -1, axis=0)
+    framed = on_frame(start, shape, 0.75) & on_frame(end, shape, 0.75)
+    framed &= on_frame(0.5 * (start + end), shape, 0.75)
+    long = (np.hypot(*(end - start).T) >= _MOVED_PX) & ~framed
+    layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
+    sides = [
+        _moved(a, b, layers, reach_px) if moves else (a, b)
+        for a, b, moves in zip(start, end, long, strict=True)
+    ]
+    firm = long | framed
+    corners = []
+    for at in range(len(sides)):
+        before, after = sides[at - 1], sides[at]
+        if firm[at - 1] and firm[at]:
+            corners.append(_meeting(before, after, start[at], 3.0 * reach_px))
+        else:
+            corners.append(before[1] if firm[at - 1] else after[0])
+    polygon = Polygon(np.clip(corners, 0, [shape[1], shape[0]]))
+    return polygon if polygon.is_valid and polygon.area > 0.5 * outline.area else outline
 
-    if mask.all() or not mask.any():
-        return mask
-    rows, columns = (
-        slice(*_range(np.any(mask, axis=a, keepdims=True).ravel(), reach_px)) for a in (1, 0)
-    )
-    part = mask[rows, columns]
-    inner = ndimage.distance_transform_edt(np.pad(part, 1, mode="edge"))[1:-1, 1:-1] > reach_px
-    outer = ndimage.distance_transform_edt(~part) > reach_px
-    if not inner.any() or not outer.any():
-        return mask
-    markers = np.where(inner, 1, np.where(outer, 2, 0)).astype(np.int32)
-    flooded = watershed(gradient(stack[:, rows, columns]), markers) == 1
-    smooth = ndimage.gaussian_filter(flooded.astype(np.float32), _SMOOTH_PX, mode="nearest") > 0.5
-    result = np.zeros_like(mask)
-    result[rows, columns] = smooth
-    return result
+
+def _moved(
+    a: FloatArray, b: FloatArray, layers: NDArray[np.float32], reach_px: float
+) -> tuple[FloatArray, FloatArray]:
+    """A side's ends, each moved across it to where the border is strongest."""
+    import cv2
+
+    length = float(np.hypot(*(b - a)))
+    along = (b - a) / length
+    across = np.array([along[1], -along[0]])
+    count = max(round(length), 2)
+    share = (np.arange(count) + 0.5) / count
+    steps, half = round(reach_px / _FINE_PX), round(_ACROSS_PX / _FINE_PX)
+    away = np.arange(-steps - half, steps + half + 1) * _FINE_PX
+    places = a + share[:, None] * (b - a)
+    at = (places + away[:, None, None] * across - 0.5).astype(np.float32)
+    seen = cv2.remap(
+        layers, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    ).reshape(len(away), count, -1)
+    # Averaged along the side, smoothed across it: the step is largest at its middle.
+    smooth = [
+        cv2.GaussianBlur(
+            cv2.blur(layer, (min(_ALONG_PX, count), 1), borderType=cv2.BORDER_REPLICATE),
+            (1, 0),
+            sigmaX=0.0,
+            sigmaY=_SMOOTH_PX / _FINE_PX,
+            borderType=cv2.BORDER_REPLICATE,
+        )
+        for layer in np.moveaxis(seen, -1, 0)
+    ]
+    step = np.stack([layer[2 * half :] - layer[: -2 * half] for layer in smooth])
+    # The root: one crown on the border does not outweigh the rest of it.
+    strength = np.sqrt(np.sqrt(np.sum(step * step, axis=0)))
+    offsets = np.arange(-steps, steps + 1)
+    stay = 1.0 - _STAY * (offsets / steps) ** 2
+    best, ends = -1.0, (0, 0)
+    columns = np.arange(count)
+    for one in offsets:
+        for other in offsets:
+            rows = np.rint(one + share * (other - one)).astype(int) + steps
+            value = float(strength[rows, columns].mean()) * float(
+                0.5 * (stay[one + steps] + stay[other + steps])
+            )
+            if value > best:
+                best, ends = value, (int(one), int(other))
+    return a + ends[0] * _FINE_PX * across, b + ends[1] * _FINE_PX * across
 
 
-def _range(used: BoolArray, margin: float) -> tuple[int, int]:
-    at = np.flatnonzero(used)
-    extra = int(margin) + 8
-    return max(int(at[0]) - extra, 0), min(int(at[-1]) + 1 + extra, len(used))
+def _meeting(
+    before: tuple[FloatArray, FloatArray],
+    after: tuple[FloatArray, FloatArray],
+    corner: FloatArray,
+    reach_px: float,
+) -> FloatArray:
+    """Where two sides meet, or halfway between their ends."""
+    halfway = 0.5 * (before[1] + after[0])
+    u, v = before[1] - before[0], after[1] - after[0]
+    size = float(np.hypot(*u) * np.hypot(*v))
+    cross = float(u[0] * v[1] - u[1] * v[0])
+    if abs(cross) < _PARALLEL * size:
+        return halfway
+    gap = after[0] - before[0]
+    meeting = before[0] + (gap[0] * v[1] - gap[1] * v[0]) / cross * u
+    return meeting if np.hypot(*(meeting - corner)) <= reach_px else halfway

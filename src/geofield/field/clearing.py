@@ -1,0 +1,98 @@
+"""Clearing: crowns and other small things inside an even surface give way to its look.
+
+A row of crowns has stronger borders than most fields, and would tear a field in two. What
+stands out of its neighbourhood, is small, and has the same ground all around it says nothing
+about where the field ends, and is painted over with that ground. What stands between two
+surfaces stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float32]
+
+#: How far a pixel stands out of the median around it, in units of the surface's variation.
+_STANDS_OUT = 5.0
+#: Side of the square of that median, metres; and the largest thing to paint over.
+_WINDOW_M, _LARGEST_M = 21.0, 45.0
+#: The larger square side of the two below, pixels: smaller ones hold too few pixels.
+_SMALLEST_WINDOW_PX = 9
+#: How even the ground around a thing has to be: four fifths of it lie within this.
+_EVEN = 5.0
+#: Width of the ring that is looked at, pixels, and of the rim that is painted over too.
+_RING_PX, _RIM_PX = 5, 2
+#: Softness of the paint, pixels.
+_SOFT_PX = 3.0
+
+
+def clear(stack: FloatArray, pixel_m: float) -> tuple[FloatArray, BoolArray]:
+    """Channels with small things inside surfaces painted over, and where these are.
+
+    Parameters
+    ----------
+    stack : float32 array (channels, rows, columns)
+        Whitened channels.
+    pixel_m : float
+        Ground size of a pixel, metres.
+
+    Returns
+    -------
+    (float32 array, bool array)
+    """
+    import cv2
+
+    away = _standing_out(stack, pixel_m)
+    things = _inside_surfaces(stack, away, pixel_m)
+    if not things.any():
+        return stack, things
+    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RIM_PX + 1,) * 2)
+    painted = cv2.dilate(things.view(np.uint8), ellipse) > 0
+    at = ndimage.distance_transform_edt(painted, return_distances=False, return_indices=True)
+    near = stack[:, at[0], at[1]]
+    soft = np.stack([cv2.GaussianBlur(layer, (0, 0), _SOFT_PX) for layer in near])
+    return np.where(painted, soft, stack).astype(np.float32), things
+
+
+def _standing_out(stack: FloatArray, pixel_m: float) -> BoolArray:
+    import cv2
+
+    side = max(round(_WINDOW_M / pixel_m) | 1, _SMALLEST_WINDOW_PX)
+    total = np.zeros(stack.shape[1:], np.float32)
+    for layer in stack:
+        # The median filter wants bytes: thirds of a unit are fine enough.
+        middle = float(np.median(layer))
+        levels = np.clip((layer - middle) * 3 + 128, 0, 255).astype(np.uint8)
+        median = (cv2.medianBlur(levels, side).astype(np.float32) - 128) / 3 + middle
+        total += np.square(layer - median)
+    return np.asarray(total > _STANDS_OUT**2)
+
+
+def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> BoolArray:
+    """What is small and has one even surface all around it."""
+    import cv2
+
+    limit = _LARGEST_M / pixel_m
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(away.view(np.uint8), connectivity=4)
+    beside = cv2.dilate(away.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    wide = 2 * (_RING_PX + 1) + 1
+    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+    margin = _RING_PX + 2
+    kept = np.zeros(count, bool)
+    for number in range(1, count):
+        left, top, width, height, area = stats[number]
+        if max(width, height) > limit or area < 3:
+            continue
+        rows = slice(max(top - margin, 0), top + height + margin)
+        columns = slice(max(left - margin, 0), left + width + margin)
+        own = (labels[rows, columns] == number).astype(np.uint8)
+        ring = (cv2.dilate(own, ellipse) > 0) & ~beside[rows, columns]
+        if ring.sum() < 15:
+            continue
+        ground = stack[:, rows, columns][:, ring]
+        distance = np.linalg.norm(ground - np.median(ground, axis=1)[:, None], axis=0)
+        kept[number] = np.quantile(distance, 0.8) < _EVEN
+    return np.asarray(kept[labels])

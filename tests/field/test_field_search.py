@@ -1,0 +1,141 @@
+"""The steps of the default method, each alone: clearing, redrawing, measuring, aligning."""
+
+import json
+from importlib import resources
+
+import numpy as np
+import pytest
+import shapely
+from shapely import Polygon, box
+
+from geofield.field import choice
+from geofield.field.border import FIGURES, Surface, measure
+from geofield.field.clearing import clear
+from geofield.field.refine import aligned
+from geofield.field.regions import partition, regions
+from geofield.field.straight import redrawn
+
+
+def overlap(a, b):
+    return a.intersection(b).area / a.union(b).area
+
+
+def picture(shape=(160, 160), seed=0):
+    """Three channels of noise as whitened channels have it."""
+    return np.random.default_rng(seed).normal(0, 0.4, (3, *shape)).astype(np.float32)
+
+
+def disc(shape, x, y, radius):
+    row, column = np.indices(shape)
+    return np.hypot(row + 0.5 - y, column + 0.5 - x) < radius
+
+
+def test_a_crown_inside_a_surface_gives_way_and_one_on_a_border_stays():
+    stack = picture()
+    stack[0, :, 80:] += 12  # another field
+    inside, border = disc((160, 160), 40, 60, 6), disc((160, 160), 80, 120, 6)
+    stack[1, inside | border] -= 15
+    cleared, things = clear(stack, 0.6)
+    assert things[inside].mean() > 0.9
+    assert not things[border].any()
+    assert abs(cleared[1][inside].mean()) < 1
+    assert np.array_equal(cleared[:, border], stack[:, border])
+    assert (cleared[0, :, 90:].mean() - cleared[0, :, :70].mean()) == pytest.approx(12, abs=0.2)
+
+
+def test_a_road_does_not_give_way():
+    stack = picture()
+    stack[:, :, 70:76] += 10
+    cleared, things = clear(stack, 0.6)
+    assert not things.any()
+    assert cleared is stack
+
+
+def test_a_field_full_of_crowns_stays_whole():
+    stack = picture((200, 200))
+    stack[0, 30:170, 30:170] += 8
+    for x in range(40, 170, 14):  # two rows of crowns from side to side
+        stack[1, disc((200, 200), x, 90, 6) | disc((200, 200), x, 104, 6)] -= 20
+    cleared, _ = clear(stack, 0.6)
+    found = regions(partition(cleared), (100.5, 60.5))
+    truth = np.zeros((200, 200), bool)
+    truth[30:170, 30:170] = True
+    best = max((one.mask & truth).sum() / (one.mask | truth).sum() for one in found)
+    assert best > 0.95
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        (box(20, 20, 120, 120).difference(box(60, 20, 80, 35)), "a crown's notch"),
+        (box(20, 20, 120, 120).union(box(120, 50, 150, 90)), "a leak through a gap"),
+        (box(20, 20, 120, 120).difference(box(105, 20, 120, 35)), "a corner that is missing"),
+        (box(0, 20, 120, 120).union(box(80, 120, 120, 160)), "a leak to the frame"),
+    ],
+)
+def test_the_sides_drawn_on_undo(wrong, why):
+    truth = box(wrong.bounds[0], 20, 120, 120)
+    found = redrawn(wrong, (50, 60), (160, 160))
+    assert max(overlap(one, truth) for one in found) > 0.999, why
+    assert all(one.is_valid and one.contains(shapely.Point(50, 60)) for one in found)
+    assert len(found) < 40
+
+
+def test_a_rectangle_suggests_nothing_else():
+    assert redrawn(box(20, 20, 120, 120), (50, 60), (160, 160)) == []
+
+
+def test_figures_tell_a_border_from_none():
+    stack = picture()
+    stack[0, 40:120, 40:120] += 10
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    on, off = (
+        measure(surface, box(*corners)) for corners in ((40, 40, 120, 120), (30, 30, 130, 130))
+    )
+    assert on is not None
+    assert off is not None
+    assert len(on) == len(FIGURES) == len(set(FIGURES))
+    on, off = (dict(zip(FIGURES, one, strict=True)) for one in (on, off))
+    assert on["strength_10"] > np.log(5) > off["strength_50"] + 1
+    assert on["share_faint"] == 0
+    assert off["share_faint"] > 0.9
+    assert on["strange_share"] < 0.05 < off["strange_share"]
+    assert on["compactness"] == pytest.approx(np.log(np.pi / 4), abs=1e-9)
+    assert measure(surface, box(50, 50, 52, 52)) is None
+
+
+def test_figures_do_not_depend_on_the_direction_of_the_ring():
+    stack = picture()
+    stack[0, 40:120, 40:120] += 10
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    outline = box(38, 40, 120, 119)
+    one, other = measure(surface, outline), measure(surface, Polygon(outline.exterior.coords[::-1]))
+    assert one == pytest.approx(other, abs=0.05)
+
+
+def test_sides_move_onto_the_border():
+    stack = picture()
+    truth = Polygon([(30, 40), (118, 28), (130, 120), (44, 131)])
+    row, column = np.indices((160, 160)) + 0.5
+    stack[0, shapely.contains_xy(truth, column, row)] += 10
+    crooked = Polygon([(31.5, 38), (116, 29.5), (131.5, 118.5), (42.5, 132.5)])
+    found = aligned(crooked, stack, 3.0)
+    assert overlap(crooked, truth) < 0.965
+    assert overlap(found, truth) > 0.985
+    assert len(found.exterior.coords) == 5
+
+
+def test_the_choice_prefers_what_others_agree_with():
+    small, large = box(0, 0, 100, 100), box(0, 0, 100, 104)
+    lone = box(0, 0, 30, 30)
+    best, expected = choice.choose([lone, small, large], np.array([0.1, 0.0, -0.2]))
+    assert best == 1
+    assert 0.5 < expected < 0.9
+
+
+def test_the_learned_table_is_of_these_figures_and_says_what_it_doubts():
+    curves = choice.learned()
+    assert curves.slope.shape == (3, len(choice.NAMES))
+    assert curves.certainty(0.99) > curves.certainty(0.7) > curves.certainty(0.3)
+    text = (resources.files("geofield.field") / "tables" / "outline.json").read_text("utf-8")
+    assert [row["name"] for row in json.loads(text)["figures"]] == list(choice.NAMES)
