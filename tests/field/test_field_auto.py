@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from geofield.field import extract_field
 from geofield.simulate import SimulationSettings, simulate_field
@@ -26,10 +27,12 @@ def test_equal_brightness_is_no_obstacle(seed):
 
 def test_crowns_become_holes_when_asked():
     truth = simulate_field(700_024, SimulationSettings(width_px=400, height_px=400, obstacles=8))
-    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon, holes="keep", min_hole_m2=10.0)
+    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon, holes="keep")
     holes = len(list(field.polygon.interiors))
-    assert 4 <= holes <= 9
-    assert field.polygon.area < truth.field.polygon.area
+    assert 7 <= holes <= 9
+    crowns = sum(shapely.Polygon(ring).area for ring in field.polygon.interiors)
+    assert crowns == pytest.approx(np.pi * (truth.obstacles["radius_m"] ** 2).sum(), rel=1.0)
+    assert overlap(shapely.Polygon(field.polygon.exterior), truth.field.polygon) > 0.9
 
 
 def test_the_same_picture_gives_the_same_outline():

@@ -18,6 +18,7 @@ from geofield.field.border import Surface
 from geofield.field.choice import Outline, choose, learned, search
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
+from geofield.field.morphology import inner, plump
 from geofield.field.refine import carried, enlarged
 from geofield.field.regions import (
     SMALLEST_PX,
@@ -57,7 +58,8 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
     best, expected = choose([one.polygon for one in outlines], score)
     chosen, certain = outlines[best], learned().certainty(expected)
     mask = carried(scene, chosen.polygon, factor, seed)
-    holes = enlarged(chosen.region.holes | surface.things, factor, mask.shape)
+    things = plump(chosen.region.holes | surface.things)
+    holes = inner(enlarged(things, factor, mask.shape), mask)
     notes, figures = _evidence(chosen, certain)
     if ground != seed:
         notes = ("the point lies on something small (a tree, a hut, a track?)", *notes)

@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from geofield.field.morphology import PLUMP
+
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float32]
 
 #: How far a pixel stands out of the median around it, in units of the surface's variation.
-_STANDS_OUT = 5.0
+#: At the higher levels crowns come apart from each other and from weaker borders.
+_STANDS_OUT = (5.0, 10.0, 20.0)
 #: Side of the square of that median, metres; and the largest thing to paint over.
 _WINDOW_M, _LARGEST_M = 21.0, 45.0
 #: The larger square side of the two below, pixels: smaller ones hold too few pixels.
@@ -46,10 +49,14 @@ def clear(stack: FloatArray, pixel_m: float) -> tuple[FloatArray, BoolArray]:
     import cv2
 
     away = _standing_out(stack, pixel_m)
-    things = _inside_surfaces(stack, away, pixel_m)
+    things = np.zeros(away.shape, bool)
+    for level in _STANDS_OUT:
+        things |= _inside_surfaces(stack, away > level, pixel_m)
     if not things.any():
         return stack, things
     ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RIM_PX + 1,) * 2)
+    # Of what stands out strongly, the rest of it too.
+    things |= (cv2.dilate(things.view(np.uint8), ellipse) > 0) & (away > _STANDS_OUT[0])
     painted = cv2.dilate(things.view(np.uint8), ellipse) > 0
     at = ndimage.distance_transform_edt(painted, return_distances=False, return_indices=True)
     near = stack[:, at[0], at[1]]
@@ -57,7 +64,7 @@ def clear(stack: FloatArray, pixel_m: float) -> tuple[FloatArray, BoolArray]:
     return np.where(painted, soft, stack).astype(np.float32), things
 
 
-def _standing_out(stack: FloatArray, pixel_m: float) -> BoolArray:
+def _standing_out(stack: FloatArray, pixel_m: float) -> FloatArray:
     import cv2
 
     side = max(round(_WINDOW_M / pixel_m) | 1, _SMALLEST_WINDOW_PX)
@@ -68,7 +75,7 @@ def _standing_out(stack: FloatArray, pixel_m: float) -> BoolArray:
         levels = np.clip((layer - middle) * 3 + 128, 0, 255).astype(np.uint8)
         median = (cv2.medianBlur(levels, side).astype(np.float32) - 128) / 3 + middle
         total += np.square(layer - median)
-    return np.asarray(total > _STANDS_OUT**2)
+    return np.sqrt(total)
 
 
 def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> BoolArray:
@@ -84,7 +91,8 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
     kept = np.zeros(count, bool)
     for number in range(1, count):
         left, top, width, height, area = stats[number]
-        if max(width, height) > limit or area < 3:
+        longer = max(width, height)
+        if longer > limit or area < max(3, PLUMP * longer * longer):
             continue
         rows = slice(max(top - margin, 0), top + height + margin)
         columns = slice(max(left - margin, 0), left + width + margin)

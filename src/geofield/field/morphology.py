@@ -9,6 +9,8 @@ BoolArray = NDArray[np.bool_]
 
 #: Openings and notches narrower than twice this are no part of an outline, pixels.
 _OPEN_PX, _CLOSE_PX = 5.0, 6.0
+#: Area of what is no mere line, in squares of its longer side.
+PLUMP = 0.12
 
 
 def tidy(mask: BoolArray, seed_px: tuple[float, float]) -> BoolArray:
@@ -64,6 +66,28 @@ def filled(mask: BoolArray) -> BoolArray:
     around = np.pad(~mask, 1, constant_values=True).view(np.uint8)
     cv2.floodFill(around, None, (0, 0), 2)
     return np.asarray(around[1:-1, 1:-1] != 2)
+
+
+def plump(mask: BoolArray) -> BoolArray:
+    """The 4-connected parts of a mask that are no mere lines."""
+    import cv2
+
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
+    longer = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    kept = stats[:, cv2.CC_STAT_AREA] >= PLUMP * longer * longer
+    kept[0] = False
+    return np.asarray(kept[labels])
+
+
+def inner(parts: BoolArray, mask: BoolArray) -> BoolArray:
+    """Those 4-connected parts that lie in a mask and touch neither its border nor the picture's."""
+    import cv2
+
+    within = parts & mask
+    _, labels = cv2.connectedComponents(within.view(np.uint8), connectivity=4)
+    outside = np.pad(~mask, 1, constant_values=True).view(np.uint8)
+    beside = cv2.dilate(outside, np.ones((3, 3), np.uint8))[1:-1, 1:-1] > 0
+    return within & ~np.isin(labels, np.unique(labels[beside & within]))
 
 
 def _shrunk(mask: BoolArray, radius: float) -> BoolArray:

@@ -28,6 +28,8 @@ _PARALLEL_SINE = 0.12
 _CORNER_REACH = 2.5
 #: Pieces of fewer steps than this, in tolerances, say nothing about a direction.
 _SHORT = 4.5
+#: Tolerance for a hole at most, in square roots of its area.
+_HOLE_SHARE = 0.06
 #: Steps from which a piece is long enough to tell its outliers.
 _ROBUST_FROM = 16
 
@@ -130,7 +132,9 @@ def _straighten(exact: Polygon, tolerance: float, width: int, height: int) -> Po
         return None
     holes = []
     for ring in exact.interiors:
-        hole = _straight_ring(shapely.get_coordinates(ring), tolerance, width, height)
+        # Crowns are round: a tolerance that suits a border would make them lozenges.
+        small = min(tolerance, _HOLE_SHARE * Polygon(ring).area ** 0.5)
+        hole = _straight_ring(shapely.get_coordinates(ring), small, width, height)
         if hole is None:
             hole = shapely.get_coordinates(ring)
         holes.append(hole)

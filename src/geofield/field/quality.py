@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 #: A field below this is hardly one, square metres.
 _SMALL_M2 = 400.0
 #: From this score on an outline is used without a warning. The score is the probability of a
-#: good outline, lowered for every reason to doubt it.
+#: good outline, lowered for what that probability knows nothing of.
 _TRUSTED = 0.6
 
 
@@ -47,9 +47,8 @@ def judge(
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
-    score = measured.get("certainty", 1.0) - 0.1 * len(reasons)
+    score = measured.get("certainty", 1.0) - 0.55 * len(strange)
     reasons.extend(strange)
-    score -= 0.55 * len(strange)
     if touching > 0.02:
         reasons.append(
             f"it touches the picture's edge along {touching:.0%} of its length, so the field "

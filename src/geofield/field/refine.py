@@ -169,7 +169,7 @@ def _meeting(
     u, v = before[1] - before[0], after[1] - after[0]
     size = float(np.hypot(*u) * np.hypot(*v))
     cross = float(u[0] * v[1] - u[1] * v[0])
-    if abs(cross) < _PARALLEL * size:
+    if abs(cross) <= _PARALLEL * size:  # also where a side has no length
         return halfway
     gap = after[0] - before[0]
     meeting = before[0] + (gap[0] * v[1] - gap[1] * v[0]) / cross * u

@@ -1,8 +1,9 @@
 """Straight: other outlines that a given one suggests, along its own straight sides.
 
-Fields have long straight sides, and the picture's frame is one more. Where an outline leaves such a side, round a crown that
-leans over the border or through a gap in it, the side drawn on is often the truth: to where
-it meets the outline again, or to where another long side, drawn back, meets it.
+Fields have long straight sides, and the picture's frame is one more. Where an outline leaves
+such a side, round a crown that leans over the border or through a gap in it, the side drawn on
+is often the truth: to where it meets the outline again, or to where another long side, drawn
+back, meets it.
 """
 
 from __future__ import annotations
