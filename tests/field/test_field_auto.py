@@ -31,7 +31,8 @@ def test_crowns_become_holes_when_asked():
     holes = len(list(field.polygon.interiors))
     assert 7 <= holes <= 9
     crowns = sum(shapely.Polygon(ring).area for ring in field.polygon.interiors)
-    assert crowns == pytest.approx(np.pi * (truth.obstacles["radius_m"] ** 2).sum(), rel=1.0)
+    # Holes take in shadows and soft rims too.
+    assert 1.0 < crowns / (np.pi * (truth.obstacles["radius_m"] ** 2).sum()) < 3.0
     assert overlap(shapely.Polygon(field.polygon.exterior), truth.field.polygon) > 0.9
 
 

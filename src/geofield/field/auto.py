@@ -37,6 +37,8 @@ COARSE_PX = 400
 _STRAY_PX = 20
 #: A border weaker than this, in units of what the field has inside, is none.
 _WEAK = 1.6
+#: Below this certainty the doubt is told.
+_LIKELY = 0.7
 
 
 def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
@@ -142,8 +144,9 @@ def _evidence(
         notes.append("its border hardly differs from what lies inside")
     elif weakest < _WEAK:
         notes.append("a quarter of its border or more is weak")
-    if certain < 0.5:
-        notes.append(f"other outlines are as likely (certainty {certain:.0%})")
+    if certain < _LIKELY:
+        other = "as likely" if certain < 0.5 else "possible"
+        notes.append(f"other outlines are {other} (certainty {certain:.0%})")
     return tuple(notes), (
         ("certainty", certain),
         ("border_contrast", contrast),

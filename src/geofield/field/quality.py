@@ -17,7 +17,7 @@ BoolArray = NDArray[np.bool_]
 _SMALL_M2 = 400.0
 #: From this score on an outline is used without a warning. The score is the probability of a
 #: good outline, lowered for what that probability knows nothing of.
-_TRUSTED = 0.6
+_TRUSTED = 0.5
 
 
 def judge(
