@@ -235,14 +235,18 @@ def seeds(options: argparse.Namespace, say: Say) -> None:
 
 
 CHILD = """
-import resource, sys, time
+import sys, time
+from pathlib import Path
 from geofield.field import extract_field
 from geofield.imagery import read_scene
 scene = read_scene(sys.argv[1])
 before = time.process_time()
 field = extract_field(scene, lat=float(sys.argv[2]), lon=float(sys.argv[3]))
 spent = time.process_time() - before
-print(spent, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+# Not ru_maxrss: that begins with the parent's.
+status = Path("/proc/self/status").read_text().splitlines()
+peak = next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
+print(spent, peak / 2**20)
 print(field.polygon_px(scene.grid).wkt)
 """
 

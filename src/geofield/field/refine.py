@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 
 #: How far a side may move at first, pixels; then so many pixels of the coarser picture.
 _REACH_PX, _REACH_COARSE = 2.5, 1.25
+#: Sides are set in a picture of at most so many pixels a side. Lines are exact to a fraction of
+#: a pixel there, and a larger one costs gigabytes.
+_FINEST_PX = 2500
 #: Sides below this length move with their neighbours, pixels.
 _MOVED_PX = 10.0
 #: Spacing of the places tried across a side, pixels.
@@ -49,14 +52,16 @@ def carried(scene: Scene, outline: Polygon, factor: int, seed_px: tuple[float, f
         The point, pixel coordinates of the reduced picture.
     """
     size, reach = factor, _REACH_PX
+    finest = math.ceil(max(scene.grid.shape) / _FINEST_PX)
     while True:
         stack = whiten(
             channels(scene, size), (seed_px[0] * factor / size, seed_px[1] * factor / size)
         )
         outline = aligned(outline, stack, reach)
-        if size == 1:
-            return within(outline, scene.grid.shape)
-        finer = 1 if size <= 4 else math.ceil(size / 4)
+        if size <= finest:
+            whole = scale(outline, size, size, origin=(0, 0))
+            return within(whole, scene.grid.shape)
+        finer = finest if size <= 4 * finest else math.ceil(size / 4)
         ratio = size / finer
         outline = scale(outline, ratio, ratio, origin=(0, 0))
         size, reach = finer, _REACH_COARSE * ratio
