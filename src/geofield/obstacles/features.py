@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -139,8 +140,9 @@ def _crown_mask(
     rows, cols = rows // 2, cols // 2
     for level in (0.5, 1.5):
         mask = image > level
-        depth = 2 * ndimage.distance_transform_edt(mask).astype(np.float32)
-        top = ndimage.maximum_filter(depth, 5)
+        distance = cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        depth = 2 * np.minimum(distance, 1e4, dtype=np.float32)
+        top = cv2.dilate(depth, np.ones((5, 5), np.uint8))
         columns[f"crown_depth_{level:g}"] = depth[rows, cols]
         columns[f"crown_depth_share_{level:g}"] = depth[rows, cols] / np.maximum(top[rows, cols], 1)
         labels, count = ndimage.label(mask)
