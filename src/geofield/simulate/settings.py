@@ -1,0 +1,58 @@
+"""What a simulated picture shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from geofield.errors import SettingsError
+
+Climate = Literal["temperate", "dry", "lush", "bare"]
+CLIMATES: tuple[Climate, ...] = ("temperate", "dry", "lush", "bare")
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationSettings:
+    """What a simulated picture shows.
+
+    Attributes
+    ----------
+    width_px, height_px : int
+        Size of the picture.
+    resolution_m : float
+        Metres per pixel.
+    obstacles : int or None
+        Crowns inside the field; None draws 3 to 25.
+    radius_m : (float, float)
+        Range of the crowns' radii.
+    climate : {"temperate", "dry", "lush", "bare"} or None
+        Colours of the ground; None draws one.
+    equal_brightness : bool
+        Give the neighbours the field's grey level, so that only colour, near infrared and
+        texture tell them apart: the case in which thresholds fail.
+    nir : bool
+        Add the near infrared band.
+    lat, lon : float
+        The place of the picture's centre, degrees.
+    """
+
+    width_px: int = 640
+    height_px: int = 640
+    resolution_m: float = 0.6
+    obstacles: int | None = None
+    radius_m: tuple[float, float] = (2.0, 7.0)
+    climate: Climate | None = None
+    equal_brightness: bool = False
+    nir: bool = True
+    lat: float = 35.075373
+    lon: float = 33.531142
+
+    def __post_init__(self) -> None:
+        if min(self.width_px, self.height_px) < 64:
+            raise SettingsError("A simulated picture has at least 64 x 64 px.")
+        if not 0 < self.radius_m[0] <= self.radius_m[1]:
+            raise SettingsError(f"The radius range {self.radius_m} is empty.")
+        if not self.resolution_m > 0:
+            raise SettingsError("The resolution must be above zero.")
+        if self.climate is not None and self.climate not in CLIMATES:
+            raise SettingsError(f"Unknown climate {self.climate!r}.", hint=f"Use {CLIMATES}.")
