@@ -50,7 +50,7 @@ def staged_folder(
         When the folder cannot be written, the disk is full, or a product is open in another
         program. The previous products are then as they were.
     """
-    target = Path(folder)
+    target, inputs = Path(folder), tuple(inputs)
     made = _make_folder(target)
     try:
         staging = Path(tempfile.mkdtemp(prefix=_STAGING_PREFIX, dir=target))
@@ -80,9 +80,11 @@ def staged_file(
     """A path to write one file at; it becomes `path` when the block ends well.
 
     The name is the same, so that drivers which look at the suffix are content. Parameters
-    and errors are those of :func:`staged_folder`.
+    and errors are those of :func:`staged_folder`, but what may not be replaced is refused
+    before the work, not after it.
     """
-    target = Path(path)
+    target, inputs = Path(path), tuple(inputs)
+    _refuse(target, overwrite, inputs)
     with staged_folder(target.parent, overwrite=overwrite, inputs=inputs) as folder:
         yield folder / target.name
 
@@ -114,23 +116,9 @@ def _publish(
     work: Path, target: Path, old: Path, overwrite: bool, inputs: Iterable[Path | str]
 ) -> None:
     files = sorted(path for path in work.rglob("*") if path.is_file())
-    forbidden = {Path(path).resolve() for path in inputs}
     pairs = [(path, target / path.relative_to(work)) for path in files]
     for _, place in pairs:
-        if place.resolve() in forbidden:
-            raise FormatError(
-                f"{place} is an input of this work and would be overwritten.",
-                hint="Write to another folder.",
-            )
-        if place.is_dir():
-            raise FormatError(f"{place} is a folder.", hint="Choose another name.")
-        if place.exists():
-            if not overwrite:
-                raise OutputExistsError(
-                    f"{place} is there already.",
-                    hint="Write to another folder, or allow overwriting (--overwrite).",
-                )
-            _refuse_locked(place)
+        _refuse(place, overwrite, inputs)
     moved: list[tuple[Path, Path | None]] = []
     try:
         for source, place in pairs:
@@ -150,6 +138,24 @@ def _publish(
             else:
                 kept.replace(place)
         raise
+
+
+def _refuse(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
+    """Refuse a place that may not be written or replaced."""
+    if place.resolve() in {Path(path).resolve() for path in inputs}:
+        raise FormatError(
+            f"{place} is an input of this work and would be overwritten.",
+            hint="Write to another folder.",
+        )
+    if place.is_dir():
+        raise FormatError(f"{place} is a folder.", hint="Choose another name.")
+    if place.exists():
+        if not overwrite:
+            raise OutputExistsError(
+                f"{place} is there already.",
+                hint="Write to another folder, or allow overwriting (--overwrite).",
+            )
+        _refuse_locked(place)
 
 
 def _keep(place: Path, kept: Path) -> None:

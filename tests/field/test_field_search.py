@@ -11,6 +11,8 @@ from shapely import Polygon, box
 from geofield.field import choice
 from geofield.field.border import FIGURES, Surface, measure
 from geofield.field.clearing import clear
+from geofield.field.hierarchy import merge
+from geofield.field.morphology import filled, inner, plump
 from geofield.field.refine import aligned
 from geofield.field.regions import partition, regions
 from geofield.field.straight import redrawn
@@ -139,3 +141,29 @@ def test_the_learned_table_is_of_these_figures_and_says_what_it_doubts():
     assert curves.certainty(0.99) > curves.certainty(0.7) > curves.certainty(0.3)
     text = (resources.files("geofield.field") / "tables" / "outline.json").read_text("utf-8")
     assert [row["name"] for row in json.loads(text)["figures"]] == list(choice.NAMES)
+
+
+def test_only_what_touches_no_border_is_a_hole():
+    field = np.zeros((60, 80), bool)
+    field[10:60, 10:70] = True
+    things = np.zeros_like(field)
+    things[20:25, 20:25] = things[8:14, 40:45] = things[57:60, 30:33] = things[40, 20:60] = True
+    holes = inner(things, field)
+    assert holes[20:25, 20:25].all()
+    assert holes[40, 20:60].all()
+    assert holes.sum() == 25 + 40  # neither that on the border nor that on the picture's edge
+    assert plump(holes).sum() == 25
+    assert np.array_equal(filled(field & ~holes), field)
+
+
+def test_the_weakest_border_merges_first_and_all_ends_in_one():
+    #  0 - 1 - 2 - 3, strong in the middle
+    first, second = np.array([0, 1, 2]), np.array([1, 2, 3])
+    tree = merge(np.full(4, 500.0), first, second, np.full(3, 10.0), np.array([1.0, 9.0, 2.0]))
+    assert tree.parent[-1] == -1
+    assert sorted(tree.leaves(6)) == [0, 1, 2, 3]
+    assert sorted(tree.leaves(4)) == [0, 1]
+    assert sorted(tree.leaves(5)) == [2, 3]
+    assert tree.chain(0) == [0, 4, 6]
+    assert tree.beside(4) == 5
+    assert tree.height[4:].tolist() == [1.0, 2.0, 9.0]

@@ -84,6 +84,17 @@ def test_a_failed_move_puts_everything_back(dataset, tmp_path, monkeypatch):
     }
 
 
+def test_staged_file_refuses_before_the_work(tmp_path):
+    target = tmp_path / "x.txt"
+    target.write_text("old")
+    for place, error in ((target, OutputExistsError), (tmp_path, FormatError)):
+        with pytest.raises(error), staged_file(place):
+            pytest.fail("The work began.")
+    with pytest.raises(FormatError, match="input"), staged_file(target, inputs=iter([target])):
+        pytest.fail("The work began.")
+    assert target.read_text() == "old"
+
+
 def test_staged_file_appears_whole_or_not_at_all(tmp_path):
     with staged_file(tmp_path / "x.txt") as path:
         path.write_text("whole")

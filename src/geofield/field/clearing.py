@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.field.morphology import PLUMP
+from geofield.field.morphology import plump
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float32]
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float32]
 _STANDS_OUT = (5.0, 10.0, 20.0)
 #: Side of the square of that median, metres; and the largest thing to paint over.
 _WINDOW_M, _LARGEST_M = 21.0, 45.0
-#: The larger square side of the two below, pixels: smaller ones hold too few pixels.
+#: Side of that square at least, pixels: a smaller one holds too few for a median.
 _SMALLEST_WINDOW_PX = 9
 #: How even the ground around a thing has to be: four fifths of it lie within this.
 _EVEN = 5.0
@@ -83,7 +83,8 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
     import cv2
 
     limit = _LARGEST_M / pixel_m
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(away.view(np.uint8), connectivity=4)
+    plumper = plump(away).view(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(plumper, connectivity=4)
     beside = cv2.dilate(away.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
     wide = 2 * (_RING_PX + 1) + 1
     ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
@@ -91,8 +92,7 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
     kept = np.zeros(count, bool)
     for number in range(1, count):
         left, top, width, height, area = stats[number]
-        longer = max(width, height)
-        if longer > limit or area < max(3, PLUMP * longer * longer):
+        if max(width, height) > limit or area < 3:
             continue
         rows = slice(max(top - margin, 0), top + height + margin)
         columns = slice(max(left - margin, 0), left + width + margin)

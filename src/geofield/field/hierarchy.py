@@ -8,7 +8,6 @@ the mean border strength as the height of a merge).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,32 +21,33 @@ _SPECK_PX = 150.0
 _STANDS_OUT = 8.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class MergeTree:
     """A binary tree over regions; the first `leaf_count` are superpixels.
 
     Attributes
     ----------
-    parent : list of int
+    parent : int array (regions,)
         -1 for the root.
-    height : list of float
+    height : float array (regions,)
         Border strength at which the region's two parts merged.
-    parts : list of (int, int) or None
-    size_px : list of float
+    parts : int array (regions, 2)
+        -1 for superpixels.
+    size_px : float array (regions,)
     leaf_count : int
     """
 
-    parent: list[int]
-    height: list[float]
-    parts: list[tuple[int, int] | None]
-    size_px: list[float]
+    parent: IntArray
+    height: FloatArray
+    parts: IntArray
+    size_px: FloatArray
     leaf_count: int
 
     def chain(self, leaf: int) -> list[int]:
         """The regions that contain a superpixel, from itself to the root."""
         found = [leaf]
         while self.parent[found[-1]] != -1:
-            found.append(self.parent[found[-1]])
+            found.append(int(self.parent[found[-1]]))
         return found
 
     def is_speck(self, leaf: int, smallest_px: float) -> bool:
@@ -58,9 +58,8 @@ class MergeTree:
         """
         region = leaf
         while self.size_px[region] < smallest_px and self.parent[region] != -1:
-            up = self.parent[region]
-            one, two = self.parts[up] or (region, region)
-            other = two if one == region else one
+            up = int(self.parent[region])
+            other = self.beside(region)
             if self.size_px[other] >= 4 * self.size_px[region] and self.height[up] > max(
                 _STANDS_OUT, 2.5 * self.height[region]
             ):
@@ -68,18 +67,19 @@ class MergeTree:
             region = up
         return False
 
+    def beside(self, region: int) -> int:
+        """The other part of the region that a region merges into."""
+        one, two = self.parts[self.parent[region]]
+        return int(two if one == region else one)
+
     def leaves(self, region: int) -> NDArray[np.int64]:
         """The superpixels of a region."""
         here = np.array([region], np.int64)
         found = []
         while len(here):
             found.append(here[here < self.leaf_count])
-            here = self._parts[here[here >= self.leaf_count] - self.leaf_count].ravel()
+            here = self.parts[here[here >= self.leaf_count]].ravel()
         return np.concatenate(found)
-
-    @cached_property
-    def _parts(self) -> IntArray:
-        return np.array(self.parts[self.leaf_count :], np.int64).reshape(-1, 2)
 
 
 def merge(
@@ -138,10 +138,4 @@ def merge(
         total = np.bincount(index, total[apart], len(keys)).astype(float)
         length = np.bincount(index, length[apart], len(keys)).astype(float)
         a, b = keys // made, keys % made
-    return MergeTree(
-        parent[:made].tolist(),
-        height[:made].tolist(),
-        [None] * count + [(int(x), int(y)) for x, y in parts[count:made]],
-        size_px[:made].tolist(),
-        count,
-    )
+    return MergeTree(parent[:made], height[:made], parts[:made], size_px[:made], count)

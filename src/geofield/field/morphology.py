@@ -10,7 +10,7 @@ BoolArray = NDArray[np.bool_]
 #: Openings and notches narrower than twice this are no part of an outline, pixels.
 _OPEN_PX, _CLOSE_PX = 5.0, 6.0
 #: Area of what is no mere line, in squares of its longer side.
-PLUMP = 0.12
+_PLUMP = 0.12
 
 
 def tidy(mask: BoolArray, seed_px: tuple[float, float]) -> BoolArray:
@@ -74,7 +74,7 @@ def plump(mask: BoolArray) -> BoolArray:
 
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
     longer = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    kept = stats[:, cv2.CC_STAT_AREA] >= PLUMP * longer * longer
+    kept = stats[:, cv2.CC_STAT_AREA] >= _PLUMP * longer * longer
     kept[0] = False
     return np.asarray(kept[labels])
 

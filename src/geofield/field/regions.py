@@ -105,11 +105,8 @@ def regions(parted: Partition, seed_px: tuple[float, float]) -> list[Region]:
     toll = np.zeros(len(TOLLS))
     highest = 0.0
     for region, following in pairwise(tree.chain(int(labels[int(seed_px[1]), int(seed_px[0])]))):
-        parts = tree.parts[following]
-        if parts is None:
-            continue
-        other = parts[1] if parts[0] == region else parts[0]
-        size, joins = tree.size_px[region], tree.size_px[other]
+        other = tree.beside(region)
+        size, joins = float(tree.size_px[region]), float(tree.size_px[other])
         share = size / labels.size
         trifle = joins < _TRIFLE_SHARE * size and share < 0.9
         if size < SMALLEST_PX or share < SMALLEST_SHARE or trifle:
@@ -122,12 +119,11 @@ def regions(parted: Partition, seed_px: tuple[float, float]) -> list[Region]:
         side = member.astype(np.int8)
         side[tree.leaves(other)] = -1
         seam = parted.lines.along(side)
+        height = float(tree.height[following])
         within = strength[member[first] & member[second]]
         inside = np.quantile(within, [0.5, 0.8, 0.95]) if len(within) else np.ones(3)
-        toll = toll + _toll(
-            seam, tree.height[following], highest, joins / size, float(whole.mean()), inside
-        )
-        highest = max(highest, tree.height[following])
+        toll = toll + _toll(seam, height, highest, joins / size, float(whole.mean()), inside)
+        highest = max(highest, height)
     return found
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from geofield.field.morphology import filled
+
 BoolArray = NDArray[np.bool_]
 
 
@@ -39,16 +41,16 @@ def fill_holes(mask: BoolArray, *, smallest_kept_px: float | None) -> BoolArray:
     smallest_kept_px : float or None
         Pixels from which a hole stays one; None fills every hole.
     """
-    filled: BoolArray = ndimage.binary_fill_holes(mask)
+    whole = filled(mask)
     if smallest_kept_px is None:
-        return filled
-    labels, count = ndimage.label(filled & ~mask)
+        return whole
+    labels, count = ndimage.label(whole & ~mask)
     if count == 0:
-        return filled
+        return whole
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     kept = sizes >= smallest_kept_px
     kept[0] = False
-    partly: BoolArray = filled & ~kept[labels]
+    partly: BoolArray = whole & ~kept[labels]
     return partly
 
 

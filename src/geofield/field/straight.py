@@ -8,8 +8,6 @@ back, meets it.
 
 from __future__ import annotations
 
-from itertools import accumulate
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -64,9 +62,8 @@ def redrawn(
     vertices = ring(polygon)
     sides = _Sides(vertices, shape)
     count, area, length = len(vertices), polygon.area, float(sides.length.sum())
-    travelled = np.concatenate([[0.0], list(accumulate(np.tile(sides.length, 2)))])
-    seed = shapely.Point(seed_px)
-    found: dict[tuple[float, float], Polygon] = {}
+    travelled = np.concatenate([[0.0], np.cumsum(np.tile(sides.length, 2))])
+    rings: list[FloatArray] = []
     for i in range(count):
         for skip in range(2, count - 1):
             if travelled[i + skip] - travelled[i + 1] > _REPLACED * length:
@@ -76,12 +73,19 @@ def redrawn(
                 continue
             kept = vertices[(j + 1 + np.arange(count - skip)) % count]
             for corner in sides.meeting(i, j):
-                new = Polygon(np.vstack([kept, *corner])) if len(kept) + len(corner) > 2 else None
-                if new is None or not new.is_valid or not new.contains(seed):
-                    continue
-                if _AREAS[0] * area <= new.area <= _AREAS[1] * area:
-                    found.setdefault((round(new.area, 1), round(new.length, 1)), new)
-    return list(found.values())
+                if len(kept) + len(corner) > 2:
+                    rings.append(np.vstack([kept, *corner]))
+    if not rings:
+        return []
+    index = np.repeat(np.arange(len(rings)), [len(one) for one in rings])
+    found = np.asarray(shapely.polygons(shapely.linearrings(np.concatenate(rings), indices=index)))
+    areas = np.asarray(shapely.area(found))
+    good = shapely.is_valid(found) & (areas >= _AREAS[0] * area) & (areas <= _AREAS[1] * area)
+    good[good] = shapely.contains_xy(found[good], *seed_px)
+    found = found[good]
+    alike = np.round(np.column_stack([areas[good], shapely.length(found)]), 1)
+    _, first = np.unique(alike, axis=0, return_index=True)
+    return list(found[np.sort(first)])
 
 
 class _Sides:

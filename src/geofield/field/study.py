@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geofield.errors import FieldError
+from geofield.field.morphology import filled
 
 BoolArray = NDArray[np.bool_]
 
@@ -70,7 +71,7 @@ class StudyPictures:
         from skimage.morphology import reconstruction
 
         mask = self.mask(numbers)
-        inside = ndimage.binary_fill_holes(mask)
+        inside = filled(mask)
         grey = np.where(inside, self.grey, 0).astype(np.float32)
         seed = np.where(mask, grey, 255).astype(np.float32)
         seed[~inside] = 0

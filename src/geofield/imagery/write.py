@@ -13,7 +13,7 @@ from rasterio.enums import ColorInterp
 from rasterio.errors import RasterioError
 from rasterio.io import MemoryFile
 
-from geofield.errors import FormatError, OutputExistsError
+from geofield.errors import FormatError
 from geofield.imagery.gdal import gdal_env, to_rasterio
 from geofield.imagery.tags import tags_of
 from geofield.model.scene import Scene
@@ -95,21 +95,12 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
 
 @contextmanager
 def replacing(path: str | Path, *, overwrite: bool) -> Iterator[Path]:
-    """A path to write a picture at, which takes its place when all went well.
-
-    What is there already is refused at once, not after the work.
-    """
+    """A path to write a picture at, which takes its place when all went well."""
     target = Path(path)
     if not target.parent.is_dir():
         raise FormatError(
             f"{target} cannot be written.",
             hint="Check that the folder exists and that you may write there.",
-        )
-    if target.is_dir():
-        raise FormatError(f"{target} is a folder.", hint="Give the name of a file.")
-    if target.exists() and not overwrite:
-        raise OutputExistsError(
-            f"{target} exists already.", hint="Choose another name, or say --overwrite."
         )
     try:
         with staged_file(target, overwrite=overwrite) as temporary:

@@ -198,13 +198,13 @@ _REMAP_WIDTH = 4096
 
 def bilinear(image: Image, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float32]:
     """Sample a picture between its pixels, positions beyond its border at the border."""
+    if x.size == 0:
+        return np.zeros(x.shape, dtype=np.float32)
     # OpenCV takes maps of limited height: the positions go in long rows.
-    width = min(max(x.size, 1), _REMAP_WIDTH)
+    width = min(x.size, _REMAP_WIDTH)
     maps = np.zeros((2, -(-x.size // width) * width), dtype=np.float32)
     maps[0, : x.size], maps[1, : x.size] = x.ravel(), y.ravel()
     columns, rows = maps.reshape(2, -1, width)
-    if x.size == 0:
-        return np.zeros(x.shape, dtype=np.float32)
     values = cv2.remap(image, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(values, dtype=np.float32).ravel()[: x.size].reshape(x.shape)
 

@@ -22,7 +22,7 @@ from geofield.obstacles.features import FeatureTable, feature_table
 
 FloatArray = NDArray[np.float64]
 
-LEAST_SCORE = -4.0
+_LEAST_SCORE = -4.0
 """Candidates below this do not count."""
 
 _RADII_PX = (3, 6, 10, 15, 25, 40)
@@ -56,7 +56,7 @@ def context_features(
     """
     count = kept.size
     points = np.column_stack([x_px, y_px])
-    others = np.flatnonzero(score > LEAST_SCORE)
+    others = np.flatnonzero(score > _LEAST_SCORE)
     here, there, distance = _pairs(points[kept], points[others])
     there = others[there]
     near = 1 / (1 + np.exp(-score))

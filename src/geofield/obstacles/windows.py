@@ -3,8 +3,8 @@
 Everything that is measured at a candidate comes from less than the overlap around it, and
 windows start at multiples of the coarsest grid used inside, so that a window gives the same
 figures as the whole picture away from the picture's own borders. Where shade falls is found
-once, for the whole picture. A window decides over its
-overlap too but keeps its core, so neighbours agree on what lies at their common border.
+once, for the whole picture. A window decides over its overlap too but keeps its core, so
+neighbours agree on what lies at their common border.
 """
 
 from __future__ import annotations
