@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 
 if TYPE_CHECKING:
-    from geofield.model.tracks import Tracks
+    import geopandas as gpd
+    from shapely import Polygon
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,28 +74,38 @@ class TrackStatistics:
     losses: tuple[ObstacleLoss, ...]
 
 
-def track_statistics(tracks: Tracks) -> TrackStatistics:
-    """Compute the figures of planned tracks."""
-    length = tracks.segments["length_m"].to_numpy(dtype=np.float64)
-    gaps = tracks.gaps["length_m"].to_numpy(dtype=np.float64)
+def track_statistics(
+    *,
+    lines: gpd.GeoDataFrame,
+    segments: gpd.GeoDataFrame,
+    gaps: gpd.GeoDataFrame,
+    headland_tracks: gpd.GeoDataFrame | None,
+    outline: Polygon | None,
+    spacing_m: float,
+    blocked_count: int,
+    losses: tuple[ObstacleLoss, ...],
+) -> TrackStatistics:
+    """Compute the figures of planned tracks; parameters as the attributes of `Tracks`."""
+    length = segments["length_m"].to_numpy(dtype=np.float64)
+    gap = gaps["length_m"].to_numpy(dtype=np.float64)
     nan = float("nan")
     area = worked = coverage = overlap = nan
-    if tracks.outline is not None:
-        area = float(tracks.outline.area)
-        strips = _strips(tracks)
-        union = shapely.intersection(shapely.union_all(strips), tracks.outline).area
-        single = float(shapely.area(shapely.intersection(strips, tracks.outline)).sum())
+    if outline is not None:
+        area = float(outline.area)
+        strips = _strips(segments, headland_tracks, spacing_m)
+        union = shapely.intersection(shapely.union_all(strips), outline).area
+        single = float(shapely.area(shapely.intersection(strips, outline)).sum())
         worked = float(union)
         coverage = 100.0 * worked / area
         overlap = 100.0 * max(0.0, single - worked) / area
     return TrackStatistics(
-        track_count=len(tracks.lines),
+        track_count=len(lines),
         segment_count=len(length),
-        gap_count=len(gaps),
-        point_count=int(tracks.lines["point_count"].sum()),
-        blocked_count=tracks.blocked_count,
+        gap_count=len(gap),
+        point_count=int(lines["point_count"].sum()),
+        blocked_count=blocked_count,
         length_m=float(length.sum()),
-        gap_length_m=float(gaps.sum()),
+        gap_length_m=float(gap.sum()),
         mean_segment_m=float(length.mean()) if len(length) else nan,
         longest_segment_m=float(length.max()) if len(length) else nan,
         shortest_segment_m=float(length.min()) if len(length) else nan,
@@ -102,27 +113,29 @@ def track_statistics(tracks: Tracks) -> TrackStatistics:
         worked_ha=worked / 10_000.0,
         coverage_percent=coverage,
         overlap_percent=overlap,
-        losses=tracks.losses,
+        losses=losses,
     )
 
 
-def _strips(tracks: Tracks) -> np.ndarray:
-    """The strip that each segment works, as a rectangle."""
-    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)
+def _strips(
+    segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, spacing_m: float
+) -> np.ndarray:
+    """The strip that each segment works, as a rectangle; those of the headland, as they bend."""
+    ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
     if not len(ends):
         return np.empty(0, dtype=object)
     along = ends[:, 1] - ends[:, 0]
     along /= np.hypot(along[:, 0], along[:, 1])[:, None]
-    side = np.column_stack((-along[:, 1], along[:, 0])) * (tracks.spacing_m / 2.0)
+    side = np.column_stack((-along[:, 1], along[:, 0])) * (spacing_m / 2.0)
     corners = np.stack(
         (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
     )
     strips = np.asarray(shapely.polygons(corners))
-    if tracks.headland_tracks is None:
+    if headland_tracks is None:
         return strips
     around = shapely.buffer(
-        tracks.headland_tracks.geometry.to_numpy(),
-        tracks.spacing_m / 2.0,
+        headland_tracks.geometry.to_numpy(),
+        spacing_m / 2.0,
         cap_style="flat",
         join_style="mitre",
     )
