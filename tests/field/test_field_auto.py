@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 from geofield.field import extract_field
+from geofield.field.auto import segment
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -42,3 +43,11 @@ def test_the_same_picture_gives_the_same_outline():
         extract_field(truth.scene, lat=truth.lat, lon=truth.lon).polygon for _ in range(2)
     )
     assert np.array_equal(np.array(first.exterior.coords), np.array(second.exterior.coords))
+
+
+def test_a_rounding_error_in_the_point_changes_nothing():
+    truth = simulate_field(700_024, SimulationSettings(width_px=300, height_px=300))
+    x, y = (float(round(at)) for at in truth.scene.grid.from_lonlat(truth.lon, truth.lat))
+    first, second = (segment(truth.scene, x + error, y - error) for error in (1e-9, -1e-9))
+    assert np.array_equal(first.mask, second.mask)
+    assert first.figures == second.figures

@@ -127,6 +127,14 @@ def test_sides_move_onto_the_border():
     assert len(found.exterior.coords) == 5
 
 
+def test_a_side_beside_the_frame_is_the_frame():
+    stack = picture()
+    stack[0, 40:120] += 10
+    found = aligned(Polygon([(2, 41), (158, 39), (157.8, 121), (1.5, 119)]), stack, 2.0)
+    assert found.bounds[::2] == (0, 160)
+    assert overlap(found, box(0, 40, 160, 120)) > 0.98
+
+
 def test_the_choice_prefers_what_others_agree_with():
     small, large = box(0, 0, 100, 100), box(0, 0, 100, 104)
     lone = box(0, 0, 30, 30)

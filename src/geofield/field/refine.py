@@ -34,6 +34,8 @@ _FINE_PX = 0.5
 _ACROSS_PX, _SMOOTH_PX, _ALONG_PX = 1.0, 1.0, 9
 #: How much a side at the end of its reach has to be stronger than one that stays.
 _STAY = 0.2
+#: A side that stays this near the picture's frame is the frame, pixels.
+_FRAME_PX = 2.5
 #: Sides whose directions differ less (sine) have no well-defined meeting point.
 _PARALLEL = 0.12
 
@@ -94,7 +96,7 @@ def aligned(outline: Polygon, stack: NDArray[np.float32], reach_px: float) -> Po
     reach_px : float
     """
     shape = stack.shape[1], stack.shape[2]
-    start = np.clip(ring(outline), 0, [shape[1], shape[0]])
+    start = _framed(np.clip(ring(outline), 0, [shape[1], shape[0]]), shape)
     end = np.roll(start, -1, axis=0)
     framed = on_frame(start, shape, 0.75) & on_frame(end, shape, 0.75)
     framed &= on_frame(0.5 * (start + end), shape, 0.75)
@@ -114,6 +116,16 @@ def aligned(outline: Polygon, stack: NDArray[np.float32], reach_px: float) -> Po
             corners.append(before[1] if firm[at - 1] else after[0])
     polygon = Polygon(np.clip(corners, 0, [shape[1], shape[0]]))
     return polygon if polygon.is_valid and polygon.area > 0.5 * outline.area else outline
+
+
+def _framed(vertices: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Vertices with sides that run beside the picture's frame put onto it."""
+    onto = vertices.copy()
+    for axis, far in ((0, shape[1]), (1, shape[0])):
+        for frame in (0.0, float(far)):
+            near = np.abs(vertices[:, axis] - frame) < _FRAME_PX
+            onto[near & (np.roll(near, 1) | np.roll(near, -1)), axis] = frame
+    return onto
 
 
 def _moved(
