@@ -59,6 +59,15 @@ def test_a_window_lies_around_the_point(rgb: str, size: dict[str, float]) -> Non
     assert scene.pixel_of(lat=lat, lon=lon) == pytest.approx((10.5, 10.5), abs=1e-6)
 
 
+@pytest.mark.parametrize("at", [(1e-5, 1e-5), (127.9999, 95.9999), (127.9999, 40.5)])
+def test_a_point_at_the_very_edge_stays_inside(rgb: str, at: tuple[float, float]) -> None:
+    scene = read_scene(rgb)
+    lon, lat = scene.grid.to_lonlat(*at)
+    x, y = scene.pixel_of(lat=lat, lon=lon)
+    assert (int(x), int(y)) == (int(at[0]), int(at[1]))
+    assert (x, y) == pytest.approx(at, abs=2e-3)
+
+
 def test_a_window_is_cut_at_the_edge(rgb: str) -> None:
     lon, lat = SceneReader.open(rgb).grid.to_lonlat(2.5, 94.5)
     scene = read_scene(rgb, lat=lat, lon=lon, size_px=11)

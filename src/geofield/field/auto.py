@@ -51,8 +51,7 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
         The seed, pixel coordinates.
     """
     factor = reduction(scene)
-    # A thousandth of a pixel is no difference, though it may be another pixel's.
-    seed = (round(x_px / factor, 3), round(y_px / factor, 3))
+    seed = (x_px / factor, y_px / factor)
     surface, found, ground = prepared(scene, factor, seed)
     outlines, score = search(surface, found, ground)
     if not outlines:

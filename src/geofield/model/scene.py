@@ -155,6 +155,9 @@ class Scene:
     def pixel_of(self, *, lat: float, lon: float) -> tuple[float, float]:
         """The pixel position of a point that must lie on the picture's data.
 
+        Rounded to a thousandth of a pixel: the last digits are the transformation's own, and a
+        point given on a pixel's border must not fall to either side of it by chance.
+
         Parameters
         ----------
         lat, lon : float
@@ -169,13 +172,15 @@ class Scene:
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
             raise PointOutsideError(outside_message(self.grid, lat, lon))
+        rows, columns = self.grid.shape
+        x, y = min(round(float(x), 3), columns - 1e-3), min(round(float(y), 3), rows - 1e-3)
         if not self.valid[int(y), int(x)]:
             raise PointOutsideError(
                 f"The point lat {lat}, lon {lon} (pixel {x:.0f}, {y:.0f}) lies where the picture "
                 "has no data.",
                 hint="Choose a point on the picture itself.",
             )
-        return float(x), float(y)
+        return x, y
 
 
 def outside_message(grid: Grid, lat: float, lon: float) -> str:
