@@ -132,14 +132,18 @@ class Surface:
         rough = np.sqrt(cv2.GaussianBlur(rough, (0, 0), 2.0))
         return np.ascontiguousarray(np.moveaxis(np.stack([*self.stack, rough]), 0, -1))
 
+    @property
+    def _size_px(self) -> FloatArray:
+        """Pixels in each superpixel."""
+        return self.parted.tree.size_px[: self.parted.tree.leaf_count]
+
     @cached_property
     def centres(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Row and column of each superpixel's centre."""
         labels = self.parted.labels
         count = self.parted.tree.leaf_count
-        size = np.bincount(labels.ravel(), minlength=count)
         rows, columns = (
-            np.bincount(labels.ravel(), index.ravel(), count) / size
+            np.bincount(labels.ravel(), index.ravel(), count) / self._size_px
             for index in np.indices(labels.shape)
         )
         return np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
@@ -149,8 +153,9 @@ class Surface:
         """Mean of each channel in each superpixel, (channels, superpixels)."""
         labels = self.parted.labels.ravel()
         count = self.parted.tree.leaf_count
-        size = np.bincount(labels, minlength=count)
-        return np.stack([np.bincount(labels, layer.ravel(), count) / size for layer in self.stack])
+        return np.stack(
+            [np.bincount(labels, layer.ravel(), count) / self._size_px for layer in self.stack]
+        )
 
     @cached_property
     def neighbours(self) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
