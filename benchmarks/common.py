@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+import shapely
+
+from geofield.imagery import read_scene
+from geofield.model import Scene
+
+#: Pictures and outlines beside the project.
+DATA = Path(os.environ.get("GEOFIELD_SHARED", Path(__file__).parents[2] / "shared")) / "data"
 RESULTS = Path(__file__).resolve().parent / "results"
 
 
@@ -33,3 +42,20 @@ def write_page(name: str, title: str, lines: Iterable[str]) -> None:
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)
+
+
+def digitised(
+    table: Path, folder: str | None = None
+) -> Iterator[tuple[str, Scene, float, float, shapely.Polygon]]:
+    """Image, scene, point and outline, pixel coordinates, of a table of outlines drawn by eye.
+
+    None where the pictures are missing. `folder` is the pictures' when the table has no such
+    column.
+    """
+    if not (DATA / "trees").is_dir():
+        return
+    with table.open(newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            scene = read_scene(DATA / (folder or row["folder"]) / f"{row['image']}.tif")
+            x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
+            yield row["image"], scene, x, y, shapely.Polygon(json.loads(row["polygon_px"]))

@@ -9,8 +9,6 @@ ones are measured.
 from __future__ import annotations
 
 import argparse
-import csv
-import json
 import math
 import os
 import platform
@@ -29,14 +27,15 @@ import shapely
 from rasterio.features import rasterize
 from scipy import ndimage
 
+from common import DATA, digitised
 from geofield.errors import GeofieldError
 from geofield.field import extract_field
-from geofield.imagery import read_scene, write_scene
+from geofield.imagery import write_scene
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
-SHARED = Path(os.environ.get("GEOFIELD_SHARED", Path(__file__).parents[2] / "shared"))
 RESULTS = Path(__file__).parent / "results" / "field.md"
+#: Fields, many without a plain border, that nothing here was learned from or chosen on.
 UNSEEN = Path(__file__).parent / "field_labels_unseen.csv"
 #: Simulation seed of the 51 fields; the weights of `auto` were learned on other seeds.
 SEED, CROWDED_SEED = 7, 4000
@@ -116,30 +115,6 @@ def overlap_mask(mask: np.ndarray, truth: shapely.Polygon) -> float:
 
 def overlap(found: shapely.Polygon, truth: shapely.Polygon) -> float:
     return found.intersection(truth).area / found.union(truth).area
-
-
-def real() -> Iterator[Case]:
-    folder = SHARED / "data" / "trees"
-    table = folder / "field_truth.csv"
-    if not table.is_file():
-        return
-    with table.open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            scene = read_scene(folder / f"{row['image']}.tif")
-            x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
-            truth = shapely.Polygon(json.loads(row["polygon_px"]))
-            yield f"{row['image']} ({x:.0f}, {y:.0f})", scene, x, y, truth
-
-
-def unseen() -> Iterator[Case]:
-    """Fields, many without a plain border, that nothing here was learned from or chosen on."""
-    if not (SHARED / "data" / "trees").is_dir():
-        return
-    with UNSEEN.open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            scene = read_scene(SHARED / "data" / row["folder"] / f"{row['image']}.tif")
-            x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
-            yield row["image"], scene, x, y, shapely.Polygon(json.loads(row["polygon_px"]))
 
 
 def crowded(count: int) -> Iterator[Case]:
@@ -314,7 +289,8 @@ def main() -> None:
     say("| field | " + " | ".join(names) + " |")
     say("|---" * (len(names) + 1) + "|")
     table: dict[str, list[float]] = {name: [] for name in names}
-    for name, scene, x, y, truth in real():
+    for image, scene, x, y, truth in digitised(DATA / "trees" / "field_truth.csv", "trees"):
+        name = f"{image} ({x:.0f}, {y:.0f})"
         row = {"auto": overlap(auto(scene, x, y)[0], truth)}
         row["study"] = overlap(study(scene, x, y)[0], truth)
         row |= {peer: overlap_mask(run(scene, x, y), truth) for peer, run in PEERS.items()}
@@ -330,7 +306,7 @@ def main() -> None:
             "has the figures of curves that never saw the site."
         )
     say()
-    found = [(*auto(scene, x, y), truth) for _, scene, x, y, truth in unseen()]
+    found = [(*auto(scene, x, y), truth) for _, scene, x, y, truth in digitised(UNSEEN)]
     if found:
         scores = np.array([overlap(polygon, truth) for polygon, _, truth in found])
         trusted = np.array([flag for _, flag, _ in found])

@@ -12,10 +12,8 @@ truth say. "Left out" figures come from curves that never saw the site.
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
-import os
 import pickle
 from collections import Counter
 from collections.abc import Iterator
@@ -27,14 +25,13 @@ import shapely
 from rasterio.features import rasterize
 from scipy.optimize import minimize
 
+from common import DATA, digitised
 from geofield.field import auto, choice
 from geofield.field.refine import carried
-from geofield.imagery import read_scene
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
 HERE = Path(__file__).parent
-SHARED = Path(os.environ.get("GEOFIELD_SHARED", HERE.parents[1] / "shared"))
 TABLE = Path(choice.__file__).parent / "tables" / "outline.json"
 RESULTS = HERE / "results" / "field_choice.md"
 SIMULATION_SEED = 11
@@ -89,20 +86,15 @@ def grey(scene: Scene) -> Scene:
 
 
 def labelled() -> Iterator[Case]:
-    data = SHARED / "data"
-    if not (data / "trees").is_dir():
-        return
-    tables = [(data / "trees" / "field_truth.csv", "trees"), (HERE / "field_labels.csv", None)]
-    for table, folder in tables:
-        with table.open(newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                scene = read_scene(data / (folder or row["folder"]) / f"{row['image']}.tif")
-                place, _, number = row["image"].rpartition("_")
-                site = f"{place.rpartition('_')[0]} {number}"
-                truth = shapely.Polygon(json.loads(row["polygon_px"]))
-                x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
-                mark = "truth" if folder else "own"
-                yield Case(f"{mark} {row['image']} ({x:.0f}, {y:.0f})", site, scene, x, y, truth)
+    tables = (
+        ("truth", DATA / "trees" / "field_truth.csv", "trees"),
+        ("own", HERE / "field_labels.csv", None),
+    )
+    for mark, table, folder in tables:
+        for image, scene, x, y, truth in digitised(table, folder):
+            place, _, number = image.rpartition("_")
+            site = f"{place.rpartition('_')[0]} {number}"
+            yield Case(f"{mark} {image} ({x:.0f}, {y:.0f})", site, scene, x, y, truth)
 
 
 def simulated(count: int) -> Iterator[Case]:
