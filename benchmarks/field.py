@@ -35,7 +35,7 @@ from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
 RESULTS = Path(__file__).parent / "results" / "field.md"
-#: Fields, many without a plain border, that nothing here was learned from or chosen on.
+#: Fields, many without a plain border, that no outline was learned from or chosen on.
 UNSEEN = Path(__file__).parent / "field_labels_unseen.csv"
 #: Simulation seed of the 51 fields; the weights of `auto` were learned on other seeds.
 SEED, CROWDED_SEED = 7, 4000
@@ -289,9 +289,12 @@ def main() -> None:
     say("| field | " + " | ".join(names) + " |")
     say("|---" * (len(names) + 1) + "|")
     table: dict[str, list[float]] = {name: [] for name in names}
+    flagged = 0
     for image, scene, x, y, truth in digitised(DATA / "trees" / "field_truth.csv", "trees"):
         name = f"{image} ({x:.0f}, {y:.0f})"
-        row = {"auto": overlap(auto(scene, x, y)[0], truth)}
+        polygon, trusted = auto(scene, x, y)
+        row = {"auto": overlap(polygon, truth)}
+        flagged += not trusted
         row["study"] = overlap(study(scene, x, y)[0], truth)
         row |= {peer: overlap_mask(run(scene, x, y), truth) for peer, run in PEERS.items()}
         for each in names:
@@ -303,7 +306,7 @@ def main() -> None:
         say()
         say(
             "The curves of `auto` were learned on these fields among others; `field_choice.md` "
-            "has the figures of curves that never saw the site."
+            f"has the figures of curves that never saw the site. Flagged: {flagged}."
         )
     say()
     found = [(*auto(scene, x, y), truth) for _, scene, x, y, truth in digitised(UNSEEN)]
@@ -314,10 +317,11 @@ def main() -> None:
         say()
         say(
             f"{len(found)} vacant lots, meadows and deserts (`field_labels_unseen.csv`), drawn by "
-            f"eye, that nothing was learned from or chosen on: `auto` {scores.mean():.3f} on "
-            f"average, median {np.median(scores):.3f}, {np.mean(scores >= 0.88):.0%} at 0.88 or "
-            f"better. Of {np.sum(scores < 0.7)} below 0.7, {np.sum((scores < 0.7) & ~trusted)} "
-            "were flagged."
+            "eye, that nothing but the certainty was learned from or chosen on: `auto` "
+            f"{scores.mean():.3f} on average, median {np.median(scores):.3f}, "
+            f"{np.mean(scores >= 0.88):.0%} at 0.88 or better. Of {np.sum(scores < 0.7)} below "
+            f"0.7, {np.sum((scores < 0.7) & ~trusted)} were flagged; of {np.sum(scores >= 0.85)} "
+            f"from 0.85 on, {np.sum((scores >= 0.85) & ~trusted)}."
         )
         say()
     for kind, fields in (("plain", simulated), ("crowded", crowded)):

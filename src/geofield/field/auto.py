@@ -37,6 +37,9 @@ COARSE_PX = 400
 _STRAY_PX = 20
 #: A border weaker than this, in units of what the field has inside, is none.
 _WEAK = 1.6
+#: Borders close inside are told from this strength on, as a share of the outline's own; a
+#: crooked course below this share of long sides.
+_RIVAL, _CROOKED = 0.75, 0.8
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -58,7 +61,8 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     best, expected = choose([one.polygon for one in outlines], score)
-    chosen, certain = outlines[best], learned().certainty(expected)
+    chosen = outlines[best]
+    certain = learned().certainty(expected, chosen.figures)
     mask = carried(scene, chosen.polygon, factor, seed)
     things = plump(chosen.region.holes | surface.things)
     holes = inner(enlarged(things, factor, mask.shape), mask)
@@ -144,6 +148,10 @@ def _evidence(
         notes.append("its border hardly differs from what lies inside")
     elif weakest < _WEAK:
         notes.append("a quarter of its border or more is weak")
+    if math.exp(chosen.figure("inside_95_above_border")) > _RIVAL:
+        notes.append("borders close inside it are as strong as its own")
+    if chosen.figure("long_sides_share") < _CROOKED:
+        notes.append("much of its course is crooked")
     if certain < _LIKELY:
         other = "as likely" if certain < 0.5 else "possible"
         notes.append(f"other outlines are {other} (certainty {certain:.0%})")

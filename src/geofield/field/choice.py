@@ -49,6 +49,10 @@ _BOLDNESS = 0.5
 _SMALL_PX = 96
 #: An outline with this overlap with the truth is a good one.
 GOOD = 0.85
+#: What tells good from bad beside the expected overlap: borders inside as strong as its own, a
+#: crooked course.
+TELLING = ("inside_95_above_border", "long_sides_share")
+EVIDENCE = ("expected_overlap", *TELLING, "constant")
 #: Where a curve bends, and where it ends, in units of the figure's spread.
 BEND, END = 0.5, 4.0
 
@@ -86,31 +90,41 @@ class Curves:
         Mean and standard deviation of each figure over the outlines learned from.
     slope : float array (3, names)
         Everywhere; above the upper bend; below the lower one.
-    trust : (float, float)
-        From the expected overlap to the probability of a good one, see `certainty`.
+    trust : float array (evidence,)
+        Weights of the `EVIDENCE` for a good outline, see `certainty`.
     """
 
     usual: FloatArray
     spread: FloatArray
     slope: FloatArray = field(repr=False)
-    trust: tuple[float, float] = (1.0, 0.0)
+    trust: FloatArray = field(default_factory=lambda: np.zeros(len(EVIDENCE)))
 
     def score(self, figures: FloatArray) -> FloatArray:
         """Scores of outlines, figures (outlines, names); only differences mean something."""
         bent = bends((figures - self.usual) / self.spread)
         return np.asarray(np.einsum("bon,bn->o", bent, self.slope))
 
-    def certainty(self, expected: float) -> float:
+    def certainty(self, expected: float, figures: FloatArray) -> float:
         """Probability that an outline overlaps the truth by `GOOD` or more.
 
         Parameters
         ----------
         expected : float
-            Its expected overlap, see `choose`. A logistic curve in it was fitted to outlines
-            on sites that the scores had not been learned from (J. Platt, 1999).
+            Its expected overlap, see `choose`.
+        figures : float array (names,)
+            Its figures.
         """
-        slope, offset = self.trust
-        return float(expit(slope * odds(expected) + offset))
+        return float(expit(self.evidence(expected, figures) @ self.trust))
+
+    def evidence(self, expected: float, figures: FloatArray) -> FloatArray:
+        """What the certainty weighs, in the order of `EVIDENCE`.
+
+        The weights are those of a logistic regression (after J. Platt, 1999), on outlines of
+        sites that the scores had not been learned from.
+        """
+        at = [NAMES.index(name) for name in TELLING]
+        standard = (figures[at] - self.usual[at]) / self.spread[at]
+        return np.array([odds(expected), *np.clip(standard, -END, END), 1.0])
 
 
 def odds(share: FloatArray | float) -> FloatArray:
@@ -143,7 +157,7 @@ def learned() -> Curves:
         )
     usual, spread = (np.array([row[key] for row in rows]) for key in ("usual", "spread"))
     slope = np.array([[row[key] for row in rows] for key in ("slope", "above", "below")])
-    return Curves(usual, spread, slope, tuple(table["trust"]))
+    return Curves(usual, spread, slope, np.array([table["trust"][name] for name in EVIDENCE]))
 
 
 def first_outlines(

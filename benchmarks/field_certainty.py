@@ -1,0 +1,90 @@
+"""How far the choice of an outline is to be trusted: learned by `field_choice.py`.
+
+A logistic regression from what `auto` knows of its choice (`Curves.evidence`) to whether the
+outline was a good one, on sites that the curves had not seen.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from geofield.field import choice
+
+#: Weight of a simulated picture against a real one; pull towards zero; parts of the sites.
+SIMULATED, RIDGE, FOLDS = 0.15, 1e-2, 8
+
+
+@dataclass
+class Found:
+    """What `auto` chose: the case's mark and site, expected and true overlap, figures."""
+
+    mark: str
+    site: str
+    expected: float
+    overlap: float
+    figures: np.ndarray
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the picture is a simulation."""
+        return self.site.startswith("simulated")
+
+
+def trusting(found: Sequence[Found], curves: choice.Curves) -> np.ndarray:
+    """Weights of the evidence for a good outline (logistic regression)."""
+    evidence = np.array([curves.evidence(one.expected, one.figures) for one in found])
+    good = np.array([one.overlap >= choice.GOOD for one in found])
+    often = Counter(one.site for one in found)
+    weight = np.array(
+        [(SIMULATED if one.simulated else 1) / often[one.site] ** 0.5 for one in found]
+    )
+
+    def loss(line: np.ndarray) -> float:
+        odds = evidence @ line
+        return float(weight @ (np.logaddexp(0, odds) - good * odds)) + RIDGE * float(line @ line)
+
+    return np.asarray(minimize(loss, np.zeros(evidence.shape[1])).x)
+
+
+def doubted(found: list[Found], curves: choice.Curves) -> list[str]:
+    """How well the certainty tells good from bad where it was not learned, as tables."""
+    sites = sorted({one.site for one in found})
+    order = np.random.default_rng(4).permutation(len(sites))
+    fold = {site: int(at) % FOLDS for site, at in zip(sites, order, strict=True)}
+    weights = [
+        trusting([one for one in found if fold[one.site] != k], curves) for k in range(FOLDS)
+    ]
+    certain = np.array(
+        [
+            replace(curves, trust=weights[fold[one.site]]).certainty(one.expected, one.figures)
+            for one in found
+        ]
+    )
+    overlaps = np.array([one.overlap for one in found])
+    real = np.array([not one.simulated for one in found])
+    page = [
+        "| certainty (real, left out) | cases | mean | share good | mean overlap |",
+        "|---" * 5 + "|",
+    ]
+    for low, high in ((0, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.85), (0.85, 1.01)):
+        at = real & (certain >= low) & (certain < high)
+        if at.any():
+            page.append(
+                f"| {low} to {min(high, 1)} | {at.sum()} | {certain[at].mean():.2f} "
+                f"| {np.mean(overlaps[at] >= choice.GOOD):.2f} | {overlaps[at].mean():.3f} |"
+            )
+    page += ["", "Certainty below 0.5, left out:", ""]
+    page += ["| cases | overlap below 0.7 | 0.7 to 0.85 | 0.85 and better |", "|---" * 4 + "|"]
+    groups = [one.mark.partition(" ")[0] for one in found]
+    for group in dict.fromkeys(groups):
+        cells = []
+        for low, high in ((0, 0.7), (0.7, choice.GOOD), (choice.GOOD, 1.01)):
+            at = (np.array(groups) == group) & (overlaps >= low) & (overlaps < high)
+            cells.append(f"{(certain[at] < 0.5).sum()} of {at.sum()}" if at.any() else "-")
+        page.append(f"| {group} | {' | '.join(cells)} |")
+    return page
