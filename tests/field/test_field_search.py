@@ -9,13 +9,14 @@ import shapely
 from shapely import Polygon, box
 
 from geofield.field import choice
-from geofield.field.border import FIGURES, Surface, measure
+from geofield.field.border import FIGURES, measure
 from geofield.field.clearing import clear
 from geofield.field.hierarchy import merge
 from geofield.field.morphology import filled, inner, plump
 from geofield.field.refine import aligned
 from geofield.field.regions import partition, regions
 from geofield.field.straight import redrawn
+from geofield.field.surface import Surface
 
 
 def overlap(a, b):

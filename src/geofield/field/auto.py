@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import FieldError
-from geofield.field.border import Surface
 from geofield.field.choice import Outline, choose, learned, search
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
@@ -29,6 +28,7 @@ from geofield.field.regions import (
     regions,
 )
 from geofield.field.segmentation import Segmentation
+from geofield.field.surface import Surface
 from geofield.model import Scene
 
 #: The search works on a picture reduced to at most this many pixels a side.

@@ -9,16 +9,14 @@ pictures.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from geofield.field.regions import Partition
 from geofield.field.straight import on_frame, ring
+from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -97,74 +95,6 @@ FIGURES = (
 """Names of the figures of `measure`, in their order."""
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """The picture that outlines are measured on.
-
-    Attributes
-    ----------
-    stack : float32 array (channels, rows, columns)
-        Whitened channels, small things painted over.
-    parted : Partition
-        Of that stack.
-    things : bool array (rows, columns)
-        What was painted over.
-    """
-
-    stack: NDArray[np.float32]
-    parted: Partition
-    things: BoolArray
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        rows, columns = self.stack.shape[1:]
-        return rows, columns
-
-    @cached_property
-    def layers(self) -> NDArray[np.float32]:
-        """The channels last, as OpenCV reads them, with roughness as one more."""
-        import cv2
-
-        rough = np.zeros(self.shape, np.float32)
-        for layer in self.stack:
-            rough += np.square(layer - cv2.GaussianBlur(layer, (0, 0), 2.0))
-        rough = np.sqrt(cv2.GaussianBlur(rough, (0, 0), 2.0))
-        return np.ascontiguousarray(np.moveaxis(np.stack([*self.stack, rough]), 0, -1))
-
-    @property
-    def _size_px(self) -> FloatArray:
-        """Pixels in each superpixel."""
-        return self.parted.tree.size_px[: self.parted.tree.leaf_count]
-
-    @cached_property
-    def centres(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Row and column of each superpixel's centre."""
-        labels = self.parted.labels
-        count = self.parted.tree.leaf_count
-        rows, columns = (
-            np.bincount(labels.ravel(), index.ravel(), count) / self._size_px
-            for index in np.indices(labels.shape)
-        )
-        return np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
-
-    @cached_property
-    def means(self) -> FloatArray:
-        """Mean of each channel in each superpixel, (channels, superpixels)."""
-        labels = self.parted.labels.ravel()
-        count = self.parted.tree.leaf_count
-        return np.stack(
-            [np.bincount(labels, layer.ravel(), count) / self._size_px for layer in self.stack]
-        )
-
-    @cached_property
-    def neighbours(self) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
-        """Pairs of neighbouring superpixels and their strengths, the weakest pair first."""
-        first, second, _, strength = self.parted.pairs
-        order = np.argsort(strength)
-        return first[order], second[order], strength[order]
-
-
 def measure(surface: Surface, outline: Polygon) -> FloatArray | None:
     """The figures of an outline, in the order of `FIGURES`; None for a mere scrap.
 
@@ -176,7 +106,7 @@ def measure(surface: Surface, outline: Polygon) -> FloatArray | None:
     """
     vertices = ring(outline)
     places, outward, frame = _places(vertices, surface.shape)
-    inside = _members(surface, vertices)
+    inside = surface.members(vertices)
     if len(places) < 12 or inside.sum() < 5:
         return None
     means = surface.means[:, inside]
@@ -318,17 +248,6 @@ def _interior(
         math.log(rough + 0.3),
         math.log(float(np.median(around)) + 0.3) - math.log(rough + 0.3),
     ]
-
-
-def _members(surface: Surface, vertices: FloatArray) -> BoolArray:
-    """The superpixels with their centres in a polygon."""
-    import cv2
-
-    mask = np.zeros(surface.shape, np.uint8)
-    # OpenCV counts from pixel centres, in sixteenths.
-    cv2.fillPoly(mask, [np.rint((vertices - 0.5) * 16).astype(np.int32)], 1, shift=4)
-    rows, columns = surface.centres
-    return np.asarray(mask[rows, columns] > 0)
 
 
 def _smoothed(values: NDArray[np.float32], width: int) -> NDArray[np.float32]:

@@ -25,10 +25,11 @@ from scipy.special import expit, logit
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.border import FIGURES, Surface, measure
+from geofield.field.border import FIGURES, measure
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.regions import TOLLS, Region
 from geofield.field.straight import redrawn
+from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
 
