@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from geofield.field import choice
+from geofield.field import scoring
 
 #: Weight of a simulated picture against a real one; pull towards zero; parts of the sites.
 SIMULATED, RIDGE, FOLDS = 0.15, 1e-2, 8
@@ -35,10 +35,10 @@ class Found:
         return self.site.startswith("simulated")
 
 
-def trusting(found: Sequence[Found], curves: choice.Curves) -> np.ndarray:
+def trusting(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
     """Weights of the evidence for a good outline (logistic regression)."""
     evidence = np.array([curves.evidence(one.expected, one.figures) for one in found])
-    good = np.array([one.overlap >= choice.GOOD for one in found])
+    good = np.array([one.overlap >= scoring.GOOD for one in found])
     often = Counter(one.site for one in found)
     weight = np.array(
         [(SIMULATED if one.simulated else 1) / often[one.site] ** 0.5 for one in found]
@@ -51,7 +51,7 @@ def trusting(found: Sequence[Found], curves: choice.Curves) -> np.ndarray:
     return np.asarray(minimize(loss, np.zeros(evidence.shape[1])).x)
 
 
-def doubted(found: list[Found], curves: choice.Curves) -> list[str]:
+def doubted(found: list[Found], curves: scoring.Curves) -> list[str]:
     """How well the certainty tells good from bad where it was not learned, as tables."""
     sites = sorted({one.site for one in found})
     order = np.random.default_rng(4).permutation(len(sites))
@@ -76,14 +76,14 @@ def doubted(found: list[Found], curves: choice.Curves) -> list[str]:
         if at.any():
             page.append(
                 f"| {low} to {min(high, 1)} | {at.sum()} | {certain[at].mean():.2f} "
-                f"| {np.mean(overlaps[at] >= choice.GOOD):.2f} | {overlaps[at].mean():.3f} |"
+                f"| {np.mean(overlaps[at] >= scoring.GOOD):.2f} | {overlaps[at].mean():.3f} |"
             )
     page += ["", "Certainty below 0.5, left out:", ""]
     page += ["| cases | overlap below 0.7 | 0.7 to 0.85 | 0.85 and better |", "|---" * 4 + "|"]
     groups = [one.mark.partition(" ")[0] for one in found]
     for group in dict.fromkeys(groups):
         cells = []
-        for low, high in ((0, 0.7), (0.7, choice.GOOD), (choice.GOOD, 1.01)):
+        for low, high in ((0, 0.7), (0.7, scoring.GOOD), (scoring.GOOD, 1.01)):
             at = (np.array(groups) == group) & (overlaps >= low) & (overlaps < high)
             cells.append(f"{(certain[at] < 0.5).sum()} of {at.sum()}" if at.any() else "-")
         page.append(f"| {group} | {' | '.join(cells)} |")

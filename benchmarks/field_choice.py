@@ -30,7 +30,7 @@ from scipy.optimize import minimize
 
 from common import DATA, digitised
 from field_certainty import Found, doubted, trusting
-from geofield.field import auto, choice
+from geofield.field import auto, choice, scoring
 from geofield.field.refine import carried
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
@@ -152,7 +152,9 @@ def reseeded(case: Case, rng: np.random.Generator) -> Case:
     return replace(case, name=f"{case.name} moved", x_px=column[at] + 0.5, y_px=row[at] + 0.5)
 
 
-def examples(case: Case, rng: np.random.Generator, curves: choice.Curves | None) -> Examples | None:
+def examples(
+    case: Case, rng: np.random.Generator, curves: scoring.Curves | None
+) -> Examples | None:
     """Outlines that a search may meet: good ones, random ones, and what it now takes for good."""
     factor = auto.reduction(case.scene)
     seed = (case.x_px / factor, case.y_px / factor)
@@ -185,7 +187,7 @@ def _overlap(one: shapely.Polygon, other: shapely.Polygon) -> float:
     return common / (one.area + other.area - common)
 
 
-def learn(known: list[Examples]) -> choice.Curves:
+def learn(known: list[Examples]) -> scoring.Curves:
     """Curves under which beliefs follow overlaps (cross entropy, ridge; convex)."""
     every = np.concatenate([one.figures for one in known]).astype(float)
     usual, spread = every.mean(axis=0), every.std(axis=0) + 1e-9
@@ -195,7 +197,7 @@ def learn(known: list[Examples]) -> choice.Curves:
     share /= share.sum()
     bent, wanted = [], []
     for one in known:
-        parts = choice.bends((one.figures - usual) / spread)
+        parts = scoring.bends((one.figures - usual) / spread)
         bent.append(np.concatenate(list(parts), axis=1))
         regret = np.minimum(one.overlap.max() - one.overlap, WORST)
         belief = np.exp(-SHARPNESS * regret)
@@ -214,10 +216,10 @@ def learn(known: list[Examples]) -> choice.Curves:
 
     size = bent[0].shape[1]
     found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": 400})
-    return choice.Curves(usual, spread, found.x.reshape(3, -1))
+    return scoring.Curves(usual, spread, found.x.reshape(3, -1))
 
 
-def folds(known: list[Examples]) -> tuple[dict[str, int], list[choice.Curves]]:
+def folds(known: list[Examples]) -> tuple[dict[str, int], list[scoring.Curves]]:
     """To which fold a site belongs, and curves that saw no site of each fold."""
     sites = sorted({one.site for one in known})
     order = np.random.default_rng(1).permutation(len(sites))
@@ -226,7 +228,7 @@ def folds(known: list[Examples]) -> tuple[dict[str, int], list[choice.Curves]]:
     return fold, curves
 
 
-def searched(case: Case, curves: choice.Curves) -> Found:
+def searched(case: Case, curves: scoring.Curves) -> Found:
     """What `auto` finds with these curves."""
     mark = case.name.partition(" ")[0] + _bands(case.name)
     factor = auto.reduction(case.scene)
@@ -243,8 +245,8 @@ def searched(case: Case, curves: choice.Curves) -> Found:
 
 
 def report(
-    known: list[Examples], curves: choice.Curves, fields: int
-) -> tuple[choice.Curves, list[str]]:
+    known: list[Examples], curves: scoring.Curves, fields: int
+) -> tuple[scoring.Curves, list[str]]:
     """The curves with what their doubt is worth, and a page on how well they choose."""
     fold, elsewhere = folds(known)
     best: dict[str, list[float]] = {}
@@ -282,7 +284,7 @@ def _bands(name: str) -> str:
     return next((end for end in (" rgb", " grey") if name.endswith(end)), "")
 
 
-def write(curves: choice.Curves) -> None:
+def write(curves: scoring.Curves) -> None:
     rows = [
         json.dumps(
             {
@@ -295,11 +297,11 @@ def write(curves: choice.Curves) -> None:
             }
         )
         for name, usual, spread, (slope, above, below) in zip(
-            choice.NAMES, curves.usual, curves.spread, curves.slope.T, strict=True
+            scoring.NAMES, curves.usual, curves.spread, curves.slope.T, strict=True
         )
     ]
     weights = dict(
-        zip(choice.EVIDENCE, (round(float(one), 4) for one in curves.trust), strict=True)
+        zip(scoring.EVIDENCE, (round(float(one), 4) for one in curves.trust), strict=True)
     )
     text = '{"learned_by": "benchmarks/field_choice.py",\n'
     text += f'"trust": {json.dumps(weights)},\n"figures": [\n'
@@ -318,7 +320,7 @@ def main() -> None:
         known = pickle.loads(options.cache.read_bytes())
     else:
         rng = np.random.default_rng(2)
-        curves = choice.learned() if TABLE.is_file() and not options.afresh else None
+        curves = scoring.learned() if TABLE.is_file() and not options.afresh else None
         known = []
         for case in cases(options.fields):
             if (one := examples(case, rng, curves)) is not None:

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from shapely import Polygon, box
 
-from geofield.field import choice
+from geofield.field import choice, scoring
 from geofield.field.border import FIGURES, measure
 from geofield.field.clearing import clear
 from geofield.field.hierarchy import merge
@@ -145,18 +145,18 @@ def test_the_choice_prefers_what_others_agree_with():
 
 
 def test_the_learned_table_is_of_these_figures_and_says_what_it_doubts():
-    curves = choice.learned()
-    assert curves.slope.shape == (3, len(choice.NAMES))
+    curves = scoring.learned()
+    assert curves.slope.shape == (3, len(scoring.NAMES))
     usual = curves.usual
     sure, fair, doubtful = (curves.certainty(expected, usual) for expected in (0.99, 0.7, 0.3))
     assert sure > fair > doubtful
     rival, crooked = usual.copy(), usual.copy()
-    rival[choice.NAMES.index("inside_95_above_border")] += 1.0  # e times as strong
-    crooked[choice.NAMES.index("long_sides_share")] = 0.6
+    rival[scoring.NAMES.index("inside_95_above_border")] += 1.0  # e times as strong
+    crooked[scoring.NAMES.index("long_sides_share")] = 0.6
     assert curves.certainty(0.7, rival) < fair
     assert curves.certainty(0.7, crooked) < fair
     text = (resources.files("geofield.field") / "tables" / "outline.json").read_text("utf-8")
-    assert [row["name"] for row in json.loads(text)["figures"]] == list(choice.NAMES)
+    assert [row["name"] for row in json.loads(text)["figures"]] == list(scoring.NAMES)
 
 
 def test_only_what_touches_no_border_is_a_hole():

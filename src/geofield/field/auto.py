@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import FieldError
-from geofield.field.choice import Outline, choose, learned, search
+from geofield.field.choice import Outline, choose, search
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
 from geofield.field.morphology import inner, plump
@@ -27,6 +27,7 @@ from geofield.field.regions import (
     partition,
     regions,
 )
+from geofield.field.scoring import learned
 from geofield.field.segmentation import Segmentation
 from geofield.field.surface import Surface
 from geofield.model import Scene

@@ -1,10 +1,7 @@
 """Choice: which of many outlines around the seed is the field.
 
 The regions around the seed are straightened into outlines, the best of them redrawn along
-their own straight sides, the best of those again. An outline's score is a sum of curves,
-one for each figure that is measured on it: bent twice, so that a figure can count more on
-one side of what is usual than on the other. `benchmarks/field_choice.py` learned them from
-simulated and real fields; `tables/outline.json` lists them.
+their own straight sides, the best of those again; `scoring` says how good each is.
 
 Scores become beliefs (their exponentials, to add up to one). The outline taken is the one
 with the largest expected overlap with the others under these beliefs.
@@ -12,29 +9,23 @@ with the largest expected overlap with the others under these beliefs.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cache
-from importlib import resources
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.special import expit, logit
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.border import FIGURES, measure
+from geofield.field.border import measure
 from geofield.field.outline import rough_outline, straight_outline
-from geofield.field.regions import TOLLS, Region
+from geofield.field.regions import Region
+from geofield.field.scoring import NAMES, Curves, learned
 from geofield.field.straight import redrawn
 from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
-
-NAMES = (*FIGURES, *(f"toll_{name}" for name in TOLLS))
-"""All figures of an outline: its own, and the tolls of the region it began as."""
 
 #: How far the first outlines may leave their regions' borders, pixels.
 _TOLERANCE_PX = 3.0
@@ -48,14 +39,6 @@ _WEIGHED = 300
 _BOLDNESS = 0.5
 #: Side of the picture in which outlines are compared, pixels.
 _SMALL_PX = 96
-#: An outline with this overlap with the truth is a good one.
-GOOD = 0.85
-#: What tells good from bad beside the expected overlap: borders inside as strong as its own, a
-#: crooked course.
-TELLING = ("inside_95_above_border", "long_sides_share")
-EVIDENCE = ("expected_overlap", *TELLING, "constant")
-#: Where a curve bends, and where it ends, in units of the figure's spread.
-BEND, END = 0.5, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,86 +62,6 @@ class Outline:
     def figure(self, name: str) -> float:
         """One of the figures."""
         return float(self.figures[NAMES.index(name)])
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """The learned sum of curves.
-
-    Attributes
-    ----------
-    usual, spread : float array (names,)
-        Mean and standard deviation of each figure over the outlines learned from.
-    slope : float array (3, names)
-        Everywhere; above the upper bend; below the lower one.
-    trust : float array (evidence,)
-        Weights of the `EVIDENCE` for a good outline, see `certainty`.
-    """
-
-    usual: FloatArray
-    spread: FloatArray
-    slope: FloatArray = field(repr=False)
-    trust: FloatArray = field(default_factory=lambda: np.zeros(len(EVIDENCE)))
-
-    def score(self, figures: FloatArray) -> FloatArray:
-        """Scores of outlines, figures (outlines, names); only differences mean something."""
-        bent = bends((figures - self.usual) / self.spread)
-        return np.asarray(np.einsum("bon,bn->o", bent, self.slope))
-
-    def certainty(self, expected: float, figures: FloatArray) -> float:
-        """Probability that an outline overlaps the truth by `GOOD` or more.
-
-        Parameters
-        ----------
-        expected : float
-            Its expected overlap, see `choose`.
-        figures : float array (names,)
-            Its figures.
-        """
-        return float(expit(self.evidence(expected, figures) @ self.trust))
-
-    def evidence(self, expected: float, figures: FloatArray) -> FloatArray:
-        """What the certainty weighs, in the order of `EVIDENCE`.
-
-        The weights are those of a logistic regression (after J. Platt, 1999), on outlines of
-        sites that the scores had not been learned from.
-        """
-        at = [NAMES.index(name) for name in TELLING]
-        standard = (figures[at] - self.usual[at]) / self.spread[at]
-        return np.array([odds(expected), *np.clip(standard, -END, END), 1.0])
-
-
-def odds(share: FloatArray | float) -> FloatArray:
-    """Logarithm of the odds of a share, within bounds."""
-    return np.asarray(logit(np.clip(share, 0.01, 0.995)))
-
-
-def bends(standard: FloatArray) -> FloatArray:
-    """Standardised figures as the three parts of a curve, (3, ...)."""
-    standard = np.clip(standard, -END, END)
-    return np.stack([standard, np.maximum(standard - BEND, 0), np.maximum(-standard - BEND, 0)])
-
-
-@cache
-def learned() -> Curves:
-    """The curves of `tables/outline.json`.
-
-    Raises
-    ------
-    FieldError
-        When the table is not of this version's figures.
-    """
-    text = (resources.files(__package__) / "tables" / "outline.json").read_text("utf-8")
-    table = json.loads(text)
-    rows = table["figures"]
-    if tuple(row["name"] for row in rows) != NAMES:
-        raise FieldError(
-            "The table of the outlines' figures is of another version.",
-            hint="Run benchmarks/field_choice.py --write.",
-        )
-    usual, spread = (np.array([row[key] for row in rows]) for key in ("usual", "spread"))
-    slope = np.array([[row[key] for row in rows] for key in ("slope", "above", "below")])
-    return Curves(usual, spread, slope, np.array([table["trust"][name] for name in EVIDENCE]))
 
 
 def first_outlines(
