@@ -35,8 +35,6 @@ from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
 RESULTS = Path(__file__).parent / "results" / "field.md"
-#: Fields, many without a plain border, that no outline was learned from or chosen on.
-UNSEEN = Path(__file__).parent / "field_labels_unseen.csv"
 #: Simulation seed of the 51 fields; the weights of `auto` were learned on other seeds.
 SEED, CROWDED_SEED = 7, 4000
 KINDS = {
@@ -309,21 +307,6 @@ def main() -> None:
             f"has the figures of curves that never saw the site. Flagged: {flagged}."
         )
     say()
-    found = [(*auto(scene, x, y), truth) for _, scene, x, y, truth in digitised(UNSEEN)]
-    if found:
-        scores = np.array([overlap(polygon, truth) for polygon, _, truth in found])
-        trusted = np.array([flag for _, flag, _ in found])
-        say("## Other real fields, on many of which nobody would see a plain border")
-        say()
-        say(
-            f"{len(found)} vacant lots, meadows and deserts (`field_labels_unseen.csv`), drawn by "
-            "eye, that nothing but the certainty was learned from or chosen on: `auto` "
-            f"{scores.mean():.3f} on average, median {np.median(scores):.3f}, "
-            f"{np.mean(scores >= 0.88):.0%} at 0.88 or better. Of {np.sum(scores < 0.7)} below "
-            f"0.7, {np.sum((scores < 0.7) & ~trusted)} were flagged; of {np.sum(scores >= 0.85)} "
-            f"from 0.85 on, {np.sum((scores >= 0.85) & ~trusted)}."
-        )
-        say()
     for kind, fields in (("plain", simulated), ("crowded", crowded)):
         compare(kind, fields(options.fields), options, say)
     seeds(options, say)

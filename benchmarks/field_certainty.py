@@ -21,8 +21,9 @@ SIMULATED, RIDGE, FOLDS = 0.15, 1e-2, 8
 
 @dataclass
 class Found:
-    """What `auto` chose: the case's mark and site, expected and true overlap, figures."""
+    """What was chosen: the case's name, mark and site, expected and true overlap, figures."""
 
+    name: str
     mark: str
     site: str
     expected: float
@@ -51,20 +52,20 @@ def trusting(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
     return np.asarray(minimize(loss, np.zeros(evidence.shape[1])).x)
 
 
-def doubted(found: list[Found], curves: scoring.Curves) -> list[str]:
-    """How well the certainty tells good from bad where it was not learned, as tables."""
+def left_out_certainty(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
+    """Certainties with weights that were learned without the site."""
     sites = sorted({one.site for one in found})
     order = np.random.default_rng(4).permutation(len(sites))
     fold = {site: int(at) % FOLDS for site, at in zip(sites, order, strict=True)}
-    weights = [
-        trusting([one for one in found if fold[one.site] != k], curves) for k in range(FOLDS)
+    judges = [
+        replace(curves, trust=trusting([one for one in found if fold[one.site] != k], curves))
+        for k in range(FOLDS)
     ]
-    certain = np.array(
-        [
-            replace(curves, trust=weights[fold[one.site]]).certainty(one.expected, one.figures)
-            for one in found
-        ]
-    )
+    return np.array([judges[fold[one.site]].certainty(one.expected, one.figures) for one in found])
+
+
+def tables(found: Sequence[Found], certain: np.ndarray) -> list[str]:
+    """How well certainties tell good from bad."""
     overlaps = np.array([one.overlap for one in found])
     real = np.array([not one.simulated for one in found])
     page = [

@@ -3,20 +3,26 @@
 The picture's channels become surfaces (`evidence`), crowns inside them give way
 (`clearing`), superpixels merge into regions around the point (`regions`), and the best
 straight outline of many is taken (`choice`) and carried to the picture's own pixels
-(`refine`).
+(`refine`). Where its border leaves doubt, each superpixel is judged by itself (`looks`,
+`ground`), and outlines are searched again that also agree with that.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import FieldError
-from geofield.field.choice import Outline, choose, search
+from geofield.field.choice import Judge, Outline, choose, search
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
+from geofield.field.ground import Ground, Network
+from geofield.field.ground import learned as learned_network
+from geofield.field.looks import looks
 from geofield.field.morphology import inner, plump
 from geofield.field.refine import carried, enlarged
 from geofield.field.regions import (
@@ -27,7 +33,7 @@ from geofield.field.regions import (
     partition,
     regions,
 )
-from geofield.field.scoring import learned
+from geofield.field.scoring import Curves, learned
 from geofield.field.segmentation import Segmentation
 from geofield.field.surface import Surface
 from geofield.model import Scene
@@ -41,6 +47,8 @@ _WEAK = 1.6
 #: Borders close inside are told from this strength on, as a share of the outline's own; a
 #: crooked course below this share of long sides.
 _RIVAL, _CROOKED = 0.75, 0.8
+#: Below this certainty the ground is asked, too.
+SECOND_OPINION = 0.66
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -56,19 +64,18 @@ def segment(scene: Scene, x_px: float, y_px: float) -> Segmentation:
     """
     factor = reduction(scene)
     seed = (x_px / factor, y_px / factor)
-    surface, found, ground = prepared(scene, factor, seed)
-    outlines, score = search(surface, found, ground)
-    if not outlines:
+    ready = prepared(scene, factor, seed)
+    chosen = opinion(ready, learned())
+    if chosen is None:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
-    best, expected = choose([one.polygon for one in outlines], score)
-    chosen = outlines[best]
-    certain = learned().certainty(expected, chosen.figures)
-    mask = carried(scene, chosen.polygon, factor, seed)
-    things = plump(chosen.region.holes | surface.things)
+    if chosen.certainty < SECOND_OPINION:
+        chosen = opinion(ready, learned(ground=True), learned_network()) or chosen
+    mask = carried(scene, chosen.outline.polygon, factor, seed)
+    things = plump(chosen.outline.region.holes | ready.surface.things)
     holes = inner(enlarged(things, factor, mask.shape), mask)
-    notes, figures = _evidence(chosen, certain)
-    if ground != seed:
+    notes, figures = _evidence(chosen)
+    if ready.seed_px != seed:
         notes = ("the point lies on something small (a tree, a hut, a track?)", *notes)
     return Segmentation(mask & ~holes & scene.valid, notes, figures)
 
@@ -78,10 +85,37 @@ def reduction(scene: Scene) -> int:
     return max(1, math.ceil(max(scene.grid.shape) / COARSE_PX))
 
 
-def prepared(
-    scene: Scene, factor: int, seed_px: tuple[float, float]
-) -> tuple[Surface, list[Region], tuple[float, float]]:
-    """What the search needs: the surface, the regions around the seed, the open ground there.
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a search needs.
+
+    Attributes
+    ----------
+    surface : Surface
+    second : Partition
+        Of another look at the same picture.
+    regions : list of Region
+        Around the seed, of both partitions.
+    raw : float32 array (channels, rows, columns)
+        The channels as they are.
+    seed_px : (float, float)
+        Open ground at the seed or beside it, pixel coordinates of the surface.
+    """
+
+    surface: Surface
+    second: Partition
+    regions: list[Region]
+    raw: NDArray[np.float32]
+    seed_px: tuple[float, float]
+
+    @cached_property
+    def looks(self) -> NDArray[np.float64]:
+        """What each superpixel shows, (superpixels, looks)."""
+        return looks(self.surface, self.second, self.raw, self.seed_px)
+
+
+def prepared(scene: Scene, factor: int, seed_px: tuple[float, float]) -> Prepared:
+    """A scene made ready for the search.
 
     Parameters
     ----------
@@ -102,46 +136,64 @@ def prepared(
     surface = Surface(stack, partition(stack), things)
     if not len(surface.parted.lines.first):
         raise FieldError("The picture is too small to find a field in.")
-    ground = footing(surface.parted, things, seed_px)
-    found = regions(surface.parted, ground)
-    # A second opinion: nothing painted over, and colour alone where there is near infrared.
+    open_px = footing(surface.parted, things, seed_px)
+    # Another look: nothing painted over, and colour alone where there is near infrared.
     second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed_px))
-    return surface, [*found, *regions(second, ground)], ground
+    found = [*regions(surface.parted, open_px), *regions(second, open_px)]
+    return Prepared(surface, second, found, raw, open_px)
+
+
+@dataclass(frozen=True, eq=False)
+class Opinion:
+    """An outline, the overlap with the truth that it may expect, how certain a good one is."""
+
+    outline: Outline
+    expected: float
+    certainty: float
+
+
+def opinion(ready: Prepared, curves: Curves, network: Network | None = None) -> Opinion | None:
+    """The outline that curves choose, where a network is given with it; None without any."""
+    ground = None if network is None else Ground(ready.surface, ready.looks, network)
+    outlines, score = search(Judge(ready.surface, curves, ground), ready.regions, ready.seed_px)
+    if not outlines:
+        return None
+    best, expected = choose([one.polygon for one in outlines], score)
+    return Opinion(outlines[best], expected, curves.certainty(expected, outlines[best].figures))
 
 
 def footing(
     parted: Partition, things: NDArray[np.bool_], seed_px: tuple[float, float]
 ) -> tuple[float, float]:
-    """The seed, or the nearest place on open ground where it is on a crown or the like."""
+    """The seed, or the nearest place on open ground where it is on a crown or the like.
+
+    That is ground of the surface which the crown stands in, where it is known: beyond a border
+    nearby there is other ground.
+    """
     labels, tree = parted.labels, parted.tree
     x, y = int(seed_px[0]), int(seed_px[1])
     smallest = max(SMALLEST_PX, SMALLEST_SHARE * labels.size)
-    specks: dict[int, bool] = {}
-
-    def on_speck(row: int, column: int) -> bool:
-        if things[row, column]:
-            return True
-        leaf = int(labels[row, column])
-        if leaf not in specks:
-            specks[leaf] = tree.is_speck(leaf, smallest)
-        return specks[leaf]
-
-    if not on_speck(y, x):
+    around = tree.surface_around(int(labels[y, x]), smallest)
+    if around is None and not things[y, x]:
         return seed_px
     top, left = max(y - _STRAY_PX, 0), max(x - _STRAY_PX, 0)
-    near = labels[top : y + _STRAY_PX + 1, left : x + _STRAY_PX + 1]
-    row, column = np.indices(near.shape)
-    distance = np.hypot(row + top - y, column + left - x).ravel()
-    for place in np.argsort(distance, kind="stable"):
-        down, right = divmod(int(place), near.shape[1])
-        if not on_speck(top + down, left + right):
-            return (left + right + 0.5, top + down + 0.5)
-    return seed_px
+    near = (slice(top, y + _STRAY_PX + 1), slice(left, x + _STRAY_PX + 1))
+    leaves, leaf_at = np.unique(labels[near], return_inverse=True)
+    open_leaf = np.array([tree.surface_around(int(leaf), smallest) is None for leaf in leaves])
+    free = open_leaf[leaf_at.reshape(labels[near].shape)] & ~things[near]
+    row, column = np.indices(free.shape)
+    distance = np.hypot(row + top - y, column + left - x)
+    if around is not None:
+        own = free & np.isin(labels[near], tree.leaves(around))
+        free = own if own.any() else free
+    if not free.any():
+        return seed_px
+    down, right = np.unravel_index(np.argmin(np.where(free, distance, np.inf)), free.shape)
+    return (float(left + right) + 0.5, float(top + down) + 0.5)
 
 
-def _evidence(
-    chosen: Outline, certain: float
-) -> tuple[tuple[str, ...], tuple[tuple[str, float], ...]]:
+def _evidence(found: Opinion) -> tuple[tuple[str, ...], tuple[tuple[str, float], ...]]:
+    chosen, certain = found.outline, found.certainty
     contrast = math.exp(chosen.figure("strength_50_above_inside"))
     weakest = math.exp(chosen.figure("strength_25_above_inside"))
     notes = []

@@ -95,7 +95,7 @@ FIGURES = (
 """Names of the figures of `measure`, in their order."""
 
 
-def measure(surface: Surface, outline: Polygon) -> FloatArray | None:
+def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> FloatArray | None:
     """The figures of an outline, in the order of `FIGURES`; None for a mere scrap.
 
     Parameters
@@ -103,10 +103,11 @@ def measure(surface: Surface, outline: Polygon) -> FloatArray | None:
     surface : Surface
     outline : Polygon
         Pixel coordinates of the surface, no holes.
+    inside : bool array (superpixels,)
+        The superpixels in it, see `Surface.members`.
     """
     vertices = ring(outline)
     places, outward, frame = _places(vertices, surface.shape)
-    inside = surface.members(vertices)
     if len(places) < 12 or inside.sum() < 5:
         return None
     means = surface.means[:, inside]

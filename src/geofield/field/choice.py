@@ -19,10 +19,11 @@ from shapely import Polygon
 
 from geofield.errors import FieldError
 from geofield.field.border import measure
+from geofield.field.ground import Ground, agreement
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.regions import Region
-from geofield.field.scoring import NAMES, Curves, learned
-from geofield.field.straight import redrawn
+from geofield.field.scoring import WITH_GROUND, Curves
+from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +53,7 @@ class Outline:
     region : Region
         The region that it began as.
     figures : float array (names,)
-        In the order of `NAMES`.
+        In the order of `NAMES`, or of `WITH_GROUND`.
     """
 
     polygon: Polygon
@@ -61,78 +62,89 @@ class Outline:
 
     def figure(self, name: str) -> float:
         """One of the figures."""
-        return float(self.figures[NAMES.index(name)])
+        return float(self.figures[WITH_GROUND.index(name)])
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """What outlines are judged by.
+
+    Attributes
+    ----------
+    surface : Surface
+        On which they are measured.
+    curves : Curves
+        That score them.
+    ground : Ground or None
+        Needed by curves that count how well an outline agrees with it.
+    """
+
+    surface: Surface
+    curves: Curves
+    ground: Ground | None = None
+
+    def measured(self, polygons: Sequence[Polygon], region: Region) -> list[Outline]:
+        """Outlines with their figures; scraps are left out."""
+        found = []
+        for polygon in polygons:
+            if polygon.is_empty or not polygon.is_valid:
+                continue
+            inside = self.surface.members(ring(polygon))
+            if (figures := measure(self.surface, polygon, inside)) is not None:
+                parts = [figures, region.toll]
+                if self.ground is not None:
+                    parts.append(agreement(self.ground, inside))
+                found.append(Outline(polygon, region, np.concatenate(parts)))
+        return found
+
+    def scores(self, outlines: Sequence[Outline]) -> FloatArray:
+        """Scores of measured outlines; only differences mean something."""
+        return self.curves.score(np.array([one.figures for one in outlines]))
 
 
 def first_outlines(
-    surface: Surface, regions: Sequence[Region], curves: Curves | None
+    judge: Judge, regions: Sequence[Region], straightened: int | None = _FITTED
 ) -> list[Outline]:
-    """The regions' own outlines, measured; the best also with well fitted sides.
-
-    Parameters
-    ----------
-    surface : Surface
-    regions : sequence of Region
-    curves : Curves or None
-        They say which are the best; None fits the sides of all.
-    """
+    """The regions' own outlines; so many of the best (None: all) also with well fitted sides."""
     rough = []
     for region in regions:
-        rough += _measured(surface, [rough_outline(region.mask)], region)
+        rough += judge.measured([rough_outline(region.mask)], region)
     best = list(rough)
-    if curves is not None and rough:
-        score = curves.score(np.array([one.figures for one in rough]))
-        best = [rough[at] for at in np.argsort(-score, kind="stable")[:_FITTED]]
+    if straightened is not None and rough:
+        order = np.argsort(-judge.scores(rough), kind="stable")
+        best = [rough[at] for at in order[:straightened]]
     found = list(rough)
     for one in best:
         try:
             fitted = straight_outline(one.region.mask, tolerance_px=_TOLERANCE_PX)
         except FieldError:
             continue
-        found += _measured(surface, [Polygon(fitted.exterior)], one.region)
+        found += judge.measured([Polygon(fitted.exterior)], one.region)
     return found
 
 
-def redrawn_outlines(
-    surface: Surface, outline: Outline, seed_px: tuple[float, float]
-) -> list[Outline]:
-    """What an outline suggests, measured."""
-    others = redrawn(outline.polygon, seed_px, surface.shape)
-    return _measured(surface, others, outline.region)
-
-
-def _measured(surface: Surface, polygons: Sequence[Polygon], region: Region) -> list[Outline]:
-    found = []
-    for polygon in polygons:
-        if polygon.is_empty or not polygon.is_valid:
-            continue
-        if (figures := measure(surface, polygon)) is not None:
-            found.append(Outline(polygon, region, np.concatenate([figures, region.toll])))
-    return found
+def redrawn_outlines(judge: Judge, outline: Outline, seed_px: tuple[float, float]) -> list[Outline]:
+    """What an outline suggests."""
+    others = redrawn(outline.polygon, seed_px, judge.surface.shape)
+    return judge.measured(others, outline.region)
 
 
 def search(
-    surface: Surface,
-    regions: Sequence[Region],
-    seed_px: tuple[float, float],
-    curves: Curves | None = None,
+    judge: Judge, regions: Sequence[Region], seed_px: tuple[float, float]
 ) -> tuple[list[Outline], FloatArray]:
     """Outlines around the seed and their scores, the best first.
 
     Parameters
     ----------
-    surface : Surface
+    judge : Judge
     regions : sequence of Region
     seed_px : (float, float)
         Pixel coordinates of the surface.
-    curves : Curves, optional
-        The learned ones when None.
     """
-    curves = curves or learned()
-    found = first_outlines(surface, regions, curves)
+    found = first_outlines(judge, regions)
     if not found:
         return [], np.zeros(0)
-    score = curves.score(np.array([one.figures for one in found]))
+    score = judge.scores(found)
     tried: set[int] = set()
     known = {_key(one.polygon) for one in found}
     for _ in range(_ROUNDS):
@@ -140,14 +152,14 @@ def search(
         more: list[Outline] = []
         for at in best:
             tried.add(at)
-            for one in redrawn_outlines(surface, found[at], seed_px):
+            for one in redrawn_outlines(judge, found[at], seed_px):
                 if (key := _key(one.polygon)) not in known:
                     known.add(key)
                     more.append(one)
         if not more:
             break
         found += more
-        score = np.concatenate([score, curves.score(np.array([one.figures for one in more]))])
+        score = np.concatenate([score, judge.scores(more)])
     order = np.argsort(-score, kind="stable")
     return [found[at] for at in order], score[order]
 

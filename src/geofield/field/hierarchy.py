@@ -50,11 +50,11 @@ class MergeTree:
             found.append(int(self.parent[found[-1]]))
         return found
 
-    def is_speck(self, leaf: int, smallest_px: float) -> bool:
-        """Whether a superpixel belongs to something small that stands out of a large surface.
+    def surface_around(self, leaf: int, smallest_px: float) -> int | None:
+        """The large surface that something small stands out of, if a superpixel belongs to such.
 
         A crown, a hut: its region joins a far larger one across a border much stronger than
-        any that it has inside.
+        any that it has inside. None for a superpixel of open ground.
         """
         region = leaf
         while self.size_px[region] < smallest_px and self.parent[region] != -1:
@@ -63,9 +63,9 @@ class MergeTree:
             if self.size_px[other] >= 4 * self.size_px[region] and self.height[up] > max(
                 _STANDS_OUT, 2.5 * self.height[region]
             ):
-                return True
+                return other
             region = up
-        return False
+        return None
 
     def beside(self, region: int) -> int:
         """The other part of the region that a region merges into."""

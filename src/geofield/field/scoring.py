@@ -2,29 +2,31 @@
 
 An outline's score is a sum of curves, one for each figure that is measured on it: bent twice,
 so that a figure can count more on one side of what is usual than on the other.
-`benchmarks/field_choice.py` learned them from simulated and real fields; `tables/outline.json`
-lists them.
+`benchmarks/field_choice.py` learned them from simulated and real fields. There are two sets:
+`tables/outline.json` counts what is measured along and within an outline, `tables/opinion.json`
+also how well the outline agrees with the `ground`.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, logit
 
-from geofield.errors import FieldError
 from geofield.field.border import FIGURES
+from geofield.field.ground import AGREEMENT
 from geofield.field.regions import TOLLS
+from geofield.field.table import read_table
 
 FloatArray = NDArray[np.float64]
 
 NAMES = (*FIGURES, *(f"toll_{name}" for name in TOLLS))
-"""All figures of an outline: its own, and the tolls of the region it began as."""
+"""Figures of an outline: its own, and the tolls of the region it began as."""
+WITH_GROUND = (*NAMES, *AGREEMENT)
+"""The same and how well it agrees with the ground."""
 
 #: An outline with this overlap with the truth is a good one.
 GOOD = 0.85
@@ -95,22 +97,17 @@ def bends(standard: FloatArray) -> FloatArray:
 
 
 @cache
-def learned() -> Curves:
-    """The curves of `tables/outline.json`.
+def learned(*, ground: bool = False) -> Curves:
+    """The curves of `tables/outline.json`, or of `tables/opinion.json` that count the ground.
 
     Raises
     ------
     FieldError
         When the table is not of this version's figures.
     """
-    text = (resources.files(__package__) / "tables" / "outline.json").read_text("utf-8")
-    table = json.loads(text)
+    names = WITH_GROUND if ground else NAMES
+    table = read_table("opinion" if ground else "outline", "figures", names)
     rows = table["figures"]
-    if tuple(row["name"] for row in rows) != NAMES:
-        raise FieldError(
-            "The table of the outlines' figures is of another version.",
-            hint="Run benchmarks/field_choice.py --write.",
-        )
     usual, spread = (np.array([row[key] for row in rows]) for key in ("usual", "spread"))
     slope = np.array([[row[key] for row in rows] for key in ("slope", "above", "below")])
     return Curves(usual, spread, slope, np.array([table["trust"][name] for name in EVIDENCE]))
