@@ -7,8 +7,7 @@ First opinion: curves over the figures of an outline make the beliefs over a pic
 as likely as their overlaps with the truth say. Second opinion, where the first leaves doubt: a
 small network learns which superpixels belong to the field (`field_ground.py`), and other curves
 also count how well an outline agrees with it. "Left out" figures come from networks and curves
-that never saw the site. Needs scikit-learn (`pip install scikit-learn`), which nothing else
-here needs.
+that never saw the site.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The network that judges the ground, learned: part of `field_choice.py`.
 
-Needs scikit-learn (`pip install scikit-learn`), which nothing else here needs.
+Learned by scikit-learn (dependency group `bench`), used without it.
 """
 
 from __future__ import annotations
