@@ -197,6 +197,14 @@ def test_a_wrong_settings_file_does_not_show_its_keys(capsys: pytest.CaptureFixt
     assert "s3cret" not in shown
 
 
+#: As `python -m geofield`. Tests in the background have SIGINT ignored, and hand that on.
+INTERRUPTIBLE = """
+import runpy, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+runpy.run_module("geofield", run_name="__main__", alter_sys=True)
+"""
+
+
 def test_ctrl_c_from_a_terminal(tmp_path: Path) -> None:
     def slow(handler: Any, tile: tuple[int, int, int], attempt: int) -> bool:
         time.sleep(0.1)
@@ -205,7 +213,7 @@ def test_ctrl_c_from_a_terminal(tmp_path: Path) -> None:
     with serving(slow) as server:
         process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "geofield", "tiles", server.template, *POINT),
+                *(sys.executable, "-c", INTERRUPTIBLE, "tiles", server.template, *POINT),
                 *("--zoom", "18", "--size", "5000", "-o", str(tmp_path / "a.tif")),
             ],
             env={**os.environ, "XDG_CACHE_HOME": str(tmp_path / "home")},
