@@ -10,8 +10,9 @@ straight outline of many is taken (`choice`) and carried to the picture's own pi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,8 @@ class Prepared:
         The channels as they are.
     seed_px : (float, float)
         Open ground at the seed or beside it, pixel coordinates of the surface.
+    known : dict
+        What was measured on the surface so far, see `Judge`.
     """
 
     surface: Surface
@@ -107,6 +110,7 @@ class Prepared:
     regions: list[Region]
     raw: NDArray[np.float32]
     seed_px: tuple[float, float]
+    known: dict[bytes, Any] = field(default_factory=dict)
 
     @cached_property
     def looks(self) -> NDArray[np.float64]:
@@ -155,7 +159,8 @@ class Opinion:
 def opinion(ready: Prepared, curves: Curves, network: Network | None = None) -> Opinion | None:
     """The outline that curves choose, where a network is given with it; None without any."""
     ground = None if network is None else Ground(ready.surface, ready.looks, network)
-    outlines, score = search(Judge(ready.surface, curves, ground), ready.regions, ready.seed_px)
+    judge = Judge(ready.surface, curves, ground, ready.known)
+    outlines, score = search(judge, ready.regions, ready.seed_px)
     if not outlines:
         return None
     best, expected = choose([one.polygon for one in outlines], score)
@@ -178,9 +183,9 @@ def footing(
         return seed_px
     top, left = max(y - _STRAY_PX, 0), max(x - _STRAY_PX, 0)
     near = (slice(top, y + _STRAY_PX + 1), slice(left, x + _STRAY_PX + 1))
-    leaves, leaf_at = np.unique(labels[near], return_inverse=True)
-    open_leaf = np.array([tree.surface_around(int(leaf), smallest) is None for leaf in leaves])
-    free = open_leaf[leaf_at.reshape(labels[near].shape)] & ~things[near]
+    leaves = np.unique(labels[near])
+    specks = [leaf for leaf in leaves if tree.surface_around(int(leaf), smallest) is not None]
+    free = ~np.isin(labels[near], specks) & ~things[near]
     row, column = np.indices(free.shape)
     distance = np.hypot(row + top - y, column + left - x)
     if around is not None:

@@ -10,7 +10,7 @@ with the largest expected overlap with the others under these beliefs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -27,6 +27,7 @@ from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 #: How far the first outlines may leave their regions' borders, pixels.
 _TOLERANCE_PX = 3.0
@@ -77,11 +78,15 @@ class Judge:
         That score them.
     ground : Ground or None
         Needed by curves that count how well an outline agrees with it.
+    known : dict
+        The superpixels inside, and figures on the surface, of each polygon (WKB) measured so far.
+        Judges of one surface may share it.
     """
 
     surface: Surface
     curves: Curves
     ground: Ground | None = None
+    known: dict[bytes, tuple[BoolArray, FloatArray | None]] = field(default_factory=dict)
 
     def measured(self, polygons: Sequence[Polygon], region: Region) -> list[Outline]:
         """Outlines with their figures; scraps are left out."""
@@ -89,8 +94,12 @@ class Judge:
         for polygon in polygons:
             if polygon.is_empty or not polygon.is_valid:
                 continue
-            inside = self.surface.members(ring(polygon))
-            if (figures := measure(self.surface, polygon, inside)) is not None:
+            key = polygon.wkb
+            if key not in self.known:
+                inside = self.surface.members(ring(polygon))
+                self.known[key] = inside, measure(self.surface, polygon, inside)
+            inside, figures = self.known[key]
+            if figures is not None:
                 parts = [figures, region.toll]
                 if self.ground is not None:
                     parts.append(agreement(self.ground, inside))

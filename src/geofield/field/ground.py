@@ -13,7 +13,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from geofield.field.looks import LOOKS
 from geofield.field.surface import Surface
@@ -62,6 +62,11 @@ class Network:
         standard = standardised(looks, self.usual, self.spread)
         lit = np.maximum(standard @ self.hidden + self.hidden_bias, 0.0)
         return np.asarray(np.clip(lit @ self.outward + self.bias, -_SURE, _SURE))
+
+
+def log_odds(share: FloatArray | float) -> FloatArray:
+    """Logarithm of the odds of a share, within bounds."""
+    return np.asarray(logit(np.clip(share, 0.01, 0.995)))
 
 
 def standardised(looks: FloatArray, usual: FloatArray, spread: FloatArray) -> FloatArray:
@@ -128,12 +133,12 @@ def agreement(ground: Ground, inside: BoolArray) -> FloatArray:
     area, common = float(own.sum()), float(own @ own_likely)
     everywhere, missed = float(size @ likely), float(own @ np.log(own_likely))
     beyond = size[~inside] @ np.log1p(-likely[~inside])
-    overlap = np.clip(common / (area + everywhere - common), 0.01, 0.995)
+    overlap = common / (area + everywhere - common)
     return np.array(
         [
             own @ own_odds / area,
             own @ (own_likely < 0.3) / area,
-            np.log(overlap / (1 - overlap)),
+            float(log_odds(overlap)),
             np.log(0.02 - (missed + beyond) / size.sum()),
             np.sort(own_odds)[int(0.1 * len(own))],
         ]

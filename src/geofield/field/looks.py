@@ -98,9 +98,10 @@ def looks(
     cost = _way_cost(surface.parted, int(labels[seed]))
     plain = _plain(raw)
     patch = _patch(surface, int(labels[seed]))
+    unlike = _unlike(surface, patch)
     return np.column_stack(
         [
-            _appearance(surface, plain, own, patch),
+            _appearance(surface, plain, own, patch, unlike),
             _log(_mean_around(surface, strength, strength)),
             surface.things[rows, columns],
             np.full(len(rows), float(3 in _PRESENT[len(raw)])),
@@ -111,7 +112,7 @@ def looks(
             _joining(second, int(second.labels[seed]))[second_at],
             cost,
             cost - np.log(away / 5 + 1),
-            _sight(surface, plain, own, patch, seed_px),
+            _sight(surface, plain, own, unlike, seed_px),
         ]
     )
 
@@ -136,7 +137,11 @@ def _patch(surface: Surface, leaf: int) -> FloatArray:
 
 
 def _appearance(
-    surface: Surface, plain: NDArray[np.float32], own: BoolArray, patch: FloatArray
+    surface: Surface,
+    plain: NDArray[np.float32],
+    own: BoolArray,
+    patch: FloatArray,
+    smooth_unlike: NDArray[np.float32],
 ) -> FloatArray:
     """How superpixels look, and how unlike the seed's ground."""
     rows, columns = surface.centres
@@ -151,7 +156,7 @@ def _appearance(
         [
             unlike,
             unlike_patch,
-            _log(_unlike(surface, patch)[rows, columns]),
+            _log(smooth_unlike[rows, columns]),
             _mean_around(surface, unlike_patch[other], unlike_patch[first]),
             rough,
             rough - np.median(rough[own]),
@@ -213,7 +218,7 @@ def _sight(
     surface: Surface,
     plain: NDArray[np.float32],
     own: BoolArray,
-    patch: FloatArray,
+    smooth_unlike: NDArray[np.float32],
     seed_px: tuple[float, float],
 ) -> FloatArray:
     """What lies on the straight line from the seed to each superpixel."""
@@ -228,7 +233,7 @@ def _sight(
     seen = np.stack(
         [
             gradient(surface.stack, 1.5),
-            _unlike(surface, patch),
+            smooth_unlike,
             surface.layers[..., -1],
             plain[..., 3],
         ],

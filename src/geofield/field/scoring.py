@@ -14,10 +14,10 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, logit
+from scipy.special import expit
 
 from geofield.field.border import FIGURES
-from geofield.field.ground import AGREEMENT
+from geofield.field.ground import AGREEMENT, log_odds
 from geofield.field.regions import TOLLS
 from geofield.field.table import read_table
 
@@ -82,12 +82,7 @@ class Curves:
         """
         at = [NAMES.index(name) for name in TELLING]
         standard = (figures[at] - self.usual[at]) / self.spread[at]
-        return np.array([odds(expected), *np.clip(standard, -END, END), 1.0])
-
-
-def odds(share: FloatArray | float) -> FloatArray:
-    """Logarithm of the odds of a share, within bounds."""
-    return np.asarray(logit(np.clip(share, 0.01, 0.995)))
+        return np.array([log_odds(expected), *np.clip(standard, -END, END), 1.0])
 
 
 def bends(standard: FloatArray) -> FloatArray:
