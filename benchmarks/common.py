@@ -10,7 +10,10 @@ from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 import shapely
+from rasterio.features import rasterize
+from scipy import ndimage
 
 from geofield.imagery import read_scene
 from geofield.model import Scene
@@ -42,6 +45,18 @@ def write_page(name: str, title: str, lines: Iterable[str]) -> None:
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)
+
+
+def overlap(found: shapely.Polygon, truth: shapely.Polygon) -> float:
+    """Intersection over union."""
+    return found.intersection(truth).area / found.union(truth).area
+
+
+def overlap_mask(mask: np.ndarray, truth: shapely.Polygon) -> float:
+    """The same of a mask, its holes filled."""
+    true = rasterize([(truth, 1)], mask.shape).astype(bool)
+    mask = ndimage.binary_fill_holes(mask)
+    return float((mask & true).sum() / max((mask | true).sum(), 1))
 
 
 def digitised(

@@ -24,10 +24,9 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from rasterio.features import rasterize
 from scipy import ndimage
 
-from common import DATA, digitised
+from common import DATA, digitised, overlap, overlap_mask
 from geofield.errors import GeofieldError
 from geofield.field import extract_field
 from geofield.imagery import write_scene
@@ -103,16 +102,6 @@ def ours(method: str) -> Callable[[Scene, float, float], tuple[shapely.Polygon, 
         return field.polygon_px(scene.grid), field.quality is None or field.quality.trusted
 
     return run
-
-
-def overlap_mask(mask: np.ndarray, truth: shapely.Polygon) -> float:
-    true = rasterize([(truth, 1)], mask.shape).astype(bool)
-    mask = ndimage.binary_fill_holes(mask)
-    return float((mask & true).sum() / max((mask | true).sum(), 1))
-
-
-def overlap(found: shapely.Polygon, truth: shapely.Polygon) -> float:
-    return found.intersection(truth).area / found.union(truth).area
 
 
 def crowded(count: int) -> Iterator[Case]:

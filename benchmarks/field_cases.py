@@ -9,9 +9,11 @@ those of `field.py`.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -49,6 +51,32 @@ class Case:
         """The kind of case, and its bands where some are left out."""
         bands = next((end for end in (" rgb", " grey") if self.name.endswith(end)), "")
         return self.name.partition(" ")[0] + bands
+
+
+class Sited(Protocol):
+    """What belongs to a site."""
+
+    site: str
+
+
+def simulated_one(one: Sited) -> bool:
+    """Whether the picture is a simulation."""
+    return one.site.startswith("simulated")
+
+
+def weights(known: Sequence[Sited], of_simulated: float) -> np.ndarray:
+    """What each counts: a site by the root of its pictures, as its years are much alike."""
+    often = Counter(one.site for one in known)
+    share = [(of_simulated if simulated_one(one) else 1) / often[one.site] ** 0.5 for one in known]
+    return np.array(share)
+
+
+def folds(known: Sequence[Sited], count: int, seed: int) -> np.ndarray:
+    """The sites dealt into folds: the fold of each."""
+    sites = sorted({one.site for one in known})
+    order = np.random.default_rng(seed).permutation(len(sites))
+    fold = {site: int(at) % count for site, at in zip(sites, order, strict=True)}
+    return np.array([fold[one.site] for one in known])
 
 
 def cases(fields: int) -> Iterator[Case]:

@@ -6,13 +6,13 @@ outline was a good one, on sites that the curves had not seen.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
+from field_cases import folds, simulated_one, weights
 from geofield.field import scoring
 
 #: Weight of a simulated picture against a real one; pull towards zero; parts of the sites.
@@ -30,20 +30,12 @@ class Found:
     overlap: float
     figures: np.ndarray
 
-    @property
-    def simulated(self) -> bool:
-        """Whether the picture is a simulation."""
-        return self.site.startswith("simulated")
-
 
 def trusting(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
     """Weights of the evidence for a good outline (logistic regression)."""
     evidence = np.array([curves.evidence(one.expected, one.figures) for one in found])
     good = np.array([one.overlap >= scoring.GOOD for one in found])
-    often = Counter(one.site for one in found)
-    weight = np.array(
-        [(SIMULATED if one.simulated else 1) / often[one.site] ** 0.5 for one in found]
-    )
+    weight = weights(found, SIMULATED)
 
     def loss(line: np.ndarray) -> float:
         odds = evidence @ line
@@ -54,20 +46,23 @@ def trusting(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
 
 def left_out_certainty(found: Sequence[Found], curves: scoring.Curves) -> np.ndarray:
     """Certainties with weights that were learned without the site."""
-    sites = sorted({one.site for one in found})
-    order = np.random.default_rng(4).permutation(len(sites))
-    fold = {site: int(at) % FOLDS for site, at in zip(sites, order, strict=True)}
+    fold = folds(found, FOLDS, seed=4)
     judges = [
-        replace(curves, trust=trusting([one for one in found if fold[one.site] != k], curves))
+        replace(curves, trust=trusting([found[at] for at in np.flatnonzero(fold != k)], curves))
         for k in range(FOLDS)
     ]
-    return np.array([judges[fold[one.site]].certainty(one.expected, one.figures) for one in found])
+    return np.array(
+        [
+            judges[number].certainty(one.expected, one.figures)
+            for number, one in zip(fold, found, strict=True)
+        ]
+    )
 
 
 def tables(found: Sequence[Found], certain: np.ndarray) -> list[str]:
     """How well certainties tell good from bad."""
     overlaps = np.array([one.overlap for one in found])
-    real = np.array([not one.simulated for one in found])
+    real = np.array([not simulated_one(one) for one in found])
     page = [
         "| certainty (real, left out) | cases | mean | share good | mean overlap |",
         "|---" * 5 + "|",

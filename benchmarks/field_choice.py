@@ -16,7 +16,6 @@ import argparse
 import json
 import math
 import pickle
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,11 +24,11 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from rasterio.features import rasterize
 from scipy.optimize import minimize
 
 import field_ground
-from field_cases import Case, cases
+from common import overlap_mask
+from field_cases import Case, cases, folds, weights
 from field_certainty import Found, left_out_certainty, tables, trusting
 from field_examples import Examples, examples
 from geofield.field import auto, ground, scoring
@@ -48,20 +47,14 @@ FOLDS = 8
 Result = TypeVar("Result")
 
 
-def weights(known: Sequence[Examples]) -> np.ndarray:
-    """What a case counts: a site by the root of its pictures, as its years are much alike."""
-    often = Counter(one.site for one in known)
-    share = np.array([(1 if one.real else SIMULATED) / often[one.site] ** 0.5 for one in known])
-    return share / share.mean()
-
-
 def learn(
     known: Sequence[Examples], figures: Sequence[np.ndarray], sharpness: float
 ) -> scoring.Curves:
     """Curves under which beliefs follow overlaps (cross entropy, ridge; convex)."""
     every = np.concatenate(figures)
     usual, spread = every.mean(axis=0), every.std(axis=0) + 1e-9
-    share = weights(known) / len(known)
+    share = weights(known, SIMULATED)
+    share /= share.sum()
     bent, wanted = [], []
     for one, values in zip(known, figures, strict=True):
         parts = scoring.bends((values - usual) / spread)
@@ -109,20 +102,15 @@ class LeftOut:
 
 def leave_out(known: list[Examples]) -> tuple[LeftOut, list[np.ndarray]]:
     """Learn without each fold; also outlines' figures, with networks that never saw the site."""
-    sites = sorted({one.site for one in known})
-    order = np.random.default_rng(1).permutation(len(sites))
-    fold = {site: int(at) % FOLDS for site, at in zip(sites, order, strict=True)}
-    others = [[k for k, one in enumerate(known) if fold[one.site] != f] for f in range(FOLDS)]
-    networks = []
-    for at in others:
-        part = [known[k] for k in at]
-        networks.append(field_ground.learn(part, weights(part)))
-    figures = [one.with_ground(networks[fold[one.site]]) for one in known]
+    fold = folds(known, FOLDS, seed=1)
+    others = [np.flatnonzero(fold != number) for number in range(FOLDS)]
+    networks = [field_ground.learn([known[k] for k in at], SIMULATED) for at in others]
+    figures = [one.with_ground(networks[k]) for k, one in zip(fold, known, strict=True)]
     parts = [
         both([known[k] for k in at], [figures[k] for k in at], network)
         for at, network in zip(others, networks, strict=True)
     ]
-    return LeftOut(fold, parts), figures
+    return LeftOut({one.site: int(k) for k, one in zip(fold, known, strict=True)}, parts), figures
 
 
 def both(known: list[Examples], figures: list[np.ndarray], network: ground.Network) -> Learned:
@@ -144,10 +132,8 @@ def searched(case: Case, left_out: LeftOut) -> tuple[Found, Found]:
             found.append(Found(case.name, case.mark, case.site, 0.0, 0.0, curves.usual))
             continue
         mask = carried(case.scene, opinion.outline.polygon, factor, seed)
-        truth = rasterize([(case.truth, 1)], mask.shape) > 0
-        overlap = float((mask & truth).sum() / (mask | truth).sum())
-        figures = opinion.outline.figures
-        found.append(Found(case.name, case.mark, case.site, opinion.expected, overlap, figures))
+        shared, figures = overlap_mask(mask, case.truth), opinion.outline.figures
+        found.append(Found(case.name, case.mark, case.site, opinion.expected, shared, figures))
     return found[0], found[1]
 
 
@@ -209,8 +195,7 @@ def progress(found: Iterator[Result]) -> Iterator[Result]:
             print(f"{number} cases", flush=True)
 
 
-def write(curves: scoring.Curves, table: Path) -> None:
-    names = scoring.WITH_GROUND if len(curves.usual) > len(scoring.NAMES) else scoring.NAMES
+def write(curves: scoring.Curves, names: Sequence[str], table: Path) -> None:
     rows = [
         json.dumps(
             {
@@ -226,11 +211,9 @@ def write(curves: scoring.Curves, table: Path) -> None:
             names, curves.usual, curves.spread, curves.slope.T, strict=True
         )
     ]
-    weights = dict(
-        zip(scoring.EVIDENCE, (round(float(one), 4) for one in curves.trust), strict=True)
-    )
+    trust = dict(zip(scoring.EVIDENCE, (round(float(one), 4) for one in curves.trust), strict=True))
     text = '{"learned_by": "benchmarks/field_choice.py",\n'
-    text += f'"trust": {json.dumps(weights)},\n"figures": [\n'
+    text += f'"trust": {json.dumps(trust)},\n"figures": [\n'
     table.write_text(text + ",\n".join(rows) + "\n]}\n", encoding="utf-8")
 
 
@@ -251,12 +234,12 @@ def main() -> None:
         if options.cache:
             options.cache.write_bytes(pickle.dumps(known))
     left_out, figures = leave_out(known)
-    learned = both(known, figures, field_ground.learn(known, weights(known)))
+    learned = both(known, figures, field_ground.learn(known, SIMULATED))
     learned, page = report(known, left_out, learned, options.fields)
     print("\n".join(page))
     if options.write:
-        write(learned.first, TABLES / "outline.json")
-        write(learned.second, TABLES / "opinion.json")
+        write(learned.first, scoring.NAMES, TABLES / "outline.json")
+        write(learned.second, scoring.WITH_GROUND, TABLES / "opinion.json")
         field_ground.write(learned.network)
         RESULTS.write_text("\n".join(page) + "\n", encoding="utf-8")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from common import overlap
 from field_cases import Case
 from geofield.field import auto, choice, ground, scoring
 from geofield.field.straight import ring
@@ -49,11 +50,6 @@ class Examples:
     belongs: np.ndarray
     clear: np.ndarray
 
-    @property
-    def real(self) -> bool:
-        """Whether the picture is no simulation."""
-        return not self.site.startswith("simulated")
-
     def with_ground(self, network: ground.Network) -> np.ndarray:
         """The outlines' figures, and how well they agree with the ground as a network has it."""
         judged = ground.Ground(self.surface, self.looks, network)
@@ -72,10 +68,10 @@ def examples(case: Case, curves: scoring.Curves | None) -> Examples | None:
     found = choice.first_outlines(judge, ready.regions, straightened=None)
     if not found:
         return None
-    overlap = [shared(one.polygon, truth) for one in found]
+    overlaps = [overlap(one.polygon, truth) for one in found]
     tried: set[int] = set()
     for _ in range(3):
-        order = np.argsort(overlap)[::-1]
+        order = np.argsort(overlaps)[::-1]
         chosen = {*order[:3].tolist(), *rng.choice(order[: 2 + len(order) // 2], 3).tolist()}
         if curves is not None:
             chosen |= set(np.argsort(-judge.scores(found))[:5].tolist())
@@ -84,7 +80,7 @@ def examples(case: Case, curves: scoring.Curves | None) -> Examples | None:
             more = choice.redrawn_outlines(judge, found[at], ready.seed_px)
             for one in (more[k] for k in rng.permutation(len(more))[:REDRAWN]):
                 found.append(one)
-                overlap.append(shared(one.polygon, truth))
+                overlaps.append(overlap(one.polygon, truth))
     surface = ready.surface
     rows, columns = surface.centres
     centres = shapely.points(columns + 0.5, rows + 0.5)
@@ -92,7 +88,7 @@ def examples(case: Case, curves: scoring.Curves | None) -> Examples | None:
         case.name,
         case.site,
         np.array([one.figures for one in found], np.float32),
-        np.array(overlap),
+        np.array(overlaps),
         np.array([one.polygon for one in found]),
         np.packbits([surface.members(ring(one.polygon)) for one in found], axis=1),
         ready.looks.astype(np.float32),
@@ -100,9 +96,3 @@ def examples(case: Case, curves: scoring.Curves | None) -> Examples | None:
         np.asarray(shapely.contains(truth, centres)),
         np.asarray(shapely.distance(centres, truth.exterior)) > CLEAR_PX,
     )
-
-
-def shared(one: shapely.Polygon, other: shapely.Polygon) -> float:
-    """Intersection over union."""
-    common = one.intersection(other).area
-    return common / (one.area + other.area - common)

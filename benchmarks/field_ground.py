@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from field_cases import weights
 from field_examples import Examples
 from geofield.field import ground
 from geofield.field.looks import LOOKS
@@ -23,14 +24,15 @@ SUPERPIXELS = 1000
 TABLE = Path(ground.__file__).parent / "tables" / "ground.json"
 
 
-def learn(known: Sequence[Examples], weights: np.ndarray) -> ground.Network:
+def learn(known: Sequence[Examples], of_simulated: float) -> ground.Network:
     """A network that knows from a superpixel's looks whether it belongs to the field."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPClassifier
 
     rng = np.random.default_rng(0)
+    shares = weights(known, of_simulated)
     looks, belongs, weight = [], [], []
-    for one, share in zip(known, weights, strict=True):
+    for one, share in zip(known, shares / shares.mean(), strict=True):
         at = rng.permutation(np.flatnonzero(one.clear))[:SUPERPIXELS]
         looks.append(one.looks[at])
         belongs.append(one.belongs[at])

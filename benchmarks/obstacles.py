@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import statistics
 import time
 import warnings
@@ -29,7 +28,7 @@ from skimage.feature import canny
 from skimage.transform import hough_circle, hough_circle_peaks
 
 import geofield as gf
-from common import machine, write_page
+from common import DATA, machine, write_page
 from geofield.evaluation import draw_reliability, match_points
 from geofield.model.scene import Scene
 from geofield.obstacles import find_circles
@@ -46,7 +45,6 @@ from geofield.obstacles.working import working_picture
 from geofield.simulate import SimulationSettings, simulate_fields
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = Path(os.environ.get("GEOFIELD_SHARED", ROOT.parent / "shared")) / "data"
 RESULTS = Path(__file__).resolve().parent / "results"
 Circles = tuple[np.ndarray, np.ndarray]
 Detector = Callable[[Scene], Circles]

@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import FieldError
-from geofield.field.choice import Judge, Outline, choose, search
+from geofield.field.choice import Judge, Known, Outline, choose, search
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
 from geofield.field.ground import Ground, Network
@@ -101,7 +100,7 @@ class Prepared:
         The channels as they are.
     seed_px : (float, float)
         Open ground at the seed or beside it, pixel coordinates of the surface.
-    known : dict
+    known : Known
         What was measured on the surface so far, see `Judge`.
     """
 
@@ -110,7 +109,7 @@ class Prepared:
     regions: list[Region]
     raw: NDArray[np.float32]
     seed_px: tuple[float, float]
-    known: dict[bytes, Any] = field(default_factory=dict)
+    known: Known = field(default_factory=dict)
 
     @cached_property
     def looks(self) -> NDArray[np.float64]:

@@ -28,6 +28,8 @@ from geofield.field.surface import Surface
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+#: Of polygons (WKB): the superpixels inside, and the figures on the surface, None for a scrap.
+Known = dict[bytes, tuple[BoolArray, FloatArray | None]]
 
 #: How far the first outlines may leave their regions' borders, pixels.
 _TOLERANCE_PX = 3.0
@@ -78,15 +80,14 @@ class Judge:
         That score them.
     ground : Ground or None
         Needed by curves that count how well an outline agrees with it.
-    known : dict
-        The superpixels inside, and figures on the surface, of each polygon (WKB) measured so far.
-        Judges of one surface may share it.
+    known : Known
+        What was measured so far; judges of one surface may share it.
     """
 
     surface: Surface
     curves: Curves
     ground: Ground | None = None
-    known: dict[bytes, tuple[BoolArray, FloatArray | None]] = field(default_factory=dict)
+    known: Known = field(default_factory=dict)
 
     def measured(self, polygons: Sequence[Polygon], region: Region) -> list[Outline]:
         """Outlines with their figures; scraps are left out."""
