@@ -1,13 +1,16 @@
 """The second opinion of the default method: what each superpixel shows, and what that says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapely import box
 
 from geofield.field import auto, extract_field, scoring
+from geofield.field.choice import Judge, Outline
 from geofield.field.ground import AGREEMENT, Ground, Network, agreement, learned
 from geofield.field.looks import LOOKS, looks
-from geofield.field.regions import partition
+from geofield.field.regions import Region, partition
 from geofield.field.straight import ring
 from geofield.field.surface import Surface
 from geofield.simulate import SimulationSettings, simulate_field
@@ -93,3 +96,59 @@ def test_the_ground_is_asked_where_there_is_doubt(monkeypatch, doubt_below, opin
     assert opinions == 1 or asked[1] is learned()
     common = field.polygon.intersection(truth.field.polygon).area
     assert common / field.polygon.union(truth.field.polygon).area > 0.95
+
+
+def test_the_second_opinion_is_the_one_taken(monkeypatch):
+    given = auto.opinion
+
+    def opinion(ready, curves, network=None):
+        found = given(ready, curves, network)
+        if network is None:
+            return replace(found, certainty=0.1)
+        return replace(found, outline=replace(found.outline, polygon=square), certainty=0.33)
+
+    monkeypatch.setattr(auto, "opinion", opinion)
+    truth = simulate_field(3, SimulationSettings(width_px=320, height_px=320))
+    x, y = truth.scene.grid.from_lonlat(truth.lon, truth.lat)
+    square = box(x - 40, y - 40, x + 40, y + 40)
+    found = auto.segment(truth.scene, x, y)
+    assert found.mask.sum() < 90**2
+    assert dict(found.figures)["certainty"] == 0.33
+
+
+def test_what_one_judge_measured_serves_another(two_fields, monkeypatch):
+    surface, told, _ = two_fields
+    ground = Ground(surface, told, learned())
+    region = Region(np.ones(surface.shape, bool), np.zeros(surface.shape, bool), np.zeros(14))
+    outlines = [box(0, 0, 90, 160), box(0, 0, 70, 160), box(5, 5, 6, 6)]
+    afresh = Judge(surface, scoring.learned(ground=True), ground).measured(outlines, region)
+    known = {}
+    first = Judge(surface, scoring.learned(), known=known).measured(outlines, region)
+    monkeypatch.setattr("geofield.field.choice.measure", None)  # not asked again
+    second = Judge(surface, scoring.learned(ground=True), ground, known).measured(outlines, region)
+    assert len(first) == len(second) == 2  # one is a scrap
+    for one, other, again in zip(first, second, afresh, strict=True):
+        assert np.array_equal(other.figures, again.figures)
+        assert np.array_equal(other.figures[: len(scoring.NAMES)], one.figures)
+
+
+@pytest.mark.parametrize(
+    ("name", "plain", "doubtful", "told"),
+    [
+        (
+            "inside_95_above_border",
+            -1.0,
+            0.2,
+            "borders close inside it are nearly as strong as its own",
+        ),
+        ("long_sides_share", 0.95, 0.5, "much of its course is crooked"),
+    ],
+)
+def test_the_reasons_of_a_low_certainty_are_told(name, plain, doubtful, told):
+    said = []
+    for value in (plain, doubtful):
+        figures = scoring.learned().usual.copy()
+        figures[scoring.NAMES.index(name)] = value
+        notes, _ = auto._evidence(auto.Opinion(Outline(box(0, 0, 1, 1), None, figures), 0.9, 0.9))
+        said.append(told in notes)
+    assert said == [False, True]

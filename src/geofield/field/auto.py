@@ -206,7 +206,7 @@ def _evidence(found: Opinion) -> tuple[tuple[str, ...], tuple[tuple[str, float],
     elif weakest < _WEAK:
         notes.append("a quarter of its border or more is weak")
     if math.exp(chosen.figure("inside_95_above_border")) > _RIVAL:
-        notes.append("borders close inside it are as strong as its own")
+        notes.append("borders close inside it are nearly as strong as its own")
     if chosen.figure("long_sides_share") < _CROOKED:
         notes.append("much of its course is crooked")
     if certain < _LIKELY:
