@@ -28,6 +28,8 @@ _AT_PX, _INSIDE_PX, _OUTSIDE_PX = (-2.0, 0.0, 2.0), (-7.0, -11.0), (7.0, 11.0)
 _ACROSS_PX = 2.5
 #: The same for strips beside it.
 _STRIP_PX = (4.0, 6.0, 9.0, 12.0)
+#: Roughness outside is looked at this far from it, pixels.
+_ROUGH_PX = (6.0, 10.0)
 #: Steps across a border are averaged along so much of it, pixels; strips along more.
 _ALONG_PX, _STRIP_ALONG_PX = 15, 31
 #: Most places along an outline that are looked at.
@@ -111,9 +113,9 @@ def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> FloatArray
     if len(places) < 12 or inside.sum() < 5:
         return None
     means = surface.means[:, inside]
-    usual = np.median(means, axis=1)
-    along = _along(surface, places, outward, usual)
-    interior = _interior(surface, inside, means, usual, places, outward)
+    usual = np.array([_median(one) for one in means])
+    along, outside_rough = _along(surface, places, outward, usual)
+    interior = _interior(surface, inside, means, usual, outside_rough)
     above = [along[at] - interior[1] for at in (3, 2)]
     shape = _shape(outline, vertices, frame, surface.shape)
     return np.array([*along, *shape, *interior[:4], *above, *interior[4:]])
@@ -152,12 +154,16 @@ def _look(
 
 def _along(
     surface: Surface, places: FloatArray, outward: FloatArray, usual_inside: FloatArray
-) -> list[float]:
-    """Strength at the outline, inside and outside it; strips beside it against the interior."""
+) -> tuple[list[float], float]:
+    """Strength at the outline, inside and outside it; strips beside it against the interior.
+
+    Also how rough the ground outside is.
+    """
     offsets = [*_AT_PX, *_INSIDE_PX, *_OUTSIDE_PX]
     away = [offset + across for across in (-_ACROSS_PX, 0.0, _ACROSS_PX) for offset in offsets]
     strips = [*(-one for one in _STRIP_PX), *_STRIP_PX]
-    layers = _look(surface, places, outward, [*away, *strips])
+    layers = _look(surface, places, outward, [*away, *strips, *_ROUGH_PX])
+    beyond = layers[-len(_ROUGH_PX) :, :, -1]
     seen, count = layers[..., :-1], len(offsets)
     low, middle, high = seen[:count], seen[count : 2 * count], seen[2 * count : 3 * count]
     step, ridge = high - low, middle - 0.5 * (low + high)
@@ -165,7 +171,7 @@ def _along(
     own, within, outside = (
         strength[part].max(axis=0) for part in (slice(0, 3), slice(3, 5), slice(5, 7))
     )
-    noise = max(float(np.median(strength[3:5])), 0.4)
+    noise = max(_median(strength[3:5]), 0.4)
     own_log, base = np.log(own + 0.3), math.log(noise + 0.3)
     mean, quantiles = float(own_log.mean()), _ranked(own_log, [0.1, 0.25, 0.5])
     inner = _ranked(np.log(within + 0.3), [0.8, 0.95]) - mean
@@ -173,7 +179,7 @@ def _along(
     half = 3 * count + len(_STRIP_PX)
     rim, around = (
         _smoothed(part.mean(axis=0), _STRIP_ALONG_PX)
-        for part in (layers[3 * count : half], layers[half:])
+        for part in (layers[3 * count : half], layers[half : half + len(_STRIP_PX)])
     )
     step_beside = around - rim
     beside = np.log(_ranked(_norm(step_beside[:, :-1]), [0.1, 0.25, 0.5]) + 0.3)
@@ -200,7 +206,7 @@ def _along(
         float(np.mean(strange < rim_strange + 0.5)),
         *texture,
         float(step_beside[:, -1].mean()),
-    ]
+    ], _median(beyond)
 
 
 def _shape(
@@ -229,8 +235,7 @@ def _interior(
     inside: BoolArray,
     means: FloatArray,
     usual: FloatArray,
-    places: FloatArray,
-    outward: FloatArray,
+    outside_rough: float,
 ) -> list[float]:
     """Borders within the outline, how uneven and how rough the ground is."""
     first, second, strength = surface.neighbours
@@ -240,14 +245,13 @@ def _interior(
     distance = np.linalg.norm(means - usual[:, None], axis=0)
     uneven = np.log(_ranked(distance, [0.5, 0.8, 0.95]) + 0.3)
     rows, columns = surface.centres
-    rough = float(np.median(surface.layers[rows[inside], columns[inside], -1]))
-    around = _look(surface, places, outward, [6.0, 10.0])[..., -1]
+    rough = _median(surface.layers[rows[inside], columns[inside], -1])
     return [
         *inner,
         *uneven,
         float(np.mean(distance > 6.0)),
         math.log(rough + 0.3),
-        math.log(float(np.median(around)) + 0.3) - math.log(rough + 0.3),
+        math.log(outside_rough + 0.3) - math.log(rough + 0.3),
     ]
 
 
@@ -272,6 +276,12 @@ def _ranked(values: NDArray[np.floating], shares: list[float]) -> NDArray[np.flo
     ordered = np.sort(values)
     at = (np.array(shares) * len(ordered)).astype(int)
     return np.asarray(ordered[at], float)
+
+
+def _median(values: NDArray[np.floating]) -> float:
+    """The same as NumPy's, without its care for what these arrays never hold."""
+    ordered = np.sort(values, axis=None)
+    return float(ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1].mean())
 
 
 def _longest(flags: BoolArray) -> int:

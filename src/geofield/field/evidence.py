@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.special import chdtr, chdtri
 
 from geofield.model import Scene
@@ -80,9 +79,7 @@ def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:
     The covariance of differences between pixels a few steps apart is trimmed to the most
     usual ones, so that borders and trees near the seed do not count.
     """
-    smooth = np.stack(
-        [ndimage.gaussian_filter(layer, _SMOOTH_PX, mode="nearest") for layer in stack]
-    )
+    smooth = np.stack([_gaussian(layer, _SMOOTH_PX) for layer in stack])
     count = len(smooth)
     x, y = int(seed_px[0]), int(seed_px[1])
     near = smooth[
@@ -126,7 +123,16 @@ def gradient(stack: FloatArray, sigma_px: float = 1.0) -> FloatArray:
     total = np.zeros(stack.shape[1:], np.float32)
     for layer in stack:
         for order in ((0, 1), (1, 0)):
-            total += np.square(
-                ndimage.gaussian_filter(layer, sigma_px, order=order, mode="nearest")
-            )
+            total += np.square(_gaussian(layer, sigma_px, order))
     return np.sqrt(total)
+
+
+def _gaussian(layer: FloatArray, sigma_px: float, order: tuple[int, int] = (0, 0)) -> FloatArray:
+    """A layer under a Gaussian, or its derivative along rows' or columns' axis where order is 1."""
+    import cv2
+
+    reach = np.arange(-round(4 * sigma_px), round(4 * sigma_px) + 1)
+    bell = np.exp(-0.5 * np.square(reach / sigma_px))
+    bell /= bell.sum()
+    down, right = (bell * reach / sigma_px**2 if one else bell for one in order)
+    return np.asarray(cv2.sepFilter2D(layer, -1, right, down, borderType=cv2.BORDER_REPLICATE))

@@ -162,17 +162,12 @@ def _moved(
     strength = np.sqrt(np.sqrt(np.sum(step * step, axis=0)))
     offsets = np.arange(-steps, steps + 1)
     stay = 1.0 - _STAY * (offsets / steps) ** 2
-    best, ends = -1.0, (0, 0)
-    columns = np.arange(count)
-    for one in offsets:
-        for other in offsets:
-            rows = np.rint(one + share * (other - one)).astype(int) + steps
-            value = float(strength[rows, columns].mean()) * float(
-                0.5 * (stay[one + steps] + stay[other + steps])
-            )
-            if value > best:
-                best, ends = value, (int(one), int(other))
-    return a + ends[0] * _FINE_PX * across, b + ends[1] * _FINE_PX * across
+    # Every pair of offsets at the two ends.
+    one, other = (part.ravel() for part in np.meshgrid(offsets, offsets, indexing="ij"))
+    rows = np.rint(one[:, None] + share * (other - one)[:, None]).astype(int) + steps
+    value = strength[rows, np.arange(count)].mean(axis=1)
+    best = np.argmax(value * 0.5 * (stay[one + steps] + stay[other + steps]))
+    return a + one[best] * _FINE_PX * across, b + other[best] * _FINE_PX * across
 
 
 def _meeting(
