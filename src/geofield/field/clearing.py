@@ -24,8 +24,9 @@ _STANDS_OUT = (5.0, 10.0, 20.0)
 _WINDOW_M, _LARGEST_M = 21.0, 45.0
 #: Side of that square at least, pixels: a smaller one holds too few for a median.
 _SMALLEST_WINDOW_PX = 9
-#: How even the ground around a thing has to be: four fifths of it lie within this.
-_EVEN = 5.0
+#: How even the ground around a thing has to be: so much of it lies within this. Where only
+#: more than so much does, that is what it is painted with.
+_EVEN, _MOST, _MORE = 5.0, 0.8, 0.6
 #: Width of the ring that is looked at, pixels, and of the rim that is painted over too.
 _RING_PX, _RIM_PX = 5, 2
 #: Softness of the paint, pixels.
@@ -58,10 +59,64 @@ def clear(stack: FloatArray, pixel_m: float) -> tuple[FloatArray, BoolArray]:
     # Of what stands out strongly, the rest of it too.
     things |= (cv2.dilate(things.view(np.uint8), ellipse) > 0) & (away > _STANDS_OUT[0])
     painted = cv2.dilate(things.view(np.uint8), ellipse) > 0
-    at = ndimage.distance_transform_edt(painted, return_distances=False, return_indices=True)
-    near = stack[:, at[0], at[1]]
-    soft = np.stack([cv2.GaussianBlur(layer, (0, 0), _SOFT_PX) for layer in near])
-    return np.where(painted, soft, stack).astype(np.float32), things
+    return _painted(stack, painted), things
+
+
+def _painted(stack: FloatArray, painted: BoolArray) -> FloatArray:
+    """Channels with each part of a mask painted over with the ground beside it.
+
+    Where most of that ground is one surface, none of the rest is taken: paint that ran from
+    one surface into another would bridge the border between them.
+    """
+    import cv2
+
+    result = stack.copy()
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        painted.view(np.uint8), connectivity=4
+    )
+    for number in range(1, count):
+        rows, columns = _around(stats[number])
+        own = labels[rows, columns] == number
+        part = stack[:, rows, columns]
+        ground = _ring(own) & ~painted[rows, columns]
+        even = _like_most(part, ground)
+        if even.sum() > _MORE * ground.sum():
+            ground = even
+        if not ground.any():
+            continue
+        at = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
+        near = np.moveaxis(part[:, at[0], at[1]], 0, -1)
+        soft = cv2.GaussianBlur(near, (0, 0), _SOFT_PX).reshape(near.shape)
+        result[:, rows, columns] = np.where(own, np.moveaxis(soft, -1, 0), result[:, rows, columns])
+    return result
+
+
+def _around(stats: NDArray[np.int32]) -> tuple[slice, slice]:
+    """The window of a part and its ring, from OpenCV's figures of the part."""
+    left, top, width, height = stats[:4]
+    margin = _RING_PX + 2
+    return (
+        slice(max(top - margin, 0), top + height + margin),
+        slice(max(left - margin, 0), left + width + margin),
+    )
+
+
+def _ring(own: BoolArray) -> BoolArray:
+    """A part and what lies around it."""
+    import cv2
+
+    wide = 2 * (_RING_PX + 1) + 1
+    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+    return np.asarray(cv2.dilate(own.view(np.uint8), ellipse) > 0)
+
+
+def _like_most(stack: FloatArray, ground: BoolArray) -> BoolArray:
+    """Of some ground what is like most of it."""
+    around = stack[:, ground]
+    distance = np.linalg.norm(around - np.median(around, axis=1)[:, None], axis=0)
+    even = np.zeros_like(ground)
+    even[ground] = distance < _EVEN
+    return even
 
 
 def _standing_out(stack: FloatArray, pixel_m: float) -> FloatArray:
@@ -86,21 +141,13 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
     plumper = plump(away).view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(plumper, connectivity=4)
     beside = cv2.dilate(away.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    wide = 2 * (_RING_PX + 1) + 1
-    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
-    margin = _RING_PX + 2
     kept = np.zeros(count, bool)
     for number in range(1, count):
-        left, top, width, height, area = stats[number]
-        if max(width, height) > limit or area < 3:
+        if max(stats[number, 2:4]) > limit or stats[number, cv2.CC_STAT_AREA] < 3:
             continue
-        rows = slice(max(top - margin, 0), top + height + margin)
-        columns = slice(max(left - margin, 0), left + width + margin)
-        own = (labels[rows, columns] == number).astype(np.uint8)
-        ring = (cv2.dilate(own, ellipse) > 0) & ~beside[rows, columns]
-        if ring.sum() < 15:
-            continue
-        ground = stack[:, rows, columns][:, ring]
-        distance = np.linalg.norm(ground - np.median(ground, axis=1)[:, None], axis=0)
-        kept[number] = np.quantile(distance, 0.8) < _EVEN
+        rows, columns = _around(stats[number])
+        ground = _ring(labels[rows, columns] == number) & ~beside[rows, columns]
+        if ground.sum() >= 15:
+            even = _like_most(stack[:, rows, columns], ground)
+            kept[number] = even.sum() > _MOST * ground.sum()
     return np.asarray(kept[labels])

@@ -29,6 +29,8 @@ SMALLEST_SHARE = 0.006
 SMALLEST_PX = 200.0
 #: A part below this share of the region joins it without being asked.
 _TRIFLE_SHARE = 0.03
+#: A region of which less hangs together with the seed is none around the seed.
+_OWN_SHARE = 0.2
 
 TOLLS = (
     "merges",
@@ -115,7 +117,10 @@ def regions(parted: Partition, seed_px: tuple[float, float]) -> list[Region]:
         member[tree.leaves(region)] = True
         raw = member[labels]
         whole = filled(raw)
-        found.append(Region(tidy(whole, seed_px), whole & ~raw, toll))
+        part = tidy(whole, seed_px)
+        own = part.sum() >= _OWN_SHARE * whole.sum()
+        if own and not (found and np.array_equal(part, found[-1].mask)):
+            found.append(Region(part, whole & ~raw, toll))
         side = member.astype(np.int8)
         side[tree.leaves(other)] = -1
         seam = parted.lines.along(side)
