@@ -1,7 +1,7 @@
 """Pictures, points and true outlines that the choice of outlines is learned from.
 
 Real fields: those of `field_truth.csv` beside the project, 35 more with a plain border
-(`field_labels.csv` here) and 39 vacant lots, meadows and deserts, on many of which nobody
+(`field_labels.csv` here) and 57 vacant lots, meadows and deserts, on many of which nobody
 would see one (`field_labels_hard.csv`), all drawn by eye. Simulated fields: other seeds than
 those of `field.py`.
 """
@@ -54,8 +54,9 @@ class Case:
 
 
 class Sited(Protocol):
-    """What belongs to a site."""
+    """A case of a site."""
 
+    name: str
     site: str
 
 
@@ -64,11 +65,20 @@ def simulated_one(one: Sited) -> bool:
     return one.site.startswith("simulated")
 
 
-def weights(known: Sequence[Sited], of_simulated: float) -> np.ndarray:
-    """What each counts: a site by the root of its pictures, as its years are much alike."""
+def weights(known: Sequence[Sited], of_simulated: float, of_truth: float = 1.0) -> np.ndarray:
+    """What each counts: a site by the root of its pictures, as its years are much alike.
+
+    `of_truth` is what fields of `field_truth.csv` count, of which alone it is known how exactly
+    they were drawn.
+    """
     often = Counter(one.site for one in known)
-    share = [(of_simulated if simulated_one(one) else 1) / often[one.site] ** 0.5 for one in known]
-    return np.array(share)
+
+    def kind(one: Sited) -> float:
+        if simulated_one(one):
+            return of_simulated
+        return of_truth if one.name.startswith("truth") else 1.0
+
+    return np.array([kind(one) / often[one.site] ** 0.5 for one in known])
 
 
 def folds(known: Sequence[Sited], count: int, seed: int) -> np.ndarray:

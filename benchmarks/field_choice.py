@@ -41,8 +41,8 @@ RIDGE = 1e-2
 #: How much likelier an outline is believed to be for its overlap, in the first and the second
 #: opinion; less than half is nothing.
 SHARPNESS, WORST = (30.0, 15.0), 0.5
-#: Weight of a simulated picture against a real one.
-SIMULATED = 0.35
+#: Weight of a simulated picture, and of a field of `field_truth.csv`, against another real one.
+SIMULATED, TRUTH = 0.7, 4.0
 FOLDS = 8
 Result = TypeVar("Result")
 
@@ -53,7 +53,7 @@ def learn(
     """Curves under which beliefs follow overlaps (cross entropy, ridge; convex)."""
     every = np.concatenate(figures)
     usual, spread = every.mean(axis=0), every.std(axis=0) + 1e-9
-    share = weights(known, SIMULATED)
+    share = weights(known, SIMULATED, TRUTH)
     share /= share.sum()
     bent, wanted = [], []
     for one, values in zip(known, figures, strict=True):
@@ -104,7 +104,7 @@ def leave_out(known: list[Examples]) -> tuple[LeftOut, list[np.ndarray]]:
     """Learn without each fold; also outlines' figures, with networks that never saw the site."""
     fold = folds(known, FOLDS, seed=1)
     others = [np.flatnonzero(fold != number) for number in range(FOLDS)]
-    networks = [field_ground.learn([known[k] for k in at], SIMULATED) for at in others]
+    networks = [field_ground.learn([known[k] for k in at], SIMULATED, TRUTH) for at in others]
     figures = [one.with_ground(networks[k]) for k, one in zip(fold, known, strict=True)]
     parts = [
         both([known[k] for k in at], [figures[k] for k in at], network)
@@ -234,7 +234,7 @@ def main() -> None:
         if options.cache:
             options.cache.write_bytes(pickle.dumps(known))
     left_out, figures = leave_out(known)
-    learned = both(known, figures, field_ground.learn(known, SIMULATED))
+    learned = both(known, figures, field_ground.learn(known, SIMULATED, TRUTH))
     learned, page = report(known, left_out, learned, options.fields)
     print("\n".join(page))
     if options.write:

@@ -24,13 +24,13 @@ SUPERPIXELS = 1000
 TABLE = Path(ground.__file__).parent / "tables" / "ground.json"
 
 
-def learn(known: Sequence[Examples], of_simulated: float) -> ground.Network:
+def learn(known: Sequence[Examples], of_simulated: float, of_truth: float) -> ground.Network:
     """A network that knows from a superpixel's looks whether it belongs to the field."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPClassifier
 
     rng = np.random.default_rng(0)
-    shares = weights(known, of_simulated)
+    shares = weights(known, of_simulated, of_truth)
     looks, belongs, weight = [], [], []
     for one, share in zip(known, shares / shares.mean(), strict=True):
         at = rng.permutation(np.flatnonzero(one.clear))[:SUPERPIXELS]

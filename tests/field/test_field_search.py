@@ -1,5 +1,7 @@
 """The steps of the default method, each alone: clearing, redrawing, measuring, aligning."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
@@ -49,6 +51,41 @@ def test_a_crown_inside_a_surface_gives_way_and_one_on_a_border_stays():
     assert abs(cleared[1][inside].mean()) < 1
     assert np.array_equal(cleared[:, border], stack[:, border])
     assert (cleared[0, :, 90:].mean() - cleared[0, :, :70].mean()) == pytest.approx(12, abs=0.2)
+
+
+def test_paint_does_not_bridge_a_border_that_a_crown_touches():
+    stack = picture()
+    field = np.zeros((160, 160), bool)
+    field[:80, 80:] = True
+    stack[0, field] += 12
+    crown = disc((160, 160), 78, 82, 8)  # at the field's corner, mostly outside it
+    stack[1, crown] -= 25
+    cleared, things = clear(stack, 0.6)
+    assert things[crown].mean() > 0.8
+    painted = cleared[0][crown]
+    assert np.abs(painted).max() < 3, "between the two surfaces"
+    found = regions(partition(cleared), (90.5, 70.5))
+    assert max((one.mask & field).sum() / (one.mask | field).sum() for one in found) > 0.97
+
+
+def test_a_region_that_only_grew_a_tendril_comes_once():
+    stack = picture((240, 240))
+    stack[0, 40:120, 40:120] += 12
+    stack[0, 60:66, 120:] += 8  # roads, thinner than any field
+    stack[0, 90:96, 120:] += 7
+    found = regions(partition(stack), (60.5, 60.5))
+    assert any(abs(one.mask.sum() - 6400) < 300 for one in found)
+    for one, following in pairwise(found):
+        assert not np.array_equal(one.mask, following.mask)
+
+
+def test_a_nook_beyond_a_neck_does_not_stand_for_what_lies_behind_it():
+    stack = picture() + 30
+    for rows, columns in ((30, 60), (20, 40)), ((52, 56), (20, 150)), ((52, 150), (60, 150)):
+        stack[:, slice(*rows), slice(*columns)] -= 30
+    found = regions(partition(stack), (30.5, 40.5))
+    for one, following in pairwise(found):
+        assert following.mask.sum() > 1.1 * one.mask.sum()
 
 
 def test_a_road_does_not_give_way():

@@ -48,7 +48,9 @@ _WEAK = 1.6
 #: crooked course below this share of long sides.
 _RIVAL, _CROOKED = 0.75, 0.8
 #: Below this certainty the ground is asked, too.
-SECOND_OPINION = 0.66
+SECOND_OPINION = 0.6
+#: How bold the beliefs of the first and the second opinion are: best on sites left out.
+_BOLDNESS = (1.0, 2.0)
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -162,7 +164,9 @@ def opinion(ready: Prepared, curves: Curves, network: Network | None = None) -> 
     outlines, score = search(judge, ready.regions, ready.seed_px)
     if not outlines:
         return None
-    best, expected = choose([one.polygon for one in outlines], score)
+    best, expected = choose(
+        [one.polygon for one in outlines], score, _BOLDNESS[network is not None]
+    )
     return Opinion(outlines[best], expected, curves.certainty(expected, outlines[best].figures))
 
 

@@ -36,11 +36,9 @@ _TOLERANCE_PX = 3.0
 #: So many of the regions' outlines get well fitted sides.
 _FITTED = 6
 #: So many outlines are redrawn, so many times.
-_BREADTH, _ROUNDS = 5, 3
+_BREADTH, _ROUNDS = 5, 2
 #: So many of the best are weighed against each other in the end.
 _WEIGHED = 300
-#: How bold beliefs are: 1 takes scores at their word, less is better on sites left out.
-_BOLDNESS = 0.5
 #: Side of the picture in which outlines are compared, pixels.
 _SMALL_PX = 96
 
@@ -179,7 +177,9 @@ def _key(polygon: Polygon) -> tuple[float, ...]:
     return round(polygon.area, 0), round(x, 1), round(y, 1)
 
 
-def choose(polygons: Sequence[Polygon], score: FloatArray) -> tuple[int, float]:
+def choose(
+    polygons: Sequence[Polygon], score: FloatArray, boldness: float = 1.0
+) -> tuple[int, float]:
     """The outline with the largest expected overlap with the truth, and that overlap.
 
     Parameters
@@ -187,9 +187,11 @@ def choose(polygons: Sequence[Polygon], score: FloatArray) -> tuple[int, float]:
     polygons : sequence of Polygon
         The best scored first, as `search` gives them.
     score : float array
+    boldness : float
+        How bold beliefs are: 1 takes scores at their word.
     """
     weighed = polygons[:_WEIGHED]
-    belief = np.exp(_BOLDNESS * (score[: len(weighed)] - score[0]))
+    belief = np.exp(boldness * (score[: len(weighed)] - score[0]))
     belief /= belief.sum()
     masks = _small_masks(weighed)
     common = masks @ masks.T
