@@ -24,9 +24,9 @@ _STANDS_OUT = (5.0, 10.0, 20.0)
 _WINDOW_M, _LARGEST_M = 21.0, 45.0
 #: Side of that square at least, pixels: a smaller one holds too few for a median.
 _SMALLEST_WINDOW_PX = 9
-#: How even the ground around a thing has to be: so much of it lies within this. Where only
-#: more than so much does, that is what it is painted with.
-_EVEN, _MOST, _MORE = 5.0, 0.8, 0.6
+#: Ground is one surface within this distance. So much of what is around a thing has to be; and
+#: around what is painted, for the rest to be left out.
+_EVEN, _AROUND_THING, _AROUND_PAINT = 5.0, 0.8, 0.6
 #: Width of the ring that is looked at, pixels, and of the rim that is painted over too.
 _RING_PX, _RIM_PX = 5, 2
 #: Softness of the paint, pixels.
@@ -65,8 +65,8 @@ def clear(stack: FloatArray, pixel_m: float) -> tuple[FloatArray, BoolArray]:
 def _painted(stack: FloatArray, painted: BoolArray) -> FloatArray:
     """Channels with each part of a mask painted over with the ground beside it.
 
-    Where most of that ground is one surface, none of the rest is taken: paint that ran from
-    one surface into another would bridge the border between them.
+    Where most of that ground is one surface, the rest is left out: paint that ran from one
+    surface into another would bridge the border between them.
     """
     import cv2
 
@@ -79,11 +79,11 @@ def _painted(stack: FloatArray, painted: BoolArray) -> FloatArray:
         own = labels[rows, columns] == number
         part = stack[:, rows, columns]
         ground = _ring(own) & ~painted[rows, columns]
-        even = _like_most(part, ground)
-        if even.sum() > _MORE * ground.sum():
-            ground = even
         if not ground.any():
             continue
+        even = _like_most(part, ground)
+        if even.sum() > _AROUND_PAINT * ground.sum():
+            ground = even
         at = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
         near = np.moveaxis(part[:, at[0], at[1]], 0, -1)
         soft = cv2.GaussianBlur(near, (0, 0), _SOFT_PX).reshape(near.shape)
@@ -149,5 +149,5 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
         ground = _ring(labels[rows, columns] == number) & ~beside[rows, columns]
         if ground.sum() >= 15:
             even = _like_most(stack[:, rows, columns], ground)
-            kept[number] = even.sum() > _MOST * ground.sum()
+            kept[number] = even.sum() > _AROUND_THING * ground.sum()
     return np.asarray(kept[labels])

@@ -29,7 +29,7 @@ SMALLEST_SHARE = 0.006
 SMALLEST_PX = 200.0
 #: A part below this share of the region joins it without being asked.
 _TRIFLE_SHARE = 0.03
-#: A region of which less hangs together with the seed is none around the seed.
+#: A region of which a smaller share hangs together with the seed is none around the seed.
 _OWN_SHARE = 0.2
 
 TOLLS = (
@@ -100,7 +100,7 @@ def partition(stack: NDArray[np.float32]) -> Partition:
 
 
 def regions(parted: Partition, seed_px: tuple[float, float]) -> list[Region]:
-    """The regions around the seed that may be the field, from small to large."""
+    """The regions around the seed that may be the field, from small to large, no shape twice."""
     labels, tree = parted.labels, parted.tree
     first, second, _, strength = parted.pairs
     found: list[Region] = []
