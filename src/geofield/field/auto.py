@@ -49,8 +49,8 @@ _WEAK = 1.6
 _RIVAL, _CROOKED = 0.75, 0.8
 #: Below this certainty the ground is asked, too.
 SECOND_OPINION = 0.6
-#: How bold the beliefs of the first and the second opinion are: best on sites left out.
-_BOLDNESS = (1.0, 2.0)
+#: How bold beliefs are in the first and in the second opinion: best on sites left out.
+_FIRST_BOLDNESS, _SECOND_BOLDNESS = 1.0, 2.0
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -164,9 +164,8 @@ def opinion(ready: Prepared, curves: Curves, network: Network | None = None) -> 
     outlines, score = search(judge, ready.regions, ready.seed_px)
     if not outlines:
         return None
-    best, expected = choose(
-        [one.polygon for one in outlines], score, _BOLDNESS[network is not None]
-    )
+    boldness = _FIRST_BOLDNESS if network is None else _SECOND_BOLDNESS
+    best, expected = choose([one.polygon for one in outlines], score, boldness)
     return Opinion(outlines[best], expected, curves.certainty(expected, outlines[best].figures))
 
 
