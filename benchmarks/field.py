@@ -26,14 +26,13 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from common import DATA, digitised, overlap, overlap_mask
+from common import DATA, RESULTS, digitised, overlap, overlap_mask
 from geofield.errors import GeofieldError
 from geofield.field import extract_field
 from geofield.imagery import write_scene
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field, simulate_fields
 
-RESULTS = Path(__file__).parent / "results" / "field.md"
 #: Simulation seed of the 51 fields; the weights of `auto` were learned on other seeds.
 SEED, CROWDED_SEED = 7, 4000
 KINDS = {
@@ -300,8 +299,8 @@ def main() -> None:
         compare(kind, fields(options.fields), options, say)
     seeds(options, say)
     large(say)
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / "field.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

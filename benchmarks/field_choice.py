@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 import field_ground
-from common import overlap_mask
+from common import RESULTS, overlap_mask
 from field_cases import Case, cases, folds, weights
 from field_certainty import Found, left_out_certainty, tables, trusting
 from field_examples import Examples, examples
@@ -35,7 +35,6 @@ from geofield.field import auto, ground, scoring
 from geofield.field.refine import carried
 
 TABLES = Path(scoring.__file__).parent / "tables"
-RESULTS = Path(__file__).parent / "results" / "field_choice.md"
 #: Pull towards zero.
 RIDGE = 1e-2
 #: How much likelier an outline is believed to be for its overlap, in the first and the second
@@ -47,14 +46,24 @@ FOLDS = 8
 Result = TypeVar("Result")
 
 
+def shares(known: Sequence[Examples]) -> np.ndarray:
+    """What the cases count, to add up to one."""
+    share = weights(known, SIMULATED, TRUTH)
+    return share / share.sum()
+
+
+def network_of(known: Sequence[Examples]) -> ground.Network:
+    """The network of the second opinion."""
+    return field_ground.learn(known, shares(known))
+
+
 def learn(
     known: Sequence[Examples], figures: Sequence[np.ndarray], sharpness: float
 ) -> scoring.Curves:
     """Curves under which beliefs follow overlaps (cross entropy, ridge; convex)."""
     every = np.concatenate(figures)
     usual, spread = every.mean(axis=0), every.std(axis=0) + 1e-9
-    share = weights(known, SIMULATED, TRUTH)
-    share /= share.sum()
+    share = shares(known)
     bent, wanted = [], []
     for one, values in zip(known, figures, strict=True):
         parts = scoring.bends((values - usual) / spread)
@@ -104,7 +113,7 @@ def leave_out(known: list[Examples]) -> tuple[LeftOut, list[np.ndarray]]:
     """Learn without each fold; also outlines' figures, with networks that never saw the site."""
     fold = folds(known, FOLDS, seed=1)
     others = [np.flatnonzero(fold != number) for number in range(FOLDS)]
-    networks = [field_ground.learn([known[k] for k in at], SIMULATED, TRUTH) for at in others]
+    networks = [network_of([known[k] for k in at]) for at in others]
     figures = [one.with_ground(networks[k]) for k, one in zip(fold, known, strict=True)]
     parts = [
         both([known[k] for k in at], [figures[k] for k in at], network)
@@ -234,14 +243,14 @@ def main() -> None:
         if options.cache:
             options.cache.write_bytes(pickle.dumps(known))
     left_out, figures = leave_out(known)
-    learned = both(known, figures, field_ground.learn(known, SIMULATED, TRUTH))
+    learned = both(known, figures, network_of(known))
     learned, page = report(known, left_out, learned, options.fields)
     print("\n".join(page))
     if options.write:
         write(learned.first, scoring.NAMES, TABLES / "outline.json")
         write(learned.second, scoring.WITH_GROUND, TABLES / "opinion.json")
         field_ground.write(learned.network)
-        RESULTS.write_text("\n".join(page) + "\n", encoding="utf-8")
+        (RESULTS / "field_choice.md").write_text("\n".join(page) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

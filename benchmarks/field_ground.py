@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from field_cases import weights
 from field_examples import Examples
 from geofield.field import ground
 from geofield.field.looks import LOOKS
@@ -24,13 +23,15 @@ SUPERPIXELS = 1000
 TABLE = Path(ground.__file__).parent / "tables" / "ground.json"
 
 
-def learn(known: Sequence[Examples], of_simulated: float, of_truth: float) -> ground.Network:
-    """A network that knows from a superpixel's looks whether it belongs to the field."""
+def learn(known: Sequence[Examples], shares: np.ndarray) -> ground.Network:
+    """A network that knows from a superpixel's looks whether it belongs to the field.
+
+    `shares` are what the cases count.
+    """
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPClassifier
 
     rng = np.random.default_rng(0)
-    shares = weights(known, of_simulated, of_truth)
     looks, belongs, weight = [], [], []
     for one, share in zip(known, shares / shares.mean(), strict=True):
         at = rng.permutation(np.flatnonzero(one.clear))[:SUPERPIXELS]

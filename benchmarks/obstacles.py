@@ -28,7 +28,7 @@ from skimage.feature import canny
 from skimage.transform import hough_circle, hough_circle_peaks
 
 import geofield as gf
-from common import DATA, machine, write_page
+from common import DATA, RESULTS, machine, write_page
 from geofield.evaluation import draw_reliability, match_points
 from geofield.model.scene import Scene
 from geofield.obstacles import find_circles
@@ -44,8 +44,6 @@ from geofield.obstacles.verifier import load_verifier
 from geofield.obstacles.working import working_picture
 from geofield.simulate import SimulationSettings, simulate_fields
 
-ROOT = Path(__file__).resolve().parents[1]
-RESULTS = Path(__file__).resolve().parent / "results"
 Circles = tuple[np.ndarray, np.ndarray]
 Detector = Callable[[Scene], Circles]
 

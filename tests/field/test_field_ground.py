@@ -116,6 +116,22 @@ def test_the_second_opinion_is_the_one_taken(monkeypatch):
     assert dict(found.figures)["certainty"] == 0.33
 
 
+def test_the_second_opinion_believes_its_scores_more(monkeypatch):
+    asked = []
+    given = auto.choose
+    monkeypatch.setattr(
+        auto,
+        "choose",
+        lambda polygons, score, boldness: (
+            asked.append(boldness) or given(polygons, score, boldness)
+        ),
+    )
+    monkeypatch.setattr(auto, "SECOND_OPINION", 1.01)
+    truth = simulate_field(3, SimulationSettings(width_px=320, height_px=320))
+    auto.segment(truth.scene, *truth.scene.grid.from_lonlat(truth.lon, truth.lat))
+    assert asked == [1.0, 2.0]
+
+
 def test_what_one_judge_measured_serves_another(two_fields, monkeypatch):
     surface, told, _ = two_fields
     ground = Ground(surface, told, learned())

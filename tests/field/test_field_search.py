@@ -75,6 +75,7 @@ def test_a_region_that_only_grew_a_tendril_comes_once():
     stack[0, 90:96, 120:] += 7
     found = regions(partition(stack), (60.5, 60.5))
     assert any(abs(one.mask.sum() - 6400) < 300 for one in found)
+    assert len(found) > 1
     for one, following in pairwise(found):
         assert not np.array_equal(one.mask, following.mask)
 
@@ -84,6 +85,7 @@ def test_a_nook_beyond_a_neck_does_not_stand_for_what_lies_behind_it():
     for rows, columns in ((30, 60), (20, 40)), ((52, 56), (20, 150)), ((52, 150), (60, 150)):
         stack[:, slice(*rows), slice(*columns)] -= 30
     found = regions(partition(stack), (30.5, 40.5))
+    assert len(found) > 1
     for one, following in pairwise(found):
         assert following.mask.sum() > 1.1 * one.mask.sum()
 
@@ -197,6 +199,9 @@ def test_the_choice_prefers_what_others_agree_with():
     best, expected = choice.choose([lone, small, large], np.array([0.1, 0.0, -0.2]))
     assert best == 1
     assert 0.5 < expected < 0.9
+    best, expected = choice.choose([lone, small, large], np.array([0.1, 0.0, -0.2]), boldness=50)
+    assert best == 0, "scores taken far beyond their word"
+    assert expected > 0.95
 
 
 def test_the_learned_table_is_of_these_figures_and_says_what_it_doubts():
