@@ -13,7 +13,7 @@ from geofield.model.scene import ROLES
 
 PROMISED = {
     "field": "field_id name area_ha perimeter_m longest_edge_m heading_deg method imagery "
-    "imagery_date licence",
+    "imagery_date licence certainty doubts",
     "obstacles": "obstacle_no kind status radius_m buffer_m confidence x_px y_px radius_px lat lon",
     "tracks": "track_no heading_deg segment_count gap_count point_count length_m",
     "segments": "track_no segment_no length_m",

@@ -18,6 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from geofield import schema
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset
+from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ TRACK: Colour = (90, 225, 255, 235)
 GAP: Colour = (255, 120, 60, 220)
 HEADLAND: Colour = (255, 170, 230, 220)
 STATUS_COLOURS: dict[str, Colour] = {
+    "possible": (255, 170, 0, 255),
     "detected": (255, 60, 60, 255),
     "confirmed": (60, 255, 110, 255),
     "added": (190, 120, 255, 255),
@@ -115,7 +117,8 @@ class _Canvas:
         obstacles = self.dataset.table("obstacles")
         for status, colour in STATUS_COLOURS.items():
             part = obstacles[obstacles["status"] == status]
-            self.outlines(part, colour, 1.6 * _OVERSAMPLING, dashed=status == "rejected")
+            dash = {"rejected": (6.0, 4.0), "possible": (1.5, 4.0)}.get(status)
+            self.outlines(part, colour, 1.6 * _OVERSAMPLING, dash=dash)
         self.outlines(self.dataset.table("field"), OUTLINE, 2.4 * _OVERSAMPLING)
         self.numbers(obstacles, segments)
 
@@ -139,15 +142,21 @@ class _Canvas:
                 self.draw.line([*a, *b], fill=colour, width=round(width))
 
     def outlines(
-        self, table: gpd.GeoDataFrame, colour: Colour, width: float, *, dashed: bool = False
+        self,
+        table: gpd.GeoDataFrame,
+        colour: Colour,
+        width: float,
+        *,
+        dash: tuple[float, float] | None = None,
     ) -> None:
         rings = shapely.get_rings(shapely.get_parts(table.geometry.to_numpy()))
         for ring in rings:
             points = self.pixels(shapely.get_coordinates(ring))
             flat = points.ravel().tolist()
-            self.draw.line(flat, fill=_CASING, width=round(width * 2), joint="curve")
-            if dashed:
-                for a, b in _dashes(points, 6.0 * _OVERSAMPLING, 4.0 * _OVERSAMPLING):
+            if dash is None:
+                self.draw.line(flat, fill=_CASING, width=round(width * 2), joint="curve")
+            if dash is not None:
+                for a, b in _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING):
                     self.draw.line([*a, *b], fill=colour, width=round(width))
             else:
                 self.draw.line(flat, fill=colour, width=round(width), joint="curve")
@@ -244,9 +253,10 @@ def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) 
     field = dataset.table("field").iloc[0]
     obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
     lines = [f"{dataset.name}   {field['area_ha']:.2f} ha"]
-    rejected = int((obstacles["status"] == "rejected").sum())
-    text = f"{len(obstacles) - rejected} obstacles"
-    lines.append(text + (f" ({rejected} rejected)" if rejected else ""))
+    count = len(active(obstacles))
+    idle = {s: int((obstacles["status"] == s).sum()) for s in schema.NOT_AVOIDED}
+    others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
+    lines.append(f"{count} obstacles" + (f" ({others})" if others else ""))
     if len(tracks):
         length = tracks["length_m"].sum() / 1000
         lines.append(

@@ -208,6 +208,8 @@ class Plan:
                 "imagery": [one.imagery or None],
                 "imagery_date": [one.imagery_date],
                 "licence": [one.licence or None],
+                "certainty": [one.certainty],
+                "doubts": ["; ".join(one.doubts) or None],
             },
             [one.polygon],
             one.crs,

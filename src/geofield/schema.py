@@ -19,10 +19,13 @@ if TYPE_CHECKING:
 ColumnType = Literal["int", "float", "str", "date"]
 GeometryType = Literal["Point", "LineString", "MultiLineString", "Polygon", "MultiPolygon"]
 
-#: What a person or the detector says of an obstacle.
-STATUSES = ("detected", "confirmed", "rejected", "added")
+#: What a person or the detector says of an obstacle. `possible`: too uncertain to be driven
+#: around, shown so that a person may decide.
+STATUSES = ("detected", "possible", "confirmed", "rejected", "added")
 #: The statuses that are a person's word and survive every re-run.
 REVIEWED = ("confirmed", "rejected", "added")
+#: The statuses of what tracks run through.
+NOT_AVOIDED = ("rejected", "possible")
 KINDS = ("tree", "other")
 
 
@@ -124,6 +127,9 @@ FIELD = Layer(
         Column("imagery", "str", "Imagery", "imagery"),
         Column("imagery_date", "date", "Imagery date", "img_date"),
         Column("licence", "str", "Licence", "licence"),
+        # Of the outline: the probability that it is right; what speaks against it, in words.
+        Column("certainty", "float", "Certainty", "certainty", "1"),
+        Column("doubts", "str", "Doubts", "doubts"),
     ),
 )
 

@@ -70,6 +70,7 @@ def test_a_person_chooses_the_status_from_a_list(opened):
         "Confirmed",
         "Detected",
         "Detected, doubtful",
+        "Possible, not avoided",
         "Added by a person",
         "Rejected by a person",
     ]

@@ -86,9 +86,10 @@ def test_a_persons_drawing_is_the_truth(edit: str) -> None:
     assert shapely.distance(shapely.union_all(through), drawn) < 1e-6
 
 
-def test_rejected_obstacles_do_not_count() -> None:
+@pytest.mark.parametrize("status", ["rejected", "possible", "Rejected "])
+def test_rejected_and_possible_obstacles_do_not_count(status: str) -> None:
     table = circles((50, 20, 5), (20, 20, 5))
-    table.loc[0, "status"] = "rejected"
+    table.loc[0, "status"] = status
     tracks = plan_tracks(box(0, 0, 100, 40), table, crs=CRS, spacing_m=4.0)
     assert set(tracks.gaps["obstacle_no"]) == {2}
 

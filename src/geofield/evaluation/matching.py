@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from geofield.crs import is_metric
 from geofield.errors import CRSError, GeofieldError, ObstacleError
+from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -256,8 +257,7 @@ def _comparable(
         raise CRSError(
             "Detections are not in a metric CRS.", hint="Reproject them to their UTM zone."
         )
-    if "status" in detected.columns:
-        detected = detected[detected["status"] != "rejected"]
+    detected = active(detected)
     return detected, truth.to_crs(detected.crs)
 
 

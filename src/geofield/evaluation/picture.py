@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.matching import Evaluation, reliability
+from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
@@ -88,8 +89,7 @@ def draw_matches(
         from geofield.imagery import read_scene
 
         scene = read_scene(scene)
-    if "status" in detected.columns:
-        detected = detected[detected["status"] != "rejected"]
+    detected = active(detected)
     match = next(iter(result.matches.values()))
     crs = detected.crs
     truth = truth.to_crs(crs)

@@ -17,6 +17,7 @@ from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
+from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -133,7 +134,7 @@ def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
     segments = dataset.table("segments")
     if not len(obstacles) or not len(segments):
         return
-    kept = obstacles[obstacles["status"] != "rejected"]
+    kept = active(obstacles)
     # A hair inside: segments end exactly on the border of a buffer.
     inside = shapely.buffer(np.asarray(kept.geometry.to_numpy(), dtype=object), -0.05)
     tree = shapely.STRtree(segments.geometry.to_numpy())

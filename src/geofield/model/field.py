@@ -91,6 +91,16 @@ class Field:
             object.__setattr__(self, "name", self.field_id)
 
     @property
+    def certainty(self) -> float | None:
+        """The probability that the outline is right, 0 to 1; None where nobody measured it."""
+        return None if self.quality is None else self.quality.score
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the outline, in words."""
+        return () if self.quality is None else self.quality.reasons
+
+    @property
     def area_ha(self) -> float:
         """Area without holes, hectares."""
         return float(self.polygon.area) / 10_000.0

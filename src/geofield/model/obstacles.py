@@ -7,7 +7,7 @@ grown by `buffer_m`. Columns are those of `geofield.schema.OBSTACLES`, in the me
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -153,8 +153,45 @@ def from_polygons(
     )
 
 
+def active(obstacles: gpd.GeoDataFrame, *, careful: bool = False) -> gpd.GeoDataFrame:
+    """The rows that are driven around: neither rejected nor merely possible.
+
+    Parameters
+    ----------
+    obstacles : GeoDataFrame
+        Any table; without a column `status` all rows are.
+    careful : bool
+        Drive around possible ones, too.
+    """
+    if "status" not in obstacles.columns:
+        return obstacles
+    idle = ("rejected",) if careful else schema.NOT_AVOIDED
+    status = obstacles["status"].astype("string").str.strip().str.lower()
+    return obstacles[~status.isin(idle).to_numpy(bool)]
+
+
+def next_number(obstacles: gpd.GeoDataFrame) -> int:
+    """The next free obstacle number of a table."""
+    numbers = obstacles["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan)
+    return int(np.nanmax(numbers, initial=0)) + 1
+
+
+def numbered(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The table with the next free numbers in rows without one; 1, 2, ... where all have none."""
+    import pandas as pd
+
+    if "obstacle_no" not in obstacles.columns:
+        return obstacles.assign(obstacle_no=pd.array(range(1, len(obstacles) + 1), dtype="Int64"))
+    missing = obstacles["obstacle_no"].isna().to_numpy(bool)
+    if not missing.any():
+        return obstacles
+    numbers = obstacles["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan).copy()
+    numbers[missing] = next_number(obstacles) + np.arange(missing.sum())
+    return obstacles.assign(obstacle_no=pd.array(numbers.astype("int64"), dtype="Int64"))
+
+
 def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
-    """The shapes to avoid: rows that are not rejected, circles as true circles.
+    """The shapes to avoid: the :func:`active` rows, circles as true circles.
 
     A row is a circle when its polygon still is the circle of `radius_m + buffer_m` (it may
     have been moved); where a person reshaped it, the polygon as drawn counts.
@@ -164,14 +201,12 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     ObstacleError
         When a radius or safety margin is negative or infinite.
     """
-    frame = obstacles
-    if "status" in frame.columns:
-        frame = frame[frame["status"] != "rejected"]
+    frame = active(numbered(obstacles))
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
     frame, geometry = frame[present], geometry[present]
     count = len(geometry)
-    numbers = _numbers(frame)
+    numbers = frame["obstacle_no"].to_numpy(dtype=np.int64)
     radius = _floats(frame, "radius_m", count)
     margin = np.nan_to_num(_floats(frame, "buffer_m", count), nan=0.0)
     if np.any(np.isinf(radius) | (radius < 0) | ~np.isfinite(margin) | (margin < 0)):
@@ -219,14 +254,3 @@ def _floats(frame: gpd.GeoDataFrame, column: str, count: int) -> FloatArray:
     if column not in frame.columns:
         return np.full(count, np.nan)
     return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))
-
-
-def _numbers(frame: Any) -> NDArray[np.int64]:
-    """Obstacle numbers; rows without one (drawn by a person) get the next free ones."""
-    if "obstacle_no" not in frame.columns:
-        return np.arange(1, len(frame) + 1)
-    numbers = frame["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan)
-    missing = np.isnan(numbers)
-    start = int(np.nanmax(numbers, initial=0)) + 1
-    numbers[missing] = np.arange(start, start + int(missing.sum()))
-    return np.asarray(numbers, dtype=np.int64)

@@ -17,7 +17,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
-from geofield.model.obstacles import from_polygons
+from geofield.model.obstacles import from_polygons, next_number
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -50,9 +50,13 @@ def complete_review(obstacles: gpd.GeoDataFrame, grid: Grid | None = None) -> gp
         shapes = shapely.make_valid(obstacles[present & drawn].geometry.to_numpy())
         shapes = shapely.get_parts(shapes)
         shapes = shapes[shapely.get_dimensions(shapes) == 2]
-        first = int(kept["obstacle_no"].max()) + 1 if len(kept) else 1
         added = from_polygons(
-            shapes, obstacles.crs, buffer_m=0.0, grid=grid, status="added", first_no=first
+            shapes,
+            obstacles.crs,
+            buffer_m=0.0,
+            grid=grid,
+            status="added",
+            first_no=next_number(kept),
         )
         parts = [part for part in (kept, added) if len(part)]
         joined = pd.concat(parts) if parts else added
@@ -88,9 +92,8 @@ def merge_reviewed(detected: gpd.GeoDataFrame, previous: gpd.GeoDataFrame) -> gp
         if match >= 0 and int(old[match]) not in taken:
             numbers[row] = old[match]
             taken.add(int(old[match]))
-    highest = int(previous["obstacle_no"].max()) if len(previous) else 0
     new = np.flatnonzero(numbers == 0)
-    numbers[new] = highest + 1 + np.arange(len(new))
+    numbers[new] = next_number(previous) + np.arange(len(new))
     fresh["obstacle_no"] = pd.array(numbers, dtype="Int64")
     parts = [part for part in (reviewed, fresh) if len(part)]
     joined = pd.concat(parts) if parts else fresh

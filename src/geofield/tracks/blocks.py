@@ -13,7 +13,7 @@ from pyproj import CRS
 from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
-from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, shapes_of
+from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, active, numbered, shapes_of
 
 _POINTS = (shapely.GeometryType.POINT.value, shapely.GeometryType.MULTIPOINT.value)
 _LINES = (
@@ -30,7 +30,7 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     ----------
     obstacles : GeoDataFrame, GeoSeries, shapely geometry, sequence of them, or None
         Tables in another CRS are reprojected; plain geometries are in `crs`. Rows whose `status` is
-        ``rejected`` are left out. Points need a column `radius_m`, or a clearance.
+        ``rejected`` or ``possible`` are left out. Points need a column `radius_m`, or a clearance.
     crs : CRS
         The field's.
     clearance_m : float
@@ -60,14 +60,11 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
             np.empty(0, np.int64),
         )
     frame = _as_table(obstacles, crs)
-    if "status" in frame.columns:
-        frame = frame[frame["status"] != "rejected"]
+    frame = active(numbered(frame))
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     missing = shapely.is_missing(geometry) | shapely.is_empty(geometry)
     if missing.any():
         _warn(f"{int(missing.sum())} obstacles have no geometry and were left out.")
-    if "obstacle_no" not in frame.columns:
-        frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
     frame, geometry = frame[~missing], shapely.force_2d(geometry[~missing])
     if not np.isfinite(shapely.get_coordinates(geometry)).all():
         raise TrackError("An obstacle has coordinates that are not finite numbers.")

@@ -20,6 +20,7 @@ _DRIVE = "0,229,255,255"
 _GAP = "255,120,0,255"
 _AVOID = "226,26,28,255"
 _ADDED = "230,0,190,255"
+_POSSIBLE = "255,170,0,255"
 
 #: Below this confidence a detection is drawn as doubtful.
 DOUBTFUL = 0.5
@@ -120,6 +121,12 @@ LOOKS: dict[str, Look] = {
                 f"{_is('detected')} AND NOT {_SURE}",
             ),
             Rule(
+                "Possible, not avoided",
+                "fill",
+                (line("60,40,0,150", 0.5, dash="0.2;1.2"), line(_POSSIBLE, 0.4, dash="0.2;1.2")),
+                _is("possible"),
+            ),
+            Rule(
                 "Added by a person",
                 "fill",
                 (fill("230,0,190,80", _ADDED, 0.5),),
@@ -139,7 +146,7 @@ LOOKS: dict[str, Look] = {
                 _WHITE,
                 "120,0,0,230",
                 geometry="point_on_surface($geometry)",
-                filter='"status" IS NULL OR "status" <> \'rejected\'',
+                filter="\"status\" IS NULL OR \"status\" NOT IN ('rejected', 'possible')",
                 max_scale=2500,
             ),
         ),

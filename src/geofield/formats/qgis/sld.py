@@ -72,6 +72,7 @@ _CONDITIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "Confirmed": ((_EQUAL, "status", "confirmed"),),
     "Detected": ((_EQUAL, "status", "detected"), (_NOT_LESS, "confidence", str(DOUBTFUL))),
     "Detected, doubtful": ((_EQUAL, "status", "detected"), (_LESS, "confidence", str(DOUBTFUL))),
+    "Possible, not avoided": ((_EQUAL, "status", "possible"),),
     "Added by a person": ((_EQUAL, "status", "added"),),
     "Rejected by a person": ((_EQUAL, "status", "rejected"),),
     "Turn": ((_EQUAL, "fits", "yes"),),

@@ -16,6 +16,7 @@ import numpy as np
 from geofield import schema
 from geofield.formats.rdf.rdfxml import escape_text
 from geofield.model.dataset import Dataset
+from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -53,8 +54,7 @@ def write_study_xml(
 
 def _obstacles(dataset: Dataset) -> Iterator[str]:
     yield _HEAD + "<Obstacles>\n"
-    frame = dataset.table(schema.OBSTACLES.name)
-    frame = frame[frame["status"] != "rejected"]
+    frame = active(dataset.table(schema.OBSTACLES.name))
     region = escape_text(dataset.name)
     for kind, element in _ELEMENTS.items():
         rows = frame[frame["kind"] == kind]

@@ -41,6 +41,10 @@ TERMS: tuple[Term, ...] = (
          ("gf:Field",)),
     Term("dc:rights", "xsd:string", "Rights", "The licence in words.",
          ("gf:Field", "dcat:Dataset", "prov:Entity")),
+    Term("gf:certainty", "xsd:double", "Certainty", "Probability that the outline is right.",
+         ("gf:Field",), unit="unit:UNITLESS", minimum=0, maximum=1),
+    Term("gf:doubts", "xsd:string", "Doubts", "What speaks against the outline, in words.",
+         ("gf:Field",)),
     # -- obstacles
     Term("gf:obstacleNo", "xsd:integer", "Obstacle number", "Unique in its field.",
          ("gf:Obstacle",), minimum=0),

@@ -173,6 +173,12 @@ INDIVIDUALS: tuple[Individual, ...] = (
     ),
     Individual("gf:Other", "gf:ObstacleKind", "other", "An obstacle that is not a tree."),
     Individual("gf:Detected", "gf:ReviewStatus", "detected", "Found by the detector, unreviewed."),
+    Individual(
+        "gf:Possible",
+        "gf:ReviewStatus",
+        "possible",
+        "Found by the detector, too uncertain to be driven around; tracks ignore it.",
+    ),
     Individual("gf:Confirmed", "gf:ReviewStatus", "confirmed", "A person says it is there."),
     Individual(
         "gf:Rejected",
