@@ -99,7 +99,9 @@ def main(args: list[str] | None = None) -> None:
         warnings.simplefilter("always", GeofieldWarning)
         warnings.showwarning = _show_warning
         try:
-            cli.main(args=args, prog_name="geofield", standalone_mode=False)
+            # Not standalone, click hands the code of `context.exit` back instead of leaving.
+            code = cli.main(args=args, prog_name="geofield", standalone_mode=False)
+            sys.exit(code if isinstance(code, int) else 0)
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
         except click.ClickException as error:

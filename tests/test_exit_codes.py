@@ -1,0 +1,149 @@
+"""Exit codes of every command as a process: 0 done, 1 the work failed, 2 wrong usage."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from geofield.cli.main import COMMANDS
+from geofield.simulate import SimulatedField
+
+GEOFIELD = Path(sys.executable).with_name("geofield")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder with one finished plan, and what commands need to name."""
+
+    folder: Path
+    picture: Path
+    lat: float
+    lon: float
+
+    def geofield(self, line: str) -> subprocess.CompletedProcess[str]:
+        """Run a command line whose words may name files of this place."""
+        names = {"PICTURE": str(self.picture), "POINT": f"--lat {self.lat} --lon {self.lon}"}
+        for name, value in names.items():
+            line = line.replace(name, value)
+        return subprocess.run(
+            [GEOFIELD, *line.split()],
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+            env={**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")},
+        )
+
+
+@pytest.fixture(scope="module")
+def place(
+    simulated: SimulatedField, simulated_tif: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Place:
+    folder = tmp_path_factory.mktemp("codes")
+    made = Place(folder, simulated_tif, simulated.lat, simulated.lon)
+    (folder / "text.tif").write_text("no picture")
+    (folder / "text.gpkg").write_text("no plan")
+    (folder / "wrong.geojson").write_text('{"type": "FeatureCollection", "features": [{}]}')
+    assert made.geofield("run PICTURE POINT --spacing 8 --out out").returncode == 0
+    return made
+
+
+#: By command: lines that succeed, that fail at their work, that are wrong usage.
+LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "run": (
+        ("run PICTURE POINT --spacing 8 --out out --overwrite",),
+        (
+            "run missing.tif POINT --out new",
+            "run text.tif POINT --out new",
+            "run PICTURE --lat 1 --lon 1 --out new",
+            "run PICTURE POINT --out out",
+        ),
+        ("run PICTURE --out new", "run PICTURE POINT --out new --holes no", "run --nothing"),
+    ),
+    "tiles": (
+        ("tiles PICTURE POINT --size 64 -o cut.tif",),
+        ("tiles missing.tif POINT -o new.tif", "tiles PICTURE --lat 1 --lon 1 -o new.tif"),
+        ("tiles PICTURE -o new.tif", "tiles PICTURE POINT --zoom often -o new.tif"),
+    ),
+    "field": (
+        ("field PICTURE POINT -o field.gpkg",),
+        ("field text.tif POINT -o new.gpkg", "field PICTURE --lat 1 --lon 1 -o new.gpkg"),
+        ("field PICTURE POINT", "field PICTURE POINT -o new.gpkg --method best"),
+    ),
+    "obstacles": (
+        ("obstacles PICTURE out/field.gpkg -o obstacles.gpkg",),
+        ("obstacles text.tif out/field.gpkg -o new.gpkg", "obstacles PICTURE text.gpkg -o n.gpkg"),
+        ("obstacles PICTURE out/field.gpkg", "obstacles PICTURE missing.gpkg -o new.gpkg"),
+    ),
+    "tracks": (
+        ("tracks out/field.gpkg --spacing 9 -o tracks.gpkg",),
+        ("tracks text.gpkg -o new.gpkg", "tracks out/field.gpkg --spacing 5000 -o new.gpkg"),
+        ("tracks out/field.gpkg", "tracks out/field.gpkg --spacing wide -o new.gpkg"),
+    ),
+    "export": (
+        ("export out/field.gpkg -f kml --out export",),
+        ("export text.gpkg -f kml --out new", "export missing.gpkg -f kml --out new"),
+        ("export out/field.gpkg -f kml", "export out/field.gpkg -f shapefile --profile x --out n"),
+    ),
+    "import": (
+        ("import out/geojson/field.geojson -o import.gpkg",),
+        ("import missing.shp -o new.gpkg", "import text.gpkg -o new.gpkg"),
+        ("import -o new.gpkg", "import out/geojson/field.geojson"),
+    ),
+    "validate": (
+        ("validate out/field.gpkg", "validate out/field.gpkg out/geojson/field.geojson --json"),
+        ("validate wrong.geojson", "validate out/field.gpkg wrong.geojson --json"),
+        ("validate", "validate out/field.gpkg --strictly"),
+    ),
+    "query": (
+        ("query out/field.rdf out/obstacles.rdf obstacles-larger-than", "query --list"),
+        ("query out/field.rdf no-such-query", "query text.gpkg obstacles-larger-than"),
+        ("query", "query out/field.rdf out/obstacles.rdf obstacles-larger-than --set radius"),
+    ),
+    "info": (
+        ("info out/field.gpkg", "info PICTURE --json"),
+        ("info text.gpkg", "info text.tif", "info missing.tif"),
+        ("info", "info out/field.gpkg --deep"),
+    ),
+    "formats": (("formats", "formats --json"), (), ("formats gpkg",)),
+    "sources": (("sources --json",), (), ("sources naip",)),
+    "cache": (
+        ("cache info", "cache clear --yes"),
+        ("cache clear nothing-of-this-name",),
+        ("cache fill",),
+    ),
+    "evaluate": (
+        ("evaluate out/field.gpkg out/field.gpkg --truth-layer obstacles --json",),
+        ("evaluate text.gpkg out/field.gpkg", "evaluate out/field.gpkg out/field.gpkg --layer no"),
+        ("evaluate out/field.gpkg", "evaluate out/field.gpkg out/field.gpkg --distance 0"),
+    ),
+    "doctor": (("doctor --json",), (), ("doctor please",)),
+    "simulate": (
+        ("simulate --size 96 --obstacles 1 --out sim",),
+        ("simulate --size 96 --obstacles 1 --out sim",),
+        ("simulate", "simulate --fields 0 --out new"),
+    ),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_exit_codes(place: Place, command: str) -> None:
+    """A message on stderr goes with every failure, and nothing is written."""
+    for code, lines in enumerate(LINES[command]):
+        for line in lines:
+            before = sorted(place.folder.iterdir())
+            done = place.geofield(line)
+            assert done.returncode == code, f"{line}: {done.returncode}\n{done.stderr}"
+            assert "Traceback" not in done.stderr, line
+            if code:
+                assert done.stderr.strip() or "--json" in line, line
+                assert sorted(place.folder.iterdir()) == before, line
+            if "--json" in line and code < 2:
+                json.loads(done.stdout)
