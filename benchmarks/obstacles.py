@@ -31,7 +31,6 @@ import geofield as gf
 from common import DATA, RESULTS, machine, write_page
 from geofield.evaluation import draw_reliability, match_points
 from geofield.model.scene import Scene
-from geofield.obstacles import find_circles
 from geofield.obstacles.auto import (
     DARK_RADII,
     WORKING_RADIUS_PX,
@@ -43,6 +42,7 @@ from geofield.obstacles.evidence import perimeter_support
 from geofield.obstacles.verifier import load_verifier
 from geofield.obstacles.working import working_picture
 from geofield.simulate import SimulationSettings, simulate_fields
+from geofield.study.phase_code import find_circles
 
 Circles = tuple[np.ndarray, np.ndarray]
 Detector = Callable[[Scene], Circles]

@@ -11,7 +11,8 @@ from scipy.io import loadmat, savemat
 from scipy.spatial import cKDTree
 
 from geofield.errors import ObstacleWarning
-from geofield.obstacles import edge_map, find_circles
+from geofield.study.edges import edge_map
+from geofield.study.phase_code import find_circles
 
 pytestmark = pytest.mark.octave
 

@@ -187,7 +187,7 @@ def _study(
     as_json: bool,
 ) -> None:
     """Print and draw the study's numbered regions."""
-    from geofield.field import study_pictures
+    from geofield.study.threshold import study_pictures
 
     study = study_pictures(scene.grey, scene.valid)
     here = study.region_at(*scene.pixel_of(lat=lat, lon=lon))
@@ -212,7 +212,7 @@ def _study(
             click.echo(f"{row['region']:6d} {row['pixels']:9d} {row['area_ha']:9.3f}{mark}")
         say(f"{len(study.counts)} regions, {len(rows)} of them of at least 100 m2")
     if folder is not None:
-        from geofield.mapping_study import draw_study
+        from geofield.study.pictures import draw_study
 
         folder.mkdir(parents=True, exist_ok=True)
         for name, image in draw_study(study, regions or (here,), shown).items():

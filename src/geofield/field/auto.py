@@ -34,9 +34,9 @@ from geofield.field.regions import (
     regions,
 )
 from geofield.field.scoring import Curves, learned
-from geofield.field.segmentation import Segmentation
 from geofield.field.surface import Surface
 from geofield.model import Scene
+from geofield.model.segmentation import Segmentation
 
 #: The search works on a picture reduced to at most this many pixels a side.
 COARSE_PX = 400

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
-import numpy as np
 import shapely
 from shapely import Polygon
 
 from geofield.errors import FieldError, FieldWarning, SettingsError
-from geofield.field.auto import segment
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
 from geofield.field.quality import judge
-from geofield.field.segmentation import Segmentation, fill_holes, part_at
-from geofield.field.study import study_pictures
+from geofield.field.segmentation import fill_holes, part_at
+from geofield.methods import FIELD
+from geofield.methods import method as method_of
 from geofield.model import Field, Scene
+from geofield.model.segmentation import Segmentation
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
-_Method = Callable[[Scene, float, float, Sequence[int]], Segmentation]
 
 
 def extract_field(
@@ -78,9 +77,9 @@ def extract_field(
     FieldWarning
         When the outline should not be trusted unseen.
     """
-    if method not in METHODS:
+    if method not in FIELD:
         raise SettingsError(
-            f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(METHODS)}."
+            f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(FIELD)}."
         )
     if regions and method != "study":
         raise SettingsError(
@@ -99,7 +98,8 @@ def extract_field(
             hint="Check the source, the band and the scaling, for instance with QGIS.",
         )
     picture = diffused(scene) if smooth == "diffusion" else scene
-    found = METHODS[method](picture, x_px, y_px, tuple(regions))
+    chosen = {"regions": tuple(regions)} if regions else {}
+    found: Segmentation = method_of(FIELD, method)(picture, x_px, y_px, **chosen)
     keep = holes == "keep" or (holes is None and method == "study")
     resolution = scene.grid.ground_resolution_m
     smallest = min_hole_m2 / resolution**2 if keep else None
@@ -141,26 +141,3 @@ def _to_metric(outline_px: Polygon, scene: Scene) -> Polygon:
             key=lambda p: p.area,
         )
     return polygon
-
-
-def _study(scene: Scene, x_px: float, y_px: float, regions: Sequence[int]) -> Segmentation:
-    pictures = study_pictures(scene.grey, scene.valid)
-    numbers = tuple(regions) or (pictures.region_at(x_px, y_px),)
-    mask = pictures.mask(numbers)
-    if regions and len(regions) > 1:
-        mask = _joined(mask)
-    return Segmentation(mask, figures=(("threshold", pictures.threshold),))
-
-
-def _joined(mask: np.ndarray) -> np.ndarray:
-    """Regions that a person joins, with the seam of a few pixels between them closed."""
-    from skimage.morphology import closing, disk
-
-    return np.asarray(closing(mask, disk(3)), bool)
-
-
-def _auto(scene: Scene, x_px: float, y_px: float, regions: Sequence[int]) -> Segmentation:
-    return segment(scene, x_px, y_px)
-
-
-METHODS: dict[str, _Method] = {"auto": _auto, "study": _study}

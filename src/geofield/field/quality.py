@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.field.plausible import doubts
-from geofield.field.segmentation import Segmentation
 from geofield.model import FieldQuality, Scene
+from geofield.model.segmentation import Segmentation
 
 BoolArray = NDArray[np.bool_]
 

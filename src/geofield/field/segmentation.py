@@ -1,8 +1,6 @@
-"""Segmentation: what a method hands on, whatever the method."""
+"""Holes and parts of a segmentation."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,25 +9,6 @@ from scipy import ndimage
 from geofield.field.morphology import filled
 
 BoolArray = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Segmentation:
-    """A field as pixels.
-
-    Attributes
-    ----------
-    mask : bool array (rows, columns)
-        The field's pixels; what stands in it (crowns, huts, ponds) may be missing.
-    notes : tuple of str
-        What the method had to tell.
-    figures : tuple of (str, float)
-        Evidence that the method measured itself.
-    """
-
-    mask: BoolArray
-    notes: tuple[str, ...] = ()
-    figures: tuple[tuple[str, float], ...] = ()
 
 
 def fill_holes(mask: BoolArray, *, smallest_kept_px: float | None) -> BoolArray:

@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 
 from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.model.circles import Circles
 from geofield.model.field import Field
 from geofield.obstacles.auto import WORKING_RESOLUTION_M, picture_channels
-from geofield.obstacles.circles import Circles
 from geofield.obstacles.shapes import footprints
 from geofield.obstacles.verifier import FloatArray, load_verifier
 from geofield.obstacles.windows import (

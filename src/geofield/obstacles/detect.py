@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.errors import ObstacleError
 from geofield.grid import Grid
+from geofield.methods import STUDY_STRATEGIES, method
+from geofield.model.circles import checked_range
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px, from_polygons
 from geofield.model.scene import Scene
-from geofield.obstacles.circles import checked_range
 from geofield.obstacles.default import detect_by_default
-from geofield.obstacles.edges import EdgeMethod
-from geofield.obstacles.phase_code import CircleMethod
-from geofield.obstacles.strategies import ThresholdRange
-from geofield.obstacles.study import GreyCheck, StudyOptions, detect_by_study
 from geofield.obstacles.windows import Picture, Polarity, Progress, search_region
 
 if TYPE_CHECKING:
     import geopandas as gpd
+
+    from geofield.study.detectors import GreyCheck
+    from geofield.study.edges import EdgeMethod
+    from geofield.study.phase_code import CircleMethod
+    from geofield.study.strategies import ThresholdRange
 
 Strategy = Literal[
     "auto",
@@ -84,7 +86,7 @@ def detect_obstacles(
         ``auto`` in a field: also return what is in the field, not field and not round, as
         polygons of kind `other`.
     edge_method : str, optional
-        Edge method of the study's strategies; see :func:`run_strategy`.
+        Edge method of the study's strategies; see :mod:`geofield.study.strategies`.
     threshold : float, optional
         Edge threshold of ``single``.
     threshold_range : (start, stop, step), optional
@@ -118,11 +120,9 @@ def detect_obstacles(
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
         )
-    options = StudyOptions(
-        edge_method, threshold, threshold_range, circle_method, sensitivity, grey_check, min_share
-    )
     shapes: list[shapely.Polygon] = []
     confidence: NDArray[np.float64] | None
+    told: dict[str, Any]
     if strategy == "auto":
         circles, shapes, told = detect_by_default(
             scene,
@@ -137,13 +137,19 @@ def detect_obstacles(
     else:
         whole = scene if isinstance(scene, Scene) else scene.read()
         resolution = whole.grid.ground_resolution_m
-        circles, confidence, told = detect_by_study(
+        circles, confidence, told = method(STUDY_STRATEGIES, strategy)(
             whole,
             search_region(whole, field),
             strategy,
             (low_m / resolution, high_m / resolution),
-            options,
             progress,
+            edge_method=edge_method,
+            threshold=threshold,
+            threshold_range=threshold_range,
+            circle_method=circle_method,
+            sensitivity=sensitivity,
+            grey_check=grey_check,
+            min_share=min_share,
         )
     order = np.lexsort((circles.x_px, circles.y_px))
     circles = circles.take(order)

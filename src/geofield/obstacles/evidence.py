@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield.model.circles import Circles
 from geofield.obstacles.channels import Image, is_peak, shrink, smoothed
-from geofield.obstacles.circles import Circles
 
 RADII = 12
 VOTE_THRESHOLD = 0.22

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.filters import apply_hysteresis_threshold
 
+from geofield.model.circles import Circles
 from geofield.obstacles.channels import Channels, Image, enlarge, shrink
-from geofield.obstacles.circles import Circles
 
 MIN_AREA_M2 = 25.0
 MIN_WIDTH_M = 2.4

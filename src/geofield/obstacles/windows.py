@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from shapely import Polygon, box
 
 from geofield.grid import Grid
+from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.field import Field
 from geofield.model.scene import Scene
 from geofield.obstacles.auto import (
@@ -29,8 +30,6 @@ from geofield.obstacles.auto import (
     shade_of,
 )
 from geofield.obstacles.channels import Variant
-from geofield.obstacles.checks import disc_means, inside
-from geofield.obstacles.circles import Circles
 from geofield.obstacles.verifier import FloatArray, Verifier, strongest
 from geofield.obstacles.working import working_picture
 

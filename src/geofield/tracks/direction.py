@@ -18,8 +18,8 @@ from shapely import LineString, Polygon
 from geofield.crs import grid_north_deg
 from geofield.errors import TrackError
 from geofield.grid import Grid
+from geofield.methods import LONGEST_EDGE, method
 from geofield.tracks.fewest import fewest_direction
-from geofield.tracks.hough import hough_edge
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 
 METHODS = ("longest_edge", "hough", "fewest", "fewest_turns")
@@ -87,8 +87,9 @@ def find_baseline(
         if direction == "longest_edge":
             frame = None if grid is None else picture_frame(grid, crs)
             return _from_edge(longest_edge(polygon, tolerance_m=tolerance_m, frame=frame), north)
-        if direction == "hough":
-            return _from_edge(hough_edge(polygon), north)
+        if direction in LONGEST_EDGE:
+            line = method(LONGEST_EDGE, direction)(polygon)
+            return _from_edge(StraightRun(*shapely.get_coordinates(line).ravel().tolist()), north)
         if direction in ("fewest", "fewest_turns"):
             along = fewest_direction(polygon, spacing_m, turns=direction == "fewest_turns")
             return _from_vector(along, north)

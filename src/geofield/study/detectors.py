@@ -10,19 +10,18 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geofield.errors import ObstacleError
+from geofield.model.circles import Circles, inside
 from geofield.model.scene import Scene
-from geofield.obstacles.accumulator import otsu_threshold
-from geofield.obstacles.checks import (
+from geofield.study.accumulator import otsu_threshold
+from geofield.study.checks import (
     GREY_LIMIT,
     dark_enough,
     first_of_duplicates,
-    inside,
     relative_grey_limit,
 )
-from geofield.obstacles.circles import Circles
-from geofield.obstacles.edges import EdgeMethod
-from geofield.obstacles.phase_code import CircleMethod, find_circles
-from geofield.obstacles.strategies import (
+from geofield.study.edges import EdgeMethod
+from geofield.study.phase_code import CircleMethod, find_circles
+from geofield.study.strategies import (
     EdgeCircles,
     Progress,
     StrategyResult,
@@ -57,10 +56,10 @@ def detect_by_study(
     region: NDArray[np.bool_],
     strategy: StudyDetector,
     radius_px: tuple[float, float],
-    options: StudyOptions,
     progress: Progress | None = None,
+    **varied: Any,
 ) -> tuple[Circles, NDArray[np.float64] | None, dict[str, Any]]:
-    """Run one of the study's detectors.
+    """Run one of the study's detectors; what is varied are the fields of :class:`StudyOptions`.
 
     Returns
     -------
@@ -71,6 +70,7 @@ def detect_by_study(
     detection : dict
         The winning setting, the counts per threshold, the grey limit.
     """
+    options = StudyOptions(**varied)
     grey = filled(scene.grey, scene.valid)
     if strategy == "study_listing":
         result = _listing(grey, region, options)

@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 from skimage.morphology import reconstruction
 
-from geofield.obstacles.peaks import plateau_labels
+from geofield.study.peaks import plateau_labels
 
 EIGHT = np.ones((3, 3))
 

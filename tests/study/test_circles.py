@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from geofield.errors import ObstacleError, ObstacleWarning
-from geofield.obstacles import find_circles
+from geofield.study.phase_code import find_circles
 
 
 def discs(centres, radius, size=(90, 110), *, inside=0.2, outside=0.7):

@@ -72,3 +72,36 @@ def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tupl
             hint="Give the smaller radius first, both above zero, for example (2, 9).",
         )
     return low, high
+
+
+def inside(circles: Circles, region: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which centres lie on a pixel of the region (rows, cols)."""
+    rows, cols = region.shape
+    x = np.floor(circles.x_px + 0.5).astype(np.intp)
+    y = np.floor(circles.y_px + 0.5).astype(np.intp)
+    known = (x >= 0) & (x < cols) & (y >= 0) & (y < rows)
+    result = np.zeros(len(circles), dtype=bool)
+    result[known] = region[y[known], x[known]]
+    return result
+
+
+def disc_means(
+    grey: NDArray[np.floating], circles: Circles, valid: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
+    """Return the mean grey level of each disc, NaN for a disc that shows no picture."""
+    rows, cols = grey.shape
+    means = np.full(len(circles), np.nan)
+    for i in range(len(circles)):
+        x, y = circles.x_px[i], circles.y_px[i]
+        reach = max(float(circles.radius_px[i]), 0.5)
+        c0, c1 = max(int(np.floor(x - reach)), 0), min(int(np.ceil(x + reach)) + 1, cols)
+        r0, r1 = max(int(np.floor(y - reach)), 0), min(int(np.ceil(y + reach)) + 1, rows)
+        if c0 >= c1 or r0 >= r1:
+            continue
+        yy, xx = np.ogrid[r0:r1, c0:c1]
+        disc = (xx - x) ** 2 + (yy - y) ** 2 <= reach**2
+        if valid is not None:
+            disc &= valid[r0:r1, c0:c1]
+        if disc.any():
+            means[i] = float(grey[r0:r1, c0:c1][disc].mean())
+    return means

@@ -5,9 +5,10 @@ import pytest
 from affine import Affine
 
 from geofield.errors import FieldError, FieldWarning, PointOutsideError, SettingsError
-from geofield.field import extract_field, study_pictures
+from geofield.field import extract_field
 from geofield.grid import Grid
 from geofield.model import Scene
+from geofield.study.threshold import study_pictures
 
 
 def scene_of(grey):

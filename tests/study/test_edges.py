@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from geofield.errors import ObstacleError
-from geofield.obstacles import EDGE_METHODS, EdgeScan, edge_map
-from geofield.obstacles.edges import gradient
+from geofield.study.edges import EDGE_METHODS, EdgeScan, edge_map, gradient
 
 
 @pytest.mark.parametrize("method", ["sobel", "prewitt"])

@@ -7,6 +7,7 @@ let a person choose by hand.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geofield.errors import FieldError
-from geofield.field.morphology import filled
+from geofield.model.scene import Scene
+from geofield.model.segmentation import Segmentation
 
 BoolArray = NDArray[np.bool_]
 
@@ -71,7 +73,7 @@ class StudyPictures:
         from skimage.morphology import reconstruction
 
         mask = self.mask(numbers)
-        inside = filled(mask)
+        inside = ndimage.binary_fill_holes(mask)
         grey = np.where(inside, self.grey, 0).astype(np.float32)
         seed = np.where(mask, grey, 255).astype(np.float32)
         seed[~inside] = 0
@@ -124,6 +126,18 @@ def study_pictures(grey: NDArray[np.float32], valid: BoolArray | None = None) ->
     binary = (total > 0.5) & valid
     regions, counts = _number(binary, valid)
     return StudyPictures(smooth, threshold, binary, regions, counts)
+
+
+def segment(scene: Scene, x_px: float, y_px: float, regions: Sequence[int] = ()) -> Segmentation:
+    """The region at a point, or the numbered regions that a person chose, joined."""
+    from skimage.morphology import closing, disk
+
+    pictures = study_pictures(scene.grey, scene.valid)
+    mask = pictures.mask(tuple(regions) or (pictures.region_at(x_px, y_px),))
+    if len(regions) > 1:
+        # The seam between neighbouring regions is a few pixels wide.
+        mask = np.asarray(closing(mask, disk(3)), bool)
+    return Segmentation(mask, figures=(("threshold", pictures.threshold),))
 
 
 def _number(binary: BoolArray, valid: BoolArray) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

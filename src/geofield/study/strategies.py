@@ -18,11 +18,11 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from geofield.errors import ObstacleError
-from geofield.obstacles.accumulator import Polarity
-from geofield.obstacles.checks import first_of_duplicates, inside
-from geofield.obstacles.circles import Circles
-from geofield.obstacles.edges import EDGE_METHODS, EdgeMethod, EdgeScan
-from geofield.obstacles.phase_code import DEFAULT_SENSITIVITY, CircleMethod, find_circles
+from geofield.model.circles import Circles, inside
+from geofield.study.accumulator import Polarity
+from geofield.study.checks import first_of_duplicates
+from geofield.study.edges import EDGE_METHODS, EdgeMethod, EdgeScan
+from geofield.study.phase_code import DEFAULT_SENSITIVITY, CircleMethod, find_circles
 
 StudyStrategy = Literal["single", "t_range", "max_of_all", "dlc", "consensus"]
 STUDY_STRATEGIES: tuple[StudyStrategy, ...] = get_args(StudyStrategy)
@@ -48,7 +48,7 @@ class EdgeCircles:
     ----------
     radius_px : (low, high)
     polarity, sensitivity, edge_threshold, method
-        See :func:`geofield.obstacles.find_circles`.
+        See :func:`geofield.study.find_circles`.
     smoothed_radius_px : (low, high) or None
         Radii of a second pass on the edge map smoothed by 3 x 3; None for no second pass.
     """

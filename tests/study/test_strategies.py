@@ -5,15 +5,14 @@ import pytest
 from scipy import ndimage
 
 from geofield.errors import ObstacleError
-from geofield.obstacles import EDGE_METHODS, Circles, EdgeCircles, run_strategy
-from geofield.obstacles.checks import (
+from geofield.model.circles import Circles, disc_means, inside
+from geofield.study.checks import (
     dark_enough,
-    disc_means,
     first_of_duplicates,
-    inside,
     relative_grey_limit,
 )
-from geofield.obstacles.strategies import thresholds
+from geofield.study.edges import EDGE_METHODS
+from geofield.study.strategies import EdgeCircles, run_strategy, thresholds
 
 RANGES = dict.fromkeys(EDGE_METHODS, (0.02, 0.2, 0.03))
 

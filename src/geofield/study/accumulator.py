@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geofield.errors import ObstacleError
-from geofield.obstacles.edges import as_unit, gradient
+from geofield.study.edges import as_unit, gradient
 
 Polarity = Literal["dark", "bright"]
 RADIUS_STEP_PX = 0.5

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import ObstacleError, ObstacleWarning
-from geofield.obstacles.accumulator import (
+from geofield.model.circles import Circles, checked_range
+from geofield.study.accumulator import (
     EdgePixels,
     Polarity,
     accumulate,
@@ -23,8 +24,7 @@ from geofield.obstacles.accumulator import (
     smooth,
     voting_pixels,
 )
-from geofield.obstacles.circles import Circles, checked_range
-from geofield.obstacles.peaks import plateau_labels
+from geofield.study.peaks import plateau_labels
 
 CircleMethod = Literal["phase_code", "two_stage"]
 CIRCLE_METHODS: tuple[CircleMethod, ...] = get_args(CircleMethod)

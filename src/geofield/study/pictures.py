@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 if TYPE_CHECKING:
-    from geofield.field import StudyPictures
+    from geofield.study.threshold import StudyPictures
 
 #: Turning the hue by the golden angle keeps neighbours in the list apart.
 _GOLDEN = 0.381966

@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Point, Polygon
+from shapely import LineString, Point, Polygon
 
-from geofield.tracks.frame import FloatArray
-from geofield.tracks.longest_edge import StraightRun
+FloatArray = NDArray[np.float64]
 
 RHO_STEP_PX = 0.5
 """The study's step of rho."""
@@ -23,7 +22,7 @@ _LINE_PX = 1.0
 _FILL_GAP_PX = 20.0
 
 
-def hough_edge(polygon: Polygon) -> StraightRun:
+def hough_edge(polygon: Polygon) -> LineString:
     """Find the longest straight edge by the Hough transform of the rasterised outline.
 
     Parameters
@@ -33,7 +32,8 @@ def hough_edge(polygon: Polygon) -> StraightRun:
 
     Returns
     -------
-    StraightRun
+    LineString
+        The edge; the field lies to its left.
     """
     x0, y0, x1, y1 = polygon.bounds
     size_m = max(x1 - x0, y1 - y0) / _RASTER_PX
@@ -56,7 +56,7 @@ def hough_edge(polygon: Polygon) -> StraightRun:
     b = np.array([x0, y0]) + end * size_m
     if not _inside_is_left(polygon, a, b, size_m):
         a, b = b, a
-    return StraightRun(float(a[0]), float(a[1]), float(b[0]), float(b[1]))
+    return LineString([a, b])
 
 
 def _longest_stretch(

@@ -1,0 +1,49 @@
+"""Methods by name: where the code of each lies.
+
+A stage looks the method that was asked for up here and loads its module only then. So the
+stages know the study's methods by name and do not lean on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any
+
+_STUDY_DETECTORS = "geofield.study.detectors:detect_by_study"
+
+FIELD: Mapping[str, str] = MappingProxyType(
+    {
+        "auto": "geofield.field.auto:segment",
+        "study": "geofield.study.threshold:segment",
+    }
+)
+"""Each takes (scene, x_px, y_px) and returns a `Segmentation`; the study's also `regions`."""
+
+STUDY_STRATEGIES: Mapping[str, str] = MappingProxyType(
+    dict.fromkeys(
+        (
+            "single",
+            "t_range",
+            "max_of_all",
+            "dlc",
+            "consensus",
+            "study_text",
+            "study_listing",
+            "study_dlc",
+        ),
+        _STUDY_DETECTORS,
+    )
+)
+"""Each takes (scene, region, strategy, radius_px, options, progress)."""
+
+LONGEST_EDGE: Mapping[str, str] = MappingProxyType({"hough": "geofield.study.hough:hough_edge"})
+"""Each takes a polygon and returns the line of its longest edge, the field to its left."""
+
+
+def method(methods: Mapping[str, str], name: str) -> Callable[..., Any]:
+    """Load the method of a name."""
+    module, function = methods[name].split(":")
+    found: Callable[..., Any] = getattr(import_module(module), function)
+    return found
