@@ -1,0 +1,109 @@
+"""Networks of this package, loaded once and run by OpenCV."""
+
+from __future__ import annotations
+
+import json
+import threading
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from geofield.errors import GeofieldError
+
+FloatImage = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A network and what its channels mean.
+
+    Any thread may call it: OpenCV's networks hold the pictures that run through them, so each
+    thread loads one of its own. It travels to other processes by its name.
+
+    Attributes
+    ----------
+    name : str
+    inputs, outputs : tuple of str
+        The channels' names, in the network's order.
+    facts : dict
+        The rest of ``NAME.json``.
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    facts: dict[str, Any]
+    _model: bytes = field(repr=False)
+    _local: threading.local = field(default_factory=threading.local, repr=False)
+
+    def __call__(self, batch: FloatImage) -> FloatImage:
+        """Run the network.
+
+        Parameters
+        ----------
+        batch : float32 array (n, inputs, rows, cols)
+
+        Returns
+        -------
+        float32 array (n, outputs, rows, cols)
+            Rows and columns of the network's own cells.
+
+        Raises
+        ------
+        ValueError
+            If the channels are not as many as the network's inputs.
+        """
+        if batch.ndim != 4 or batch.shape[1] != len(self.inputs):
+            raise ValueError(
+                f"{self.name} takes (n, {len(self.inputs)}, rows, cols), not {batch.shape}"
+            )
+        if not hasattr(self._local, "net"):
+            self._local.net = cv2.dnn.readNetFromONNX(np.frombuffer(self._model, np.uint8))
+        self._local.net.setInput(np.ascontiguousarray(batch, dtype=np.float32))
+        return np.array(self._local.net.forward(), dtype=np.float32)
+
+    def stacked(self, **channels: FloatImage | float) -> FloatImage:
+        """Return channels, given by name, as one batch (1, inputs, rows, cols).
+
+        A number fills its channel.
+
+        Raises
+        ------
+        ValueError
+            If a channel is missing or unknown.
+        """
+        if set(channels) != set(self.inputs):
+            raise ValueError(f"{self.name} takes {self.inputs}, not {tuple(channels)}")
+        rows = np.broadcast_arrays(*(channels[name] for name in self.inputs))
+        return np.stack([np.asarray(row, np.float32) for row in rows])[None]
+
+    def named(self, batch: FloatImage) -> dict[str, FloatImage]:
+        """Run the network on one picture and return its output by name, each (rows, cols)."""
+        return dict(zip(self.outputs, self(batch)[0], strict=True))
+
+    def __reduce__(self) -> tuple[Any, tuple[str]]:
+        return network, (self.name,)
+
+
+@cache
+def network(name: str) -> Network:
+    """Return a network of this package by its name.
+
+    Raises
+    ------
+    GeofieldError
+        If there is none of that name, or its file is damaged.
+    """
+    folder = files("geofield.learned")
+    try:
+        facts = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        model = (folder / f"{name}.onnx").read_bytes()
+        inputs, outputs = tuple(facts.pop("inputs")), tuple(facts.pop("outputs"))
+    except (OSError, ValueError, KeyError) as error:
+        raise GeofieldError(f"The network {name!r} of this installation cannot be read.") from error
+    return Network(name, inputs, outputs, facts, model)
