@@ -60,17 +60,34 @@ class Plan:
     __hash__ = None  # type: ignore[assignment]
 
     def __eq__(self, other: object) -> bool:
-        """Whether all tables, settings, source, grid and evidence are the same."""
+        """Whether field, obstacles, tracks, settings, source, grid and evidence are the same."""
         if not isinstance(other, Plan):
             return NotImplemented
-        mine, theirs = self.to_dataset(), other.to_dataset()
+        mine, theirs = self._tables(), other._tables()
         return (
-            mine.crs == theirs.crs
-            and mine.provenance == theirs.provenance
-            and mine.grid == theirs.grid
-            and mine.tables.keys() == theirs.tables.keys()
-            and all(mine.tables[name].equals(theirs.tables[name]) for name in mine.tables)
+            self._facts() == other._facts()
+            and mine.keys() == theirs.keys()
+            and all(mine[name].equals(theirs[name]) for name in mine)
         )
+
+    def _facts(self) -> tuple[Any, ...]:
+        """What is the same in equal plans, besides the tables."""
+        one = self.field
+        words = (one.name, one.field_id, one.method, one.imagery, one.imagery_date, one.licence)
+        outline = None if self.tracks is None else self.tracks.outline
+        return (one.crs, one.polygon, words, outline, self._provenance(), self.grid)
+
+    def _tables(self) -> dict[str, gpd.GeoDataFrame]:
+        """All tables but the field's own."""
+        tables = {} if self.obstacles is None else {schema.OBSTACLES.name: self.obstacles}
+        return tables if self.tracks is None else tables | self.tracks.tables()
+
+    def _provenance(self) -> Provenance:
+        evidence = dict(self.evidence)
+        if self.tracks is not None:
+            evidence["tracks"] = self.tracks.evidence()
+        settings = self.settings.model_dump(mode="json") if self.settings else {}
+        return Provenance(SOFTWARE, self.source, settings, evidence)
 
     @property
     def outline_edited(self) -> bool:
@@ -80,25 +97,13 @@ class Plan:
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
-        tables = {schema.FIELD.name: self._field_table()}
-        if self.obstacles is not None:
-            tables[schema.OBSTACLES.name] = self.obstacles
-        points = None
-        if self.tracks is not None:
-            tables |= self.tracks.tables()
-            points = self.tracks.point_chunks
         return Dataset(
-            tables=tables,
+            tables={schema.FIELD.name: self._field_table()} | self._tables(),
             crs=self.field.crs,
             name=self.field.name,
-            provenance=Provenance(
-                software=SOFTWARE,
-                source=self.source,
-                settings=self.settings.model_dump(mode="json") if self.settings else {},
-                evidence=dict(self.evidence),
-            ),
+            provenance=self._provenance(),
             grid=self.grid,
-            points=points,
+            points=None if self.tracks is None else self.tracks.point_chunks,
         )
 
     @classmethod
@@ -122,12 +127,15 @@ class Plan:
         settings = (
             from_mapping(dataset.provenance.settings) if dataset.provenance.settings else None
         )
+        field = _field_from_row(rows, dataset, evidence)
         obstacles = dataset.tables.get(schema.OBSTACLES.name)
         tracks = None
         if schema.SEGMENTS.name in dataset.tables and "tracks" in evidence:
-            tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
+            tracks = Tracks.from_tables(
+                dataset.tables, evidence["tracks"], grid=dataset.grid, outline=field.polygon
+            )
         return cls(
-            field=_field_from_row(rows, dataset, evidence),
+            field=field,
             obstacles=obstacles,
             tracks=tracks,
             settings=settings,

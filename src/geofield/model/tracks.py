@@ -49,7 +49,7 @@ class Tracks:
     notes : tuple of str
         What the planner had to tell.
     outline : shapely.Polygon or None
-        The field planned in, metric CRS; None where the tracks were only read back.
+        The field planned in, metric CRS; None where it is not known.
     blocked_count : int
         Tracks of the layout that obstacles leave nothing of; their numbers stay free.
     losses : tuple of ObstacleLoss
@@ -102,6 +102,8 @@ class Tracks:
             "spacing_m": self.spacing_m,
             "step_m": self.step_m,
             "notes": list(self.notes),
+            "blocked_count": self.blocked_count,
+            "losses": [[each.obstacle_no, each.length_m, each.percent] for each in self.losses],
         }
 
     @classmethod
@@ -111,6 +113,7 @@ class Tracks:
         evidence: Mapping[str, Any],
         *,
         grid: Grid | None = None,
+        outline: Polygon | None = None,
     ) -> Tracks:
         """The tracks that were written as :meth:`tables` and :meth:`evidence`."""
         return cls(
@@ -122,6 +125,9 @@ class Tracks:
             step_m=float(evidence["step_m"]),
             grid=grid,
             notes=tuple(evidence.get("notes", ())),
+            outline=outline,
+            blocked_count=int(evidence.get("blocked_count", 0)),
+            losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),
             headland=tables.get(schema.HEADLAND.name),
             headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
             route=tables.get(schema.ROUTE.name),

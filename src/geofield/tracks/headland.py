@@ -73,7 +73,8 @@ def headland_table(
             "width_m": [width_m],
             "area_ha": [sum(p.area for p in parts) / 10_000.0],
         },
-        [MultiPolygon(parts)],
+        # As files hold it: a plan read back is then the same.
+        [shapely.orient_polygons(MultiPolygon(parts))],
         crs,
     )
 

@@ -1,0 +1,107 @@
+"""A plan is the same value before it is written and after it is read."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import geopandas as gpd
+import pytest
+import shapely
+from pyproj import CRS
+
+import geofield as gf
+from geofield.model.obstacles import circle_polygons
+from geofield.pipeline import run_tracks
+from geofield.plan import Plan, read_plan
+from geofield.settings import load_settings
+
+UTM = CRS.from_epsg(32636)
+X, Y = 545_000.0, 3_880_000.0
+SETTINGS = load_settings(
+    None, {"tracks": {"spacing_m": 5.0, "headland_m": 5.0}, "export": {"formats": ["gpkg", "rdf"]}}
+)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    """A field with a wall that leaves nothing of two tracks, and a tree on two others."""
+    wall = shapely.box(X - 1, Y + 18, X + 121, Y + 28)
+    table = gpd.GeoDataFrame(
+        {
+            "obstacle_no": [1, 2],
+            "kind": ["other", "tree"],
+            "status": "added",
+            "radius_m": [None, 4],
+        },
+        geometry=[wall, *circle_polygons([X + 60], [Y + 45], [4.0])],
+        crs=UTM,
+    ).assign(status="added", buffer_m=0.0)
+    field = gf.Field(shapely.box(X, Y, X + 120, Y + 60), crs=UTM)
+    obstacles = gf.schema.conform(gf.schema.OBSTACLES, table)
+    return run_tracks(Plan(field, obstacles), settings=SETTINGS)
+
+
+@pytest.mark.parametrize("product", ["field.gpkg", "field.rdf"])
+def test_statistics_are_the_same_after_a_round_trip(
+    plan: Plan, product: str, tmp_path: Path
+) -> None:
+    assert plan.tracks is not None
+    before = plan.tracks.statistics
+    assert before.blocked_count == 2
+    assert 50 < before.coverage_percent < 100
+    assert [loss.obstacle_no for loss in before.losses] == [1, 2]
+    plan.write(tmp_path)
+    again = read_plan(tmp_path / product)
+    assert again.tracks is not None
+    assert again.tracks.statistics == before
+    assert again == plan
+
+
+def test_the_command_tells_the_same_figures_as_the_plan_that_it_wrote(
+    plan: Plan, tmp_path: Path
+) -> None:
+    plan.write(tmp_path / "out")
+    file = tmp_path / "out/field.gpkg"
+    done = subprocess.run(
+        [sys.executable, "-m", "geofield", "tracks", file, "--spacing", "5", "-o", file, "--json"],
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    (told,) = json.loads(done.stdout)["fields"]
+    tracks = read_plan(file).tracks
+    assert tracks is not None
+    for name, value in asdict(tracks.statistics).items():
+        if name == "losses":
+            assert told[name] == [asdict(loss) for loss in tracks.statistics.losses]
+        else:
+            assert math.isclose(told[name], value, rel_tol=1e-12), name
+
+
+def test_comparing_plans_plans_nothing(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from geofield.tracks import direction
+
+    plan.write(tmp_path)
+    again = read_plan(tmp_path / "field.gpkg")
+
+    def refused(*args: object, **options: object) -> None:
+        raise AssertionError("== ran a track algorithm")
+
+    monkeypatch.setattr(direction, "find_baseline", refused)
+    monkeypatch.setattr(direction, "longest_edge", refused)
+    assert again == plan
+    assert again != run_other(plan)
+
+
+def run_other(plan: Plan) -> Plan:
+    """The same plan under another name of the field."""
+    from dataclasses import replace
+
+    return replace(plan, field=replace(plan.field, name="another"))
