@@ -22,6 +22,17 @@ _PARAMETER = re.compile(
     r'VALUES \?(?P<name>\w+) \{ (?P<value>"(?P<text>[^"]*)"(?:\^\^xsd:(?P<kind>\w+))?|-?\d+) \}'
 )
 
+_BLANK = r"(?:\s|\#[^\r\n]*[\r\n])*"
+_NAME = r"(?:<[^>]*>|[?$]\w+|[\w.-]*:[^\s{]*?)"
+#: What reaches beyond the files that were named: other hosts, and data that is not in them.
+#: Looked for in the raw text, texts and comments too: no second reading of SPARQL's syntax can
+#: then differ from the engine's and let one through.
+_OUTWARD = re.compile(
+    rf"(?<![?$])(SERVICE){_BLANK}(?:SILENT{_BLANK})?{_NAME}{_BLANK}\{{"
+    rf"|(?<![?$\w:])(FROM|LOAD){_BLANK}(?:(?:NAMED|SILENT){_BLANK})?(?:<[^>]*>|[\w.-]*:)",
+    re.IGNORECASE,
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Query:
@@ -127,22 +138,45 @@ def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = 
     Raises
     ------
     FormatError
-        When the query is not SPARQL, or a parameter is unknown or of the wrong kind.
+        When the query is not SPARQL or asks for data elsewhere (SERVICE, LOAD, FROM), or a
+        parameter is unknown or of the wrong kind.
     """
     text = query.with_values(values or {}) if isinstance(query, Query) else query
+    refuse_outward(text)
     try:
         result = store.query(
             text,
             prefixes=SCHEMA_PREFIXES,
             custom_functions=oxigraph_functions(),
         )
+        if not isinstance(result, ox.QuerySolutions):
+            raise FormatError("Only SELECT queries are answered here.", hint="Ask with SELECT.")
+        columns = tuple(variable.value for variable in result.variables)
+        rows = tuple(tuple(_python(row[column]) for column in columns) for row in result)
     except (SyntaxError, ValueError) as error:
         raise FormatError(f"The query is not valid SPARQL: {error}.") from error
-    if not isinstance(result, ox.QuerySolutions):
-        raise FormatError("Only SELECT queries are answered here.", hint="Ask with SELECT.")
-    columns = tuple(variable.value for variable in result.variables)
-    rows = tuple(tuple(_python(row[column]) for column in columns) for row in result)
+    except (RuntimeError, OSError) as error:
+        raise FormatError(f"The query cannot be answered: {error}.") from error
     return Answer(columns, rows)
+
+
+def refuse_outward(text: str) -> None:
+    """Refuse SPARQL that would reach for other hosts or other data, before anything runs it.
+
+    Raises
+    ------
+    FormatError
+        Names the keyword and its line.
+    """
+    found = _OUTWARD.search(text)
+    if found:
+        line = text.count("\n", 0, found.start()) + 1
+        keyword = (found[1] or found[2]).upper()
+        raise FormatError(
+            f"The query, line {line}: {keyword} asks for data elsewhere. geofield answers "
+            "from the files that you name, and opens no connection.",
+            hint="Take it out; give the other data as a file of RDF.",
+        )
 
 
 def _parsed(name: str, text: str) -> Query:
