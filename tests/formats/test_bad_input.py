@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats import FORMATS, read_dataset, shapefile, write_dataset
+from geofield.formats import FORMATS, read_dataset, shapefile_layer, write_dataset
 from geofield.formats.names import safe_name
 from geofield.formats.shapefile_profiles import PROFILES
 
@@ -29,19 +29,19 @@ def renamed(dataset, name):
 
 def test_shapefile_names_fit_and_do_not_collide():
     for layer in schema.LAYERS:
-        names = list(shapefile.short_names(layer).values())
+        names = list(shapefile_layer.short_names(layer).values())
         assert all(0 < len(name) <= 10 and name.isascii() for name in names)
         assert len({name.lower() for name in names}) == len(names)
 
 
 def test_profiles_fit_too(dataset):
     for profile in PROFILES.values():
-        for _, _, table in profile(dataset, "c", "f"):
-            assert all(len(name) <= 10 for name in table.column_names)
+        for layer in profile(dataset, "c", "f"):
+            assert all(len(name) <= 10 for name in layer.columns)
 
 
 def test_more_than_a_shapefile_holds_is_refused_before_writing(dataset, tmp_path, monkeypatch):
-    monkeypatch.setattr(shapefile, "FILE_BYTES", 1000)
+    monkeypatch.setattr(shapefile_layer, "FILE_BYTES", 1000)
     with pytest.raises(FormatError, match=r"GB; 2 GB fit.*GeoPackage or FlatGeobuf"):
         write_dataset(dataset, tmp_path / "out", ["shapefile"])
     assert not (tmp_path / "out").exists()
@@ -51,12 +51,12 @@ def test_size_estimate_is_not_below_the_file(dataset, tmp_path):
     written = write_dataset(dataset, tmp_path, ["shapefile"])
     largest = max(path.stat().st_size for path in written)
     for bytes_ in (largest - 1,):
-        shapefile_bytes, shapefile.FILE_BYTES = shapefile.FILE_BYTES, bytes_
+        shapefile_bytes, shapefile_layer.FILE_BYTES = shapefile_layer.FILE_BYTES, bytes_
         try:
             with pytest.raises(FormatError, match="GB"):
                 write_dataset(dataset, tmp_path / "again", ["shapefile"])
         finally:
-            shapefile.FILE_BYTES = shapefile_bytes
+            shapefile_layer.FILE_BYTES = shapefile_bytes
 
 
 @pytest.mark.parametrize("name", ["kml", "gpx", "isoxml"])

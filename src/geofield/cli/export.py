@@ -68,6 +68,8 @@ def export(
     options = {key: value for key, value in given.items() if value is not None}
     options |= dict(_named(text) for text in further)
     dataset = read_dataset(plan_file, crs=crs)
+    for note in dataset.notes:
+        say(note)
     written = write_dataset(
         dataset,
         folder,

@@ -44,7 +44,9 @@ def import_(
 
     FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or
     AgOpenGPS field, in any CRS. Several files make one field: the boundary from one, the
-    obstacles from another.
+    obstacles from another. A lone polygon is the field; of several, whole words of the layers'
+    names (boundary, trees), their columns, and what lies in what decide. What was taken as what
+    is said on stderr.
     """
     from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
@@ -56,9 +58,18 @@ def import_(
     written = write_dataset(
         dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite, inputs=files
     )
+    for note in dataset.notes:
+        say(note)
     counts = {layer: len(table) for layer, table in dataset.tables.items() if len(table)}
     if as_json:
-        echo_json({"files": [str(path) for path in written], "name": dataset.name, "rows": counts})
+        echo_json(
+            {
+                "files": [str(path) for path in written],
+                "name": dataset.name,
+                "rows": counts,
+                "taken": list(dataset.notes),
+            }
+        )
         return
     found = ", ".join(f"{count} {layer}" for layer, count in counts.items())
     say(f"{dataset.name}: {found} in {output}")

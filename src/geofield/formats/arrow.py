@@ -6,6 +6,7 @@ never lies in memory as a whole, and an empty layer has the same columns as a fu
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _SINGLE = {"Point": 0, "LineString": 1, "Polygon": 3, "MultiLineString": 5, "MultiPolygon": 6}
 _PART = {"MultiLineString": 1, "MultiPolygon": 3}
 _WHOLE = {"Point": 4, "LineString": 5, "Polygon": 6}
+_NEARLY_FULL = 2**26
 # GDAL's configuration belongs to the whole process.
 _GDAL_CONFIG = threading.Lock()
 
@@ -46,6 +48,12 @@ def gdal_config(**options: str) -> Iterator[None]:
             yield
         finally:
             pyogrio.set_gdal_config_options(before)
+
+
+def disk_hint(path: Path) -> str:
+    """What to tell beside a driver's refusal: the disk only where it is nearly full."""
+    free = shutil.disk_usage(path.parent).free
+    return f"The disk has {free / 2**20:.0f} MB left." if free < _NEARLY_FULL else ""
 
 
 def to_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
@@ -236,7 +244,7 @@ def write_layer(
         )
     except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
         raise FormatError(
-            f"{path.name} could not be written: {error}.", hint="Is there room on the disk?"
+            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
         ) from error
 
 

@@ -1,45 +1,29 @@
-"""Understanding tables that other programs made: which layer is what, in which CRS.
+"""Reading tables that other programs made: their geometries, their CRS, and what is what.
 
-Layers with geofield's own columns are taken as they are. Of others, polygons are the
-field's outline or obstacles, points are obstacles, and lines are guidance lines: by the
-layer's name where it says so, else by what lies in what.
+Layers with geofield's own columns are taken as they are; `geofield.formats.sorting` finds out
+what the others are.
 """
 
 from __future__ import annotations
 
-import re
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-import shapely
 from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
+from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-_OBSTACLE_WORDS = re.compile(
-    r"obst|tree|baum|arbre|exclu|hole|interior|inner|areafeature|pointfeature|hindernis|flag", re.I
-)
-_FIELD_WORDS = re.compile(r"^field|bound|outline|parcel|parzelle|schlag|feld|perimeter", re.I)
-_SKIP_WORDS = re.compile(r"headland|turn|route|gap", re.I)
-
-
-@dataclass(frozen=True, slots=True)
-class RawLayer:
-    """A table as a file has it: any columns, any CRS, geometries that may be mixed."""
-
-    name: str
-    frame: gpd.GeoDataFrame
+__all__ = ["RawLayer", "layer_names", "read_foreign", "read_vector"]
 
 
 def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
@@ -53,9 +37,16 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     import geopandas as gpd
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
+    from shapely.errors import GEOSException
 
     try:
-        frame = pyogrio.read_dataframe(path, layer=layer)
+        with warnings.catch_warnings():
+            # GDAL tells of each ring that is not closed; they are counted below.
+            warnings.filterwarnings("ignore", "Non closed ring", RuntimeWarning)
+            try:
+                frame = pyogrio.read_dataframe(path, layer=layer)
+            except GEOSException:
+                frame = _mended(path, layer)
     except (DataSourceError, DataLayerError, FeatureError, GeometryError) as error:
         raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
     except UnicodeDecodeError as error:
@@ -65,6 +56,26 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
         ) from error
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
+    return frame
+
+
+def _mended(path: Path, layer: str | None) -> Any:
+    """A layer with rings closed that are open, which is said; impossible shapes are left out."""
+    import pyogrio
+
+    frame = pyogrio.read_dataframe(path, layer=layer, on_invalid="fix")
+    plain = pyogrio.read_dataframe(path, layer=layer, on_invalid="ignore").geometry
+    # A ring of two points closes to nothing.
+    frame = frame[~(frame.geom_type.str.endswith("Polygon") & (frame.geometry.area == 0.0))]
+    lost = len(plain) - int(frame.geometry.notna().sum())
+    closed = int(plain.isna().sum()) - lost
+    words = [f"{closed} with rings that were not closed: they are closed now"] if closed else []
+    words += [f"{lost} without a shape that can be: they are left out"] if lost else []
+    warnings.warn(
+        f"{path.name}: geometries that are damaged: {'; '.join(words)}. Look at them.",
+        FormatWarning,
+        stacklevel=4,
+    )
     return frame
 
 
@@ -113,20 +124,35 @@ def read_foreign(
     if not present:
         raise FormatError(f"{path} holds no geometries.")
     metric = _metric_of(present)
-    tables: dict[str, gpd.GeoDataFrame] = {}
-    rest: list[RawLayer] = []
+    own: dict[str, list[Any]] = {}
+    foreign: list[RawLayer] = []
+    notes: list[str] = []
     for each in present:
         frame = each.frame.to_crs(metric)
-        own = _own_layer(each)
-        if own is not None:
-            tables[own.name] = _own(own, frame, path)
+        layer = _own_layer(each)
+        if layer is None:
+            foreign.append(RawLayer(each.name, frame))
         else:
-            rest.append(RawLayer(each.name, frame))
-    _sort_out(rest, tables, metric, path)
+            own.setdefault(layer.name, []).append(_own(layer, frame, path))
+            notes.append(f"{each.name}: {len(frame)} rows are geofield's own layer {layer.name}")
+    tables = {
+        name: parts[0]
+        if len(parts) == 1
+        else schema.conform(schema.layer(name), pd.concat(parts), extras=True)
+        for name, parts in own.items()
+    }
+    guessed = sort_out(foreign, tables, metric, path)
+    # A file of geofield alone leaves nothing to guess.
+    notes = notes + guessed if guessed else []
+    if not any(len(table) for table in tables.values()):
+        raise FormatError(
+            f"{path} holds nothing that is a boundary, an obstacle or a line.",
+            hint="; ".join(notes),
+        )
     field = tables.get("field")
     if name is None and field is not None and len(field) and isinstance(field["name"].iloc[0], str):
         name = field["name"].iloc[0]
-    return Dataset(tables, metric, name or path.stem)
+    return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
 
 
 def _present(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -201,72 +227,3 @@ def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFr
             stacklevel=4,
         )
     return schema.conform(of, frame[fits], extras=True)
-
-
-def _sort_out(rest: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path) -> None:
-    """Give every foreign geometry its place."""
-    outlines: list[Any] = []
-    obstacles: list[Any] = []
-    lines: list[Any] = []
-    unnamed: list[Any] = []
-    for each in rest:
-        if _SKIP_WORDS.search(each.name):
-            continue
-        frame = each.frame.explode(index_parts=False, ignore_index=True)
-        kind = frame.geom_type
-        polygons = frame[kind == "Polygon"]
-        lines.append(frame[kind.isin(["LineString", "LinearRing"])])
-        obstacles.append(frame[kind == "Point"])
-        if _OBSTACLE_WORDS.search(each.name):
-            obstacles.append(polygons)
-        elif _FIELD_WORDS.search(each.name):
-            outlines.append(polygons)
-        else:
-            unnamed.append(polygons)
-    outline, loose = _concat(outlines), _concat(unnamed)
-    if loose is not None:
-        if outline is None and "field" not in tables:
-            outline, inner = _largest_and_inner(loose)
-            obstacles.append(inner)
-        else:
-            obstacles.append(loose)
-    if outline is not None and "field" not in tables:
-        tables["field"] = field_table(_repaired(outline, path), metric, path)
-    found = _concat(obstacles)
-    if found is not None and "obstacles" not in tables:
-        tables["obstacles"] = obstacle_table(_repaired(found, path), metric, path)
-    drawn = _concat(lines)
-    if drawn is not None and "tracks" not in tables:
-        tables["tracks"], tables["segments"] = line_tables(drawn, metric)
-    elif "segments" in tables and "tracks" not in tables:
-        tables["tracks"], tables["segments"] = line_tables(tables["segments"], metric)
-
-
-def _largest_and_inner(frame: gpd.GeoDataFrame) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
-    """Split polygons of one layer: those that lie in the largest are its obstacles."""
-    largest = int(np.argmax(frame.area.to_numpy()))
-    outer = shapely.Polygon(frame.geometry.iloc[largest].exterior)
-    inside = np.asarray(shapely.covered_by(frame.geometry.to_numpy(), outer))
-    inside[largest] = False
-    return frame[~inside], frame[inside]
-
-
-def _repaired(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
-    polygons = frame.geom_type == "Polygon"
-    bad = polygons & ~frame.geometry.is_valid
-    if not bad.any():
-        return frame
-    warnings.warn(
-        f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired; look at them.",
-        FormatWarning,
-        stacklevel=4,
-    )
-    mended = frame.copy()
-    mended.loc[bad, mended.geometry.name] = frame.geometry[bad].make_valid()
-    mended = mended.explode(index_parts=False, ignore_index=True)
-    return mended[mended.geom_type.isin(["Polygon", "Point"])]
-
-
-def _concat(frames: list[Any]) -> Any:
-    full = [frame for frame in frames if len(frame)]
-    return pd.concat(full, ignore_index=True) if full else None

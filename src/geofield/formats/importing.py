@@ -12,6 +12,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
+from geofield.formats.foreign_tables import obstacle_table
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
@@ -60,7 +61,7 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
     ----------
     datasets : sequence of Dataset
         Of the same field; obstacles of all are put together and numbered again when their
-        numbers clash.
+        numbers clash. An outline that lies in another one is an obstacle.
     name : str, optional
         The field's name.
 
@@ -71,17 +72,19 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
     """
     import pandas as pd
 
+    if len(datasets) == 1 and name is None:
+        return datasets[0]
     first = datasets[0]
+    notes = [note for dataset in datasets for note in dataset.notes]
     tables: dict[str, Any] = {}
-    for dataset in datasets:
+    for dataset in _with_inner_fields_as_obstacles(datasets, first.crs, notes):
         for layer, table in dataset.tables.items():
             if not len(table):
                 continue
-            moved = table if dataset.crs == first.crs else table.to_crs(first.crs)
             if layer not in tables:
-                tables[layer] = moved
+                tables[layer] = table
             elif layer == schema.OBSTACLES.name:
-                tables[layer] = pd.concat([tables[layer], moved], ignore_index=True)
+                tables[layer] = pd.concat([tables[layer], table], ignore_index=True)
                 if tables[layer]["obstacle_no"].duplicated().any():
                     tables[layer]["obstacle_no"] = pd.array(range(1, len(tables[layer]) + 1))
             else:
@@ -89,10 +92,46 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
                     f"Two of the files have a layer {layer!r}.", hint="Import one of them."
                 )
     named = next((each for each in datasets if each.has(schema.FIELD.name)), first)
-    if schema.FIELD.name in tables and name is not None:
-        tables[schema.FIELD.name] = tables[schema.FIELD.name].assign(name=name)
-    if len(datasets) == 1 and name is None:
-        return first
+    if schema.FIELD.name in tables:
+        row = tables[schema.FIELD.name]
+        name = name or str(row["name"].iloc[0] if row["name"].notna().iloc[0] else named.name)
+        tables[schema.FIELD.name] = row.assign(name=name)
     return replace(
-        named, tables=tables, crs=first.crs, name=name or named.name, points=first.points
+        named,
+        tables=tables,
+        crs=first.crs,
+        name=name or named.name,
+        points=first.points,
+        notes=tuple(notes),
     )
+
+
+def _with_inner_fields_as_obstacles(
+    datasets: Sequence[Dataset], crs: CRS, notes: list[str]
+) -> list[Dataset]:
+    """The datasets in one CRS; of outlines that lie in another one, obstacles are made."""
+    import shapely
+
+    moved = [
+        replace(each, crs=crs, tables={k: t.to_crs(crs) for k, t in each.tables.items()})
+        for each in datasets
+    ]
+    fields = [each.table(schema.FIELD.name) for each in moved]
+    outer = [shapely.Polygon(t.geometry.iloc[0].exterior) if len(t) else None for t in fields]
+    for number, shape in enumerate(outer):
+        around = [other for other in outer if other is not None and other is not shape]
+        if shape is None or not any(
+            other.covers(shape) and other.area > shape.area for other in around
+        ):
+            continue
+        dataset = moved[number]
+        rest = {k: t for k, t in dataset.tables.items() if k != schema.FIELD.name}
+        inner = fields[number][["geometry"]]
+        inner = obstacle_table(inner, crs, Path(dataset.name))
+        if schema.OBSTACLES.name in rest:
+            raise FormatError(
+                f"{dataset.name} lies in another of the fields.", hint="Import one of them."
+            )
+        moved[number] = replace(dataset, tables={**rest, schema.OBSTACLES.name: inner})
+        notes.append(f"{dataset.name}: its polygon lies in another one: taken as an obstacle")
+    return moved

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 # What Windows reserves, whatever the suffix: terminals and sticks are read there.
 _RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{d}{n}" for d in ("COM", "LPT") for n in range(1, 10))}
@@ -28,3 +32,11 @@ def safe_name(name: str, *, length: int = 40) -> str:
 def cut_name(name: str, length: int) -> str:
     """A name cut to a number of characters, at its end marked with an ellipsis."""
     return name if len(name) <= length else f"{name[: length - 1]}…"
+
+
+def line_names(segments: gpd.GeoDataFrame) -> list[str]:
+    """``Track 7`` for an unbroken track's first segment, ``Track 7-2`` for its second."""
+    return [
+        f"Track {track}" if segment == 1 else f"Track {track}-{segment}"
+        for track, segment in zip(segments["track_no"], segments["segment_no"], strict=True)
+    ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,8 @@ from geofield.model import Dataset, ImagerySource, Provenance
 VERSION = 1
 #: Names this JSON where a format wants a URI.
 URI = "https://geofield.dev/ns/origin/1"
+#: Stands for an unknown day where a file must have one.
+UNDATED = "1980-01-01"
 
 
 def to_json(dataset: Dataset) -> str:
@@ -133,12 +136,16 @@ def lineage(dataset: Dataset) -> str:
     return "; ".join(word for word in words if word)
 
 
-def timestamp(dataset: Dataset) -> str:
-    """The time stamped on files: the date of the imagery, so that a second run is identical.
-
-    Midnight UTC, ISO 8601; the start of 1970 where nobody knows the date.
-    """
+def imagery_day(dataset: Dataset) -> str | None:
+    """The day of the imagery, ISO 8601; None where nobody knows it."""
     date = (dataset.provenance.source.date or "")[:10]
-    parts = date.split("-")
-    whole = len(parts) == 3 and all(part.isdigit() for part in parts) and len(date) == 10
-    return f"{date if whole else '1970-01-01'}T00:00:00.000Z"
+    return date if re.fullmatch(r"\d{4}-\d{2}-\d{2}", date) else None
+
+
+def timestamp(dataset: Dataset) -> str:
+    """The time stamped where a file must have one, so that a second run is identical.
+
+    Midnight UTC of the imagery's day, ISO 8601. Where nobody knows that day it is the earliest
+    that ZIP archives can say, as the tools of reproducible builds write it.
+    """
+    return f"{imagery_day(dataset) or UNDATED}T00:00:00.000Z"

@@ -1,138 +1,132 @@
-"""Shapefiles as two families of farm terminals want them.
+"""Shapefiles as people and two families of farm terminals want them.
 
-Each profile yields the path (without suffix), the geometry type and the Arrow table of
-every Shapefile. None has been tried on a physical terminal.
+Each profile yields the Shapefiles to write. None has been tried on a physical terminal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
+from geofield import schema
 from geofield.formats.arrow import to_lonlat
-from geofield.formats.avoided import avoided
-from geofield.formats.names import safe_name
+from geofield.formats.avoided import avoided, passed_through
+from geofield.formats.names import line_names, safe_name
+from geofield.formats.shapefile_layer import Column, ShapefileLayer, schema_layer
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    import pyarrow as pa
 
-Shapefiles = Iterator[tuple[PurePosixPath, str, Any]]
+Shapefiles = Iterator[ShapefileLayer]
+_FLAT = Path("shapefile")
+
+#: Layer by file name of the generic profile. Obstacles that tracks run through lie in files
+#: of their own: a terminal takes whatever `obstacles.shp` holds for an obstacle.
+GENERIC = {
+    "boundary": schema.FIELD,
+    "obstacles": schema.OBSTACLES,
+    **{f"obstacles_{status}": schema.OBSTACLES for status in schema.NOT_AVOIDED},
+    "guidance": schema.SEGMENTS,
+}
+
+
+def generic(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
+    """All columns under short names; a file more per status that is not driven around."""
+    field = schema_layer(dataset, _FLAT / "boundary", schema.FIELD, dataset.table("field"))
+    rows = len(field.shapes)
+    # The boundary import of several farm platforms asks for these three.
+    named = {"CLIENT": customer, "FARM": farm, "FIELD": dataset.name}
+    named_columns: dict[str, Column] = {key: ("str", [text] * rows) for key, text in named.items()}
+    columns = {**named_columns, **field.columns}
+    yield ShapefileLayer(field.path, field.geometry, columns, field.shapes)
+    yield schema_layer(dataset, _FLAT / "obstacles", schema.OBSTACLES, avoided(dataset))
+    for status, table in passed_through(dataset).items():
+        yield schema_layer(dataset, _FLAT / f"obstacles_{status}", schema.OBSTACLES, table)
+    yield schema_layer(dataset, _FLAT / "guidance", schema.SEGMENTS, dataset.table("segments"))
 
 
 def tracklead(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
     """TRACK-Leader (Mueller-Elektronik): flat files that begin with the field's name."""
     stem = safe_name(dataset.name)
-    folder = PurePosixPath("shapefile")
-    field, obstacles, segments = _tables(dataset)
-    yield folder / f"{stem}_boundary", "Polygon", _table(dataset, field, {"name": [dataset.name]})
-    yield (
-        folder / f"{stem}_obstacles",
-        "Point",
-        _table(dataset, obstacles, _obstacle_columns(obstacles), centres=True),
-    )
-    yield (
-        folder / f"{stem}_guidancepath",
-        "LineString",
-        _table(dataset, segments, {"name": _line_names(segments)}),
-    )
+    field, segments = dataset.table("field"), dataset.table("segments")
+    names: dict[str, Column] = {"name": ("str", [dataset.name] * len(field))}
+    yield _layer(dataset, _FLAT / f"{stem}_boundary", "Polygon", field, names)
+    obstacles = avoided(dataset)
+    columns = _obstacle_columns(obstacles)
+    yield _layer(dataset, _FLAT / f"{stem}_obstacles", "Point", obstacles, columns)
+    columns = {"name": ("str", line_names(segments))}
+    yield _layer(dataset, _FLAT / f"{stem}_guidancepath", "LineString", segments, columns)
     if dataset.has("headland"):
-        headland = dataset.table("headland")
-        yield (
-            folder / f"{stem}_headland",
-            "Polygon",
-            _table(dataset, headland.explode(ignore_index=True), {}),
-        )
+        parts = dataset.table("headland").explode(ignore_index=True)
+        columns = {"id": ("int", range(1, len(parts) + 1))}
+        yield _layer(dataset, _FLAT / f"{stem}_headland", "Polygon", parts, columns)
 
 
 def aggps(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
     """Trimble: ``AgGPS/Data/<Client>/<Farm>/<Field>/`` with boundary, swaths and features."""
-    folder = PurePosixPath(
+    folder = Path(
         "AgGPS",
         "Data",
         safe_name(customer or "Client"),
         safe_name(farm or "Farm"),
         safe_name(dataset.name),
     )
-    field, obstacles, segments = _tables(dataset)
-    yield (
-        folder / "boundary",
-        "Polygon",
-        _table(
-            dataset,
-            field,
-            {"id": np.arange(1, len(field) + 1), "Name": [dataset.name], "Area": field.area},
-        ),
-    )
-    yield (
-        folder / "swaths",
-        "LineString",
-        _table(
-            dataset,
-            segments,
-            # 0 is a straight line, 1 a curve.
-            {
-                "id": (shapely.get_num_points(segments.geometry.to_numpy()) > 2).astype(np.int64),
-                "Name": _line_names(segments),
-                "Length": segments.length,
-            },
-        ),
-    )
-    round_ones = obstacles["radius_m"].notna().to_numpy(dtype=bool)
-    areas, points = obstacles[~round_ones], obstacles[round_ones]
-    yield folder / "AreaFeature", "Polygon", _table(dataset, areas, _obstacle_columns(areas))
-    yield (
-        folder / "PointFeature",
-        "Point",
-        _table(dataset, points, _obstacle_columns(points), centres=True),
-    )
+    field, segments = dataset.table("field"), dataset.table("segments")
+    columns: dict[str, Column] = {
+        "id": ("int", range(1, len(field) + 1)),
+        "Name": ("str", [dataset.name] * len(field)),
+        "Area": ("float", list(field.area)),
+    }
+    yield _layer(dataset, folder / "boundary", "Polygon", field, columns)
+    bends = shapely.get_num_points(np.asarray(segments.geometry.to_numpy(), dtype=object)) > 2
+    columns = {
+        # 0 is a straight line, 1 a curve.
+        "id": ("int", [int(bend) for bend in bends]),
+        "Name": ("str", line_names(segments)),
+        "Length": ("float", list(segments.length)),
+    }
+    yield _layer(dataset, folder / "swaths", "LineString", segments, columns)
+    obstacles = avoided(dataset)
+    is_round = obstacles["radius_m"].notna().to_numpy(dtype=bool)
+    for name, kind, part in (
+        ("AreaFeature", "Polygon", obstacles[~is_round]),
+        ("PointFeature", "Point", obstacles[is_round]),
+    ):
+        yield _layer(dataset, folder / name, kind, part, _obstacle_columns(part))
 
 
-def _tables(
-    dataset: Dataset,
-) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame, gpd.GeoDataFrame]:
-    """Field, obstacles that are to be avoided, and segments."""
-    return dataset.table("field"), avoided(dataset), dataset.table("segments")
-
-
-def _obstacle_columns(obstacles: gpd.GeoDataFrame) -> dict[str, Any]:
+def _obstacle_columns(obstacles: gpd.GeoDataFrame) -> dict[str, Column]:
     return {
-        "id": obstacles["obstacle_no"],
-        "name": [f"Obstacle {number}" for number in obstacles["obstacle_no"]],
-        "radius_m": obstacles["radius_m"],
-        "buffer_m": obstacles["buffer_m"],
+        "id": ("int", list(obstacles["obstacle_no"])),
+        "name": ("str", [f"Obstacle {number}" for number in obstacles["obstacle_no"]]),
+        "radius_m": ("float", list(obstacles["radius_m"])),
+        "buffer_m": ("float", list(obstacles["buffer_m"])),
     }
 
 
-def _line_names(segments: gpd.GeoDataFrame) -> list[str]:
-    return [
-        f"Track {track}" if segment == 1 else f"Track {track}-{segment}"
-        for track, segment in zip(segments["track_no"], segments["segment_no"], strict=True)
-    ]
-
-
-def _table(
-    dataset: Dataset, frame: gpd.GeoDataFrame, columns: dict[str, Any], *, centres: bool = False
-) -> pa.Table:
-    import pyarrow as pa
-
-    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
-    geometry = shapely.centroid(geometry) if centres else geometry
-    if len(geometry):
-        geometry = to_lonlat(geometry, dataset.crs)
-    arrays = {name: pa.array(values, from_pandas=True) for name, values in columns.items()}
-    if not arrays:
-        arrays["id"] = pa.array(np.arange(1, len(frame) + 1))
-    return pa.table({**arrays, "geom": pa.array(shapely.to_wkb(geometry), pa.binary())})
+def _layer(
+    dataset: Dataset,
+    path: Path,
+    geometry: str,
+    frame: gpd.GeoDataFrame,
+    columns: Mapping[str, Column],
+) -> ShapefileLayer:
+    """A Shapefile of a table's geometries, or of their centres where it holds points."""
+    shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    if geometry == "Point":
+        shapes = shapely.centroid(shapes)
+    placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes
+    return ShapefileLayer(path, geometry, columns, placed)
 
 
 #: By the name the user writes.
 PROFILES: dict[str, Callable[[Dataset, str, str], Shapefiles]] = {
+    "generic": generic,
     "tracklead": tracklead,
     "aggps": aggps,
 }

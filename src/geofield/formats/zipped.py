@@ -1,18 +1,46 @@
-"""Reading out of ZIP archives, as Shapefiles and task data are passed on."""
+"""ZIP archives, as Shapefiles and task data are passed on."""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from geofield.errors import FormatError
 
+#: ZIP knows no time before this.
+_ZERO = (1980, 1, 1)
 #: More than this is no archive of one field, bytes.
 MAX_BYTES = 4 * 2**30
+
+
+def archived(
+    files: Iterable[Path], path: Path, *, day: str | None, below: Path | None = None
+) -> Path:
+    """Move files into an archive; byte-identical for the same files.
+
+    Parameters
+    ----------
+    files : iterable of Path
+    path : Path
+        The archive.
+    day : str or None
+        ISO 8601; stamped on each entry.
+    below : Path, optional
+        Entries keep their folders below this one; without it they lie flat.
+    """
+    date = max(tuple(map(int, day.split("-"))), _ZERO) if day else _ZERO
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            name = file.name if below is None else file.relative_to(below).as_posix()
+            info = zipfile.ZipInfo(name, (date[0], date[1], date[2], 0, 0, 0))
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, file.read_bytes())
+            file.unlink()
+    return path
 
 
 @contextmanager

@@ -64,6 +64,8 @@ class Dataset:
         The picture's file beside the products, for projects that show it.
     points : callable or None
         Yields the track points in chunks, for products that stream them.
+    notes : tuple of str
+        What a reader took as what in another program's file, for people.
     """
 
     tables: Mapping[str, gpd.GeoDataFrame]
@@ -73,6 +75,7 @@ class Dataset:
     grid: Grid | None = None
     scene_path: Path | None = None
     points: Callable[[], Iterator[gpd.GeoDataFrame]] | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, table in self.tables.items():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -31,12 +31,9 @@ from geofield.formats.isoxml.codes import (
     PointType,
     PolygonType,
 )
-from geofield.formats.names import cut_name
+from geofield.formats.names import cut_name, line_names
 from geofield.formats.xml import write_xml
 from geofield.model import Dataset
-
-if TYPE_CHECKING:
-    import geopandas as gpd
 
 _GEOD = Geod(ellps="WGS84")
 
@@ -158,7 +155,7 @@ def _add_guidance_groups(part: ET.Element, dataset: Dataset) -> None:
         return
     placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
     explicit = {"E": REPEAT_NONE, "F": EXTEND_NONE}
-    for name, lonlat in zip(segment_names(segments), placed, strict=True):
+    for name, lonlat in zip(line_names(segments), placed, strict=True):
         number += 1
         _add_group(part, number, name, lonlat, width_mm, explicit)
 
@@ -206,20 +203,12 @@ def _add_guidance_lines(part: ET.Element, dataset: Dataset) -> None:
         return
     width_mm = _width_mm(dataset)
     placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
-    for name, line in zip(segment_names(segments), placed, strict=True):
+    for name, line in zip(line_names(segments), placed, strict=True):
         element = ET.SubElement(part, "LSG", A=LineType.GUIDANCE, B=cut_name(name, DESIGNATOR))
         if width_mm is not None:
             element.set("C", str(width_mm))
         for lon, lat in line.coords:
             _add_point(element, PointType.OTHER, lon, lat)
-
-
-def segment_names(segments: gpd.GeoDataFrame) -> list[str]:
-    """``Track 7`` for an unbroken track's first segment, ``Track 7-2`` for its second."""
-    return [
-        f"Track {track}" if segment == 1 else f"Track {track}-{segment}"
-        for track, segment in zip(segments["track_no"], segments["segment_no"], strict=True)
-    ]
 
 
 def _add_point(

@@ -1,0 +1,199 @@
+"""One Shapefile: what it holds, whether it fits, and writing it.
+
+A Shapefile cuts names at ten characters, text at 254 bytes and files at 2 GB, mostly in
+silence. Everything that would be cut is an error here, before anything is written. fiona
+writes them: each column has the type and width that its schema says, whether or not there
+is a row to guess them from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import shapely
+from shapely.geometry import mapping
+
+from geofield import schema
+from geofield.crs import LONLAT
+from geofield.errors import FormatError
+from geofield.formats.arrow import disk_hint, exact_geometry, to_lonlat
+from geofield.model import Dataset
+
+TEXT_BYTES = 254
+NAME_CHARACTERS = 10
+FILE_BYTES = 2**31 - 1
+#: Text columns have at least so many bytes, and terminals some room to write.
+_TEXT_WIDTH = 80
+#: Width of the other columns as GDAL itself declares them; a day has eight digits.
+_TYPES = {"int": "int:18", "float": "float:24.15", "date": "date"}
+_WIDTHS = {"int": 18, "float": 24, "date": 8}
+
+_SENTENCES = {"doubts"}
+
+Column = tuple[schema.ColumnType, Sequence[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class ShapefileLayer:
+    """One Shapefile to write.
+
+    Attributes
+    ----------
+    path : Path
+        Relative to the output folder, without suffix.
+    geometry : str
+        The one type of all shapes.
+    columns : mapping
+        Type and values by name.
+    shapes : array of geometries
+        In WGS 84.
+    """
+
+    path: Path
+    geometry: str
+    columns: Mapping[str, Column]
+    shapes: Any
+
+
+def short_names(of: schema.Layer) -> dict[str, str]:
+    """The names of a layer's columns in a Shapefile."""
+    return {column.name: column.shapefile for column in of.columns}
+
+
+def schema_layer(dataset: Dataset, path: Path, of: schema.Layer, table: Any) -> ShapefileLayer:
+    """A table of the schema as a Shapefile with all its columns.
+
+    Only sentences of our own are cut to what fits: names and ids are refused instead.
+    """
+    shapes = exact_geometry(of, table)
+    table = table.assign(
+        **{
+            name: [text if pd.isna(text) else _cut(str(text)) for text in table[name]]
+            for name in _SENTENCES & set(table.columns)
+        }
+    )
+    return ShapefileLayer(
+        path,
+        of.geometry,
+        {column.shapefile: (column.type, list(table[column.name])) for column in of.columns},
+        to_lonlat(shapes, dataset.crs) if len(shapes) else shapes,
+    )
+
+
+def _cut(text: str) -> str:
+    """The beginning of a text, with an ellipsis, where it has too many bytes."""
+    if len(text.encode()) <= TEXT_BYTES:
+        return text
+    return text.encode()[: TEXT_BYTES - 3].decode(errors="ignore") + "…"
+
+
+def check_limits(layer: ShapefileLayer) -> None:
+    """Refuse what a Shapefile would cut.
+
+    Raises
+    ------
+    FormatError
+        For names, text or files that are too long.
+    """
+    name = layer.path.name
+    seen: set[str] = set()
+    record = 1
+    for column, (kind, values) in layer.columns.items():
+        if len(column.encode()) > NAME_CHARACTERS or column.lower() in seen:
+            raise FormatError(f"Shapefile {name}: the column name {column!r} is too long or twice.")
+        seen.add(column.lower())
+        longest = _longest(values) if kind == "str" else ""
+        if len(longest.encode()) > TEXT_BYTES:
+            raise FormatError(
+                f"Shapefile {name}: a text in column {column!r} has {len(longest.encode())} "
+                f"bytes, {TEXT_BYTES} fit: {longest[:40]!r}...",
+                hint="Shorten it, or use GeoPackage.",
+            )
+        record += _WIDTHS.get(kind, max(_TEXT_WIDTH, len(longest.encode())))
+    points = int(shapely.get_num_coordinates(layer.shapes).sum()) if len(layer.shapes) else 0
+    count = len(layer.shapes)
+    size = max(100 + 64 * count + 16 * points, 1000 + record * count)
+    if size > FILE_BYTES:
+        raise FormatError(
+            f"Shapefile {name} would need {size / 2**30:.1f} GB; 2 GB fit.",
+            hint="Use GeoPackage or FlatGeobuf.",
+        )
+
+
+def _longest(values: Sequence[Any]) -> str:
+    texts = (str(value) for value in values if not pd.isna(value))
+    return max(texts, key=lambda text: len(text.encode()), default="")
+
+
+def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list[Path]:
+    """Write one Shapefile with all its parts.
+
+    Parameters
+    ----------
+    layer : ShapefileLayer
+    place : Path
+        Without suffix.
+    day : str or None
+        ISO 8601; of the last change.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    FormatError
+        When GDAL refuses.
+    """
+    import fiona
+    from fiona.errors import FionaError
+
+    place.parent.mkdir(parents=True, exist_ok=True)
+    types = {
+        name: _TYPES.get(kind) or f"str:{max(_TEXT_WIDTH, len(_longest(values).encode()))}"
+        for name, (kind, values) in layer.columns.items()
+    }
+    rows = zip(
+        *(_plain(kind, values) for kind, values in layer.columns.values()),
+        strict=True,
+    )
+    file = place.with_name(place.name + ".shp")
+    try:
+        with fiona.open(
+            file,
+            "w",
+            driver="ESRI Shapefile",
+            crs=LONLAT.to_wkt("WKT1_GDAL"),
+            schema={"geometry": layer.geometry, "properties": types},
+            encoding="UTF-8",
+            DBF_DATE_LAST_UPDATE=day or "1970-01-01",
+        ) as target:
+            target.writerecords(
+                {"geometry": mapping(shape), "properties": dict(zip(types, row, strict=True))}
+                for shape, row in zip(layer.shapes, rows, strict=True)
+            )
+    except (FionaError, RuntimeError, ValueError) as error:
+        raise FormatError(
+            f"{file.name} could not be written: {error}.", hint=disk_hint(file)
+        ) from error
+    if day is None:
+        _leave_undated(file.with_suffix(".dbf"))
+    return [place.with_name(place.name + end) for end in (".shp", ".shx", ".dbf", ".prj", ".cpg")]
+
+
+def _plain(kind: schema.ColumnType, values: Sequence[Any]) -> list[Any]:
+    """Values as fiona takes them; missing ones (NaN included) as None."""
+    make = {"int": int, "float": float}.get(kind, lambda value: str(value)[:10])
+    make = str if kind == "str" else make
+    return [None if pd.isna(value) else make(value) for value in values]
+
+
+def _leave_undated(table: Path) -> None:
+    """Leave the day of the last change empty in a dBase file."""
+    with table.open("r+b") as file:
+        file.seek(1)
+        file.write(b"\0\0\0")

@@ -1,0 +1,220 @@
+"""What other programs' layers are: the field's outline, obstacles, guidance lines.
+
+Points are obstacles and lines are guidance. Of polygons, one that is alone is the field;
+among several, whole words of the layer's name and its columns say whether they are outlines
+or obstacles, and where they are silent, the largest is the field and what lies in it
+obstacles. Nothing is left out or taken without a word.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import shapely
+from pyproj import CRS
+
+from geofield.errors import FormatWarning
+from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+
+def _words(text: str) -> frozenset[str]:
+    """The whole words of a text, lower case; ``AreaFeature`` is two, and one."""
+    parted = re.sub(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])", " ", text)
+    return frozenset(re.findall(r"[^\W_]+", f"{parted} {text}".lower()))
+
+
+_OBSTACLE_WORDS = _words(
+    """obstacle obstacles obstruction obstructions hindernis hindernisse tree trees baum baeume
+    bäume arbre arbres exclusion exclusions hole holes interior inner flag flags pond ponds
+    building buildings areafeature pointfeature"""
+)
+_FIELD_WORDS = _words(
+    """field fields boundary boundaries outline outlines border perimeter parcel parcels parzelle
+    parzellen schlag feld felder acker farm grenze grenzen exterior outer"""
+)
+#: What is no guidance and no outline where the file has others: words by geometry.
+_ASIDE_WORDS = {
+    "Polygon": _words("headland headlands vorgewende"),
+    "LineString": _words("turn turns route routes gap gaps headland headlands vorgewende"),
+}
+_OBSTACLE_COLUMNS = frozenset(["obstacle_no", "obst_no", "radius_m", "buffer_m"])
+_FIELD_COLUMNS = frozenset(["field_id", "area_ha", "client", "farm", "field", "crop", "crop_name"])
+
+
+@dataclass(frozen=True, slots=True)
+class RawLayer:
+    """A table as a file has it: any columns, any CRS, geometries that may be mixed."""
+
+    name: str
+    frame: gpd.GeoDataFrame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """The geometries of one kind in a layer."""
+
+    layer: str
+    kind: str
+    frame: Any
+
+    @property
+    def aside(self) -> bool:
+        """Whether its name says that it is neither outline nor guidance."""
+        return bool(_words(self.layer) & _ASIDE_WORDS.get(self.kind, frozenset()))
+
+    @property
+    def role(self) -> str:
+        """Of polygons, by name, else by columns; empty where neither says or both do."""
+        columns = {str(name).lower() for name in self.frame.columns}
+        for obstacle, field in (
+            (_words(self.layer) & _OBSTACLE_WORDS, _words(self.layer) & _FIELD_WORDS),
+            (columns & _OBSTACLE_COLUMNS, columns & _FIELD_COLUMNS),
+        ):
+            if bool(obstacle) != bool(field):
+                return "obstacles" if obstacle else "field"
+        return ""
+
+    def told(self, count: int, what: str) -> str:
+        """A line for people."""
+        thing = {"Polygon": "polygon", "LineString": "line", "Point": "point"}[self.kind]
+        return f"{self.layer}: {count} {thing}{'' if count == 1 else 's'} {what}"
+
+
+def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path) -> list[str]:
+    """Give every foreign geometry its place.
+
+    Parameters
+    ----------
+    layers : list of RawLayer
+        In the metric CRS.
+    tables : dict
+        The layers found already, by name; what is found here is added.
+    metric : CRS
+    path : Path
+        For messages and names.
+
+    Returns
+    -------
+    list of str
+        What was taken as what, and what was left out, for people.
+    """
+    parts = [part for layer in layers for part in _parts(layer)]
+    notes: list[str] = []
+    polygons = _without_asides([part for part in parts if part.kind == "Polygon"], tables, notes)
+    outlines, inside = _outlines(polygons, tables, notes)
+    points = [part for part in parts if part.kind == "Point"]
+    notes += [part.told(len(part.frame), "taken as obstacles") for part in points]
+    if outlines:
+        tables["field"] = field_table(_repaired(_joined(outlines), path), metric, path)
+    standing = [*(part.frame for part in points), *inside]
+    if standing and "obstacles" not in tables:
+        tables["obstacles"] = obstacle_table(_repaired(_joined(standing), path), metric, path)
+    lines = _without_asides([part for part in parts if part.kind == "LineString"], tables, notes)
+    if lines and "tracks" not in tables:
+        notes += [part.told(len(part.frame), "taken as guidance") for part in lines]
+        drawn = _joined([part.frame for part in lines])
+        tables["tracks"], tables["segments"] = line_tables(drawn, metric)
+    elif "segments" in tables and "tracks" not in tables:
+        tables["tracks"], tables["segments"] = line_tables(tables["segments"], metric)
+    return notes
+
+
+def _parts(layer: RawLayer) -> list[_Part]:
+    frame = layer.frame.explode(index_parts=False, ignore_index=True)
+    kinds = frame.geom_type.replace("LinearRing", "LineString")
+    return [
+        _Part(layer.name, kind, frame[kinds == kind])
+        for kind in ("Polygon", "LineString", "Point")
+        if (kinds == kind).any()
+    ]
+
+
+def _without_asides(parts: list[_Part], tables: dict[str, Any], notes: list[str]) -> list[_Part]:
+    """The parts without headlands, turns and the like, where others are there."""
+    there = {"Polygon": "field", "LineString": "tracks"}
+    rest = [part for part in parts if not part.aside]
+    if not rest and not any(there[part.kind] in tables for part in parts):
+        return parts
+    for part in parts:
+        if part.aside:
+            notes.append(part.told(len(part.frame), "left out, by the layer's name"))
+    return rest
+
+
+def _outlines(
+    parts: list[_Part], tables: dict[str, Any], notes: list[str]
+) -> tuple[list[Any], list[Any]]:
+    """Frames of outlines, and frames of polygons that are obstacles."""
+    if not parts:
+        return [], []
+    if "field" in tables:
+        notes += [part.told(len(part.frame), "taken as obstacles") for part in parts]
+        return [], [part.frame for part in parts]
+    if sum(len(part.frame) for part in parts) == 1:
+        notes.append(parts[0].told(1, "taken as the field, being the only one"))
+        return [parts[0].frame], []
+    candidates = [part for part in parts if part.role == "field"]
+    candidates = candidates or [part for part in parts if part.role != "obstacles"]
+    if not candidates:
+        notes += [part.told(len(part.frame), "taken as obstacles, by name") for part in parts]
+        return [], [part.frame for part in parts]
+    # A word is no more than a word: what all of them lie in is the field.
+    largest = max(parts, key=lambda part: float(part.frame.area.max()))
+    if largest not in candidates and _covers(largest, candidates):
+        candidates = [largest, *candidates]
+    whole = _joined([part.frame.assign(_part=number) for number, part in enumerate(candidates)])
+    inside = _inside_largest(whole)
+    outer, inner = whole[~inside], whole[inside]
+    obstacles = [part for part in parts if part not in candidates]
+    for rows, what in ((outer, "taken as the field"), (inner, "inside it taken as obstacles")):
+        for number, count in sorted(Counter(rows["_part"]).items()):
+            notes.append(candidates[number].told(count, what))
+    notes += [part.told(len(part.frame), "taken as obstacles") for part in obstacles]
+    frames = [inner.drop(columns="_part")] if len(inner) else []
+    return [outer.drop(columns="_part")], frames + [part.frame for part in obstacles]
+
+
+def _covers(part: _Part, others: list[_Part]) -> bool:
+    """Whether the largest polygon of a part covers all of the others."""
+    shape = part.frame.geometry.iloc[int(np.argmax(part.frame.area.to_numpy()))]
+    outer = shapely.Polygon(shape.exterior)
+    return all(other.frame.geometry.covered_by(outer).all() for other in others)
+
+
+def _inside_largest(frame: gpd.GeoDataFrame) -> Any:
+    """Which polygons lie in the largest, whatever holes that has."""
+    largest = int(np.argmax(frame.area.to_numpy()))
+    outer = shapely.Polygon(frame.geometry.iloc[largest].exterior)
+    inside = np.asarray(shapely.covered_by(frame.geometry.to_numpy(), outer))
+    inside[largest] = False
+    return inside
+
+
+def _repaired(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
+    polygons = frame.geom_type == "Polygon"
+    bad = polygons & ~frame.geometry.is_valid
+    if not bad.any():
+        return frame
+    warnings.warn(
+        f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired; look at them.",
+        FormatWarning,
+        stacklevel=5,
+    )
+    mended = frame.copy()
+    mended.loc[bad, mended.geometry.name] = frame.geometry[bad].make_valid()
+    mended = mended.explode(index_parts=False, ignore_index=True)
+    return mended[mended.geom_type.isin(["Polygon", "Point"])]
+
+
+def _joined(frames: list[Any]) -> Any:
+    return pd.concat(frames, ignore_index=True)

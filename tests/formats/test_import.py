@@ -1,0 +1,154 @@
+"""`geofield import`: what other people's layers are taken as, and that it is always said."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import geopandas as gpd
+import pytest
+import shapely
+
+from geofield.formats import read_dataset
+
+BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
+POND = shapely.box(500_050, 5_500_020, 500_070, 5_500_040)
+TREES = [shapely.Point(500_100 + 9 * i, 5_500_050).buffer(3) for i in range(3)]
+LINES = [shapely.LineString([(500_000, 5_500_000 + y), (500_200, 5_500_000 + y)]) for y in (4, 8)]
+
+
+def write(path, shapes, **columns):
+    gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:32633").to_file(path)
+    return path
+
+
+def geofield(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "geofield", *map(str, arguments)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def imported(folder, *files):
+    done = geofield("import", *files, "-o", folder / "plan.gpkg", "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout), done.stderr, read_dataset(folder / "plan.gpkg")
+
+
+@pytest.mark.parametrize("name", [
+    "whole_farm", "Baumgarten", "street_12", "Singapore", "Turner_farm", "Route66", "headland",
+    "tree", "interior", "gaps",
+])  # fmt: skip
+def test_a_lone_polygon_is_the_field_whatever_its_name(tmp_path, name):
+    found, said, back = imported(tmp_path, write(tmp_path / f"{name}.shp", [BOX]))
+    assert found["rows"] == {"field": 1}
+    assert f"{name}: 1 polygon taken as the field" in said
+    assert back.table("field").geometry.iloc[0].symmetric_difference(BOX).area < 0.1
+
+
+@pytest.mark.parametrize("name", ["Singapore", "Turner", "Route66", "turns", "gaps"])
+def test_lines_never_vanish(tmp_path, name):
+    found, said, _ = imported(tmp_path, write(tmp_path / f"{name}.shp", LINES))
+    assert found["rows"] == {"tracks": 2, "segments": 2}
+    assert f"{name}: 2 lines taken as guidance" in said
+
+
+@pytest.mark.parametrize(("trees", "field"), [
+    ("obstacles", "a"), ("AreaFeature", "b"), ("old trees", "boundary"), ("x", "Feldgrenze"),
+    ("z_border_stones", "Baumgarten"), ("a", "tree_nursery"),
+])  # fmt: skip
+def test_words_columns_and_place_tell_obstacles_from_fields(tmp_path, trees, field):
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    write(folder / f"{trees}.shp", [POND, *TREES])
+    write(folder / f"{field}.shp", [BOX])
+    found, said, back = imported(tmp_path, folder)
+    assert found["rows"] == {"field": 1, "obstacles": 4}
+    assert back.table("field").area.iloc[0] == pytest.approx(20_000)
+    assert f"{trees}: 4 polygons" in said
+    assert f"{field}: 1 polygon taken as the field" in said
+
+
+def test_one_tree_in_a_file_of_its_own(tmp_path):
+    tree = write(tmp_path / "pappel.shp", [POND])
+    found, said, _ = imported(tmp_path, tree, write(tmp_path / "Schlag 7.shp", [BOX]))
+    assert found["rows"] == {"field": 1, "obstacles": 1}
+    assert found["name"] == "Schlag 7"
+    assert "pappel: its polygon lies in another one: taken as an obstacle" in said
+
+
+def test_columns_tell_circles_of_a_person(tmp_path):
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    write(folder / "schicht1.shp", TREES, radius_m=[2.5] * 3)
+    found, _, _ = imported(tmp_path, folder)
+    assert found["rows"] == {"obstacles": 3}
+
+
+def test_what_is_left_out_is_said(tmp_path):
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    write(folder / "boundary.shp", [BOX])
+    write(folder / "headland.shp", [BOX.difference(BOX.buffer(-8))])
+    write(folder / "ab.shp", LINES)
+    write(folder / "turns.shp", LINES)
+    found, said, _ = imported(tmp_path, folder)
+    assert found["rows"] == {"field": 1, "tracks": 2, "segments": 2}
+    assert "headland: 1 polygon left out" in said
+    assert "turns: 2 lines left out" in said
+    assert found["taken"] == [line for line in said.splitlines() if ": " in line]
+
+
+def test_nothing_found_is_an_error(tmp_path):
+    empty = tmp_path / "empty.geojson"
+    empty.write_text('{"type": "FeatureCollection", "features": []}')
+    nowhere = tmp_path / "nowhere.geojson"
+    nowhere.write_text(
+        '{"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, '
+        '"geometry": null}]}'
+    )
+    for file in (empty, nowhere):
+        done = geofield("import", file, "-o", tmp_path / "plan.gpkg")
+        assert done.returncode == 1
+        assert "holds no geometries" in done.stderr
+    assert not (tmp_path / "plan.gpkg").exists()
+
+
+OPEN_RING = "15.0,50.0,0 15.002,50.0,0 15.002,50.001,0 15.0,50.001,0"
+OPEN_FILES = {
+    "open.kml": f"""<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Placemark><name>Acker</name><Polygon>
+<outerBoundaryIs><LinearRing><coordinates>{OPEN_RING}</coordinates></LinearRing>
+</outerBoundaryIs></Polygon></Placemark></Document></kml>""",
+    "open.geojson": """{"type": "Feature", "properties": {"name": "Acker"}, "geometry": {"type":
+"Polygon", "coordinates": [[[15, 50], [15.002, 50], [15.002, 50.001], [15, 50.001]]]}}""",
+}
+
+
+@pytest.mark.parametrize("name", list(OPEN_FILES))
+def test_rings_that_are_not_closed_are_closed_and_that_is_said(tmp_path, name):
+    (tmp_path / name).write_text(OPEN_FILES[name], encoding="utf-8")
+    found, said, back = imported(tmp_path, tmp_path / name)
+    assert "1 with rings that were not closed" in said
+    assert found["name"] == "Acker"
+    ring = back.table("field").to_crs(4326).geometry.iloc[0]
+    assert shapely.equals_exact(
+        shapely.normalize(ring), shapely.normalize(shapely.box(15, 50, 15.002, 50.001)), 1e-9
+    )
+    for command in ("tracks", "info", "validate"):
+        extra = ["--spacing", "4", "-o", tmp_path / "t.gpkg"] if command == "tracks" else []
+        done = geofield(command, tmp_path / name, *extra)
+        assert "Traceback" not in done.stderr
+
+
+def test_rings_of_two_points_are_left_out_and_that_is_said(tmp_path):
+    ring = json.loads(OPEN_FILES["open.geojson"])
+    line = json.loads(OPEN_FILES["open.geojson"])
+    line["geometry"]["coordinates"] = [[[15, 50], [15.002, 50]]]
+    (tmp_path / "two.geojson").write_text(
+        json.dumps({"type": "FeatureCollection", "features": [line, ring]})
+    )
+    found, said, _ = imported(tmp_path, tmp_path / "two.geojson")
+    assert found["rows"] == {"field": 1}
+    assert "1 without a shape that can be" in said
