@@ -155,7 +155,7 @@ def _refuse(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
                 f"{place} is there already.",
                 hint="Write to another folder, or allow overwriting (--overwrite).",
             )
-        _refuse_locked(place)
+        refuse_locked(place)
 
 
 def _keep(place: Path, kept: Path) -> None:
@@ -166,7 +166,7 @@ def _keep(place: Path, kept: Path) -> None:
         shutil.copy2(place, kept)
 
 
-def _refuse_locked(place: Path) -> None:
+def refuse_locked(place: Path) -> None:
     """Refuse to replace a read-only file, or a GeoPackage that another program has open.
 
     QGIS keeps a GeoPackage in WAL mode while it is open. Leaving that mode needs to be

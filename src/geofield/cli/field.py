@@ -126,9 +126,9 @@ def _extract(
     parcel: Field | None,
     as_json: bool,
 ) -> None:
-    from geofield.cli.plan_files import save_plan
     from geofield.pipeline import run_field
     from geofield.plan import read_plan
+    from geofield.plan_files import save_plan
 
     previous = read_plan(output) if output.is_file() and not fresh else None
     if output.is_file() and not overwrite:

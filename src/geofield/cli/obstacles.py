@@ -48,9 +48,9 @@ def obstacles(
     rejected or drew in FIELD.gpkg stay as they are; the tracks are removed, for they no
     longer fit: run `geofield tracks` next.
     """
-    from geofield.cli.plan_files import save_plan
     from geofield.pipeline import run_obstacles, scene_of_plan
     from geofield.plan import read_plan
+    from geofield.plan_files import save_plan
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))

@@ -58,10 +58,10 @@ def tracks(
     all that a person changed; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...),
     each of which is a field.
     """
-    from geofield.cli.plan_files import save_plan
     from geofield.cli.polygon_files import obstacles_of, plans_of, with_obstacles
     from geofield.errors import GeofieldError, TrackError
     from geofield.pipeline import run_tracks
+    from geofield.plan_files import save_plan
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))

@@ -1,0 +1,280 @@
+"""Edits: each a pure function from a plan and plain JSON values to the plan after it.
+
+A command is a mapping with ``do``, the name of one of :data:`COMMANDS`, and its values. Places
+are x, y in the plan's metric CRS. Tracks are not planned here: a session does that once per
+edit, whatever the edit was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import Geod
+from shapely import Polygon
+
+from geofield import schema
+from geofield.crs import LONLAT, transformer
+from geofield.errors import GeofieldError, SettingsError
+from geofield.model.obstacles import circle_polygons, from_polygons, next_number
+from geofield.model.review import complete_review
+from geofield.settings import Settings, TrackSettings
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from geofield.plan import Plan
+
+Command = Mapping[str, Any]
+
+
+class EditError(GeofieldError):
+    """An edit that cannot be made; the plan stays as it is."""
+
+
+def apply_command(plan: Plan, command: Command) -> Plan:
+    """The plan after an edit; its tracks are those of before, to be planned again.
+
+    Parameters
+    ----------
+    plan : Plan
+    command : mapping
+        ``do`` and the values of that edit.
+
+    Raises
+    ------
+    EditError
+        For an unknown edit, an obstacle that is not there, a value that is no number, or a
+        shape that crosses itself or lies outside the picture.
+    """
+    name = command.get("do")
+    if name not in COMMANDS:
+        raise EditError(f"There is no edit {name!r}.", hint=f"Edits: {', '.join(COMMANDS)}.")
+    try:
+        return COMMANDS[name](plan, command)
+    except KeyError as error:
+        raise EditError(f"The edit {name!r} needs a value {error}.") from None
+
+
+def set_status(plan: Plan, command: Command) -> Plan:
+    """Confirm or reject an obstacle, or take that back: ``no``, ``status``."""
+    status = command["status"]
+    if status not in schema.STATUSES:
+        raise EditError(
+            f"There is no status {status!r}.", hint=f"Statuses: {', '.join(schema.STATUSES)}."
+        )
+    return _with_row(plan, command, {"status": status})
+
+
+def add_circle(plan: Plan, command: Command) -> Plan:
+    """A round obstacle that nobody had found: ``x``, ``y``, ``radius_m``."""
+    x, y, radius_m = _number(command, "x"), _number(command, "y"), _radius(command)
+    return _added(plan, shapely.Point(x, y).buffer(radius_m), x, y, radius_m=radius_m)
+
+
+def add_polygon(plan: Plan, command: Command) -> Plan:
+    """An obstacle of any shape: ``ring``, a list of x, y."""
+    shape = _polygon([command["ring"]], "obstacle")
+    centre = shape.centroid
+    return _added(plan, shape, centre.x, centre.y, radius_m=None)
+
+
+def move(plan: Plan, command: Command) -> Plan:
+    """Shift an obstacle: ``no``, ``dx_m``, ``dy_m``."""
+    row = _row(plan, command)
+    dx, dy = _number(command, "dx_m"), _number(command, "dy_m")
+    shape = shapely.transform(row.geometry, lambda xy: xy + np.array([dx, dy]))
+    return _reshaped(plan, command, shape, {})
+
+
+def set_radius(plan: Plan, command: Command) -> Plan:
+    """Another radius of a round obstacle: ``no``, ``radius_m``."""
+    row = _row(plan, command)
+    if not math.isfinite(row["radius_m"]):
+        raise EditError(
+            f"Obstacle {command['no']} is not round.", hint="Draw its shape anew instead."
+        )
+    radius_m, centre = _radius(command), row.geometry.centroid
+    buffer_m = float(np.nan_to_num(row["buffer_m"]))
+    return _reshaped(
+        plan,
+        command,
+        circle_polygons(centre.x, centre.y, radius_m + buffer_m)[0],
+        {"radius_m": radius_m, "radius_px": row["radius_px"] * radius_m / row["radius_m"]},
+    )
+
+
+def reshape(plan: Plan, command: Command) -> Plan:
+    """The shape of an obstacle as a person drew it: ``no``, ``ring``."""
+    shape = _polygon([command["ring"]], "obstacle")
+    return _reshaped(
+        plan,
+        command,
+        shape,
+        {"kind": "other", "radius_m": np.nan, "radius_px": np.nan, "buffer_m": 0.0},
+    )
+
+
+def delete(plan: Plan, command: Command) -> Plan:
+    """Take an obstacle away: what a person drew is gone, what was found becomes rejected."""
+    row = _row(plan, command)
+    if row["status"] != "added":
+        # A row that was only dropped would be found again by the next run.
+        return _with_row(plan, command, {"status": "rejected"})
+    obstacles = plan.obstacles
+    assert obstacles is not None  # noqa: S101 - a row was found in it
+    left = obstacles[obstacles["obstacle_no"] != command["no"]].reset_index(drop=True)
+    return replace(plan, obstacles=left)
+
+
+def set_outline(plan: Plan, command: Command) -> Plan:
+    """The outline as a person drew it: ``rings``, the outer one first."""
+    return replace(plan, field=replace(plan.field, polygon=_polygon(command["rings"], "outline")))
+
+
+def set_tracks(plan: Plan, command: Command) -> Plan:
+    """Settings of the tracks by their names: ``settings``."""
+    given = dict(command["settings"])
+    unknown = sorted(set(given) - set(TrackSettings.model_fields))
+    if unknown:
+        raise EditError(f"Tracks have no setting {unknown[0]!r}.")
+    settings = plan.settings or Settings()
+    from pydantic import ValidationError
+
+    try:
+        tracks = TrackSettings(**{**settings.tracks.model_dump(), **given})
+    except ValidationError as error:
+        problem = error.errors()[0]
+        name = ".".join(str(part) for part in problem["loc"])
+        raise SettingsError(f"{name}: {problem['msg']}.") from None
+    return replace(plan, settings=settings.model_copy(update={"tracks": tracks}))
+
+
+def set_direction(plan: Plan, command: Command) -> Plan:
+    """Tracks along a line that was dragged: ``a``, ``b``, its ends."""
+    (ax, ay), (bx, by) = _places([command["a"], command["b"]])
+    if math.hypot(bx - ax, by - ay) < 1.0:
+        raise EditError("The line is shorter than a metre: it has no clear direction.")
+    lon, lat = transformer(plan.field.crs, LONLAT).transform([ax, bx], [ay, by])
+    heading, _, _ = Geod(ellps="WGS84").inv(lon[0], lat[0], lon[1], lat[1])
+    direction = f"{heading % 180.0:.4f}"
+    return set_tracks(plan, {"settings": {"direction": direction, "ab_lonlat": None}})
+
+
+#: Edits by the name that a command gives in ``do``.
+COMMANDS: dict[str, Callable[[Plan, Command], Plan]] = {
+    "status": set_status,
+    "circle": add_circle,
+    "polygon": add_polygon,
+    "move": move,
+    "radius": set_radius,
+    "reshape": reshape,
+    "delete": delete,
+    "outline": set_outline,
+    "tracks": set_tracks,
+    "direction": set_direction,
+}
+
+
+def _row(plan: Plan, command: Command) -> Any:
+    if plan.obstacles is not None:
+        rows = plan.obstacles[plan.obstacles["obstacle_no"] == command["no"]]
+        if len(rows):
+            return rows.iloc[0]
+    raise EditError(f"There is no obstacle {command['no']}.")
+
+
+def _with_row(plan: Plan, command: Command, values: Mapping[str, Any]) -> Plan:
+    _row(plan, command)
+    obstacles: gpd.GeoDataFrame = plan.obstacles.copy()  # type: ignore[union-attr]
+    at = obstacles.index[obstacles["obstacle_no"] == command["no"]][0]
+    for name, value in values.items():
+        obstacles.at[at, name] = value
+    return replace(plan, obstacles=obstacles)
+
+
+def _reshaped(plan: Plan, command: Command, shape: Any, values: Mapping[str, Any]) -> Plan:
+    """A shape or place that a person gave says that the thing is there."""
+    _on_the_picture(plan, shape)
+    status = "added" if _row(plan, command)["status"] == "added" else "confirmed"
+    edited = _with_row(plan, command, {**values, "status": status, "geometry": shape})
+    return replace(edited, obstacles=complete_review(edited.obstacles, plan.grid))
+
+
+def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: float | None) -> Plan:
+    import pandas as pd
+
+    _on_the_picture(plan, footprint)
+    settings = plan.settings or Settings()
+    buffer_m = settings.obstacles.buffer_m
+    crs, before = plan.field.crs, plan.obstacles
+    number = 1 if before is None else next_number(before)
+    row = from_polygons(
+        np.array([footprint], dtype=object),
+        crs,
+        buffer_m=buffer_m,
+        grid=plan.grid,
+        status="added",
+        first_no=number,
+    )
+    if radius_m is not None:
+        row["kind"], row["radius_m"] = "tree", radius_m
+        row.geometry = circle_polygons([x], [y], [radius_m + buffer_m])
+        if plan.grid is not None:
+            row["radius_px"] = radius_m / float(plan.grid.metric_scale(row["x_px"], row["y_px"])[0])
+    parts = [part for part in (before, row) if part is not None and len(part)]
+    joined = schema.conform(schema.OBSTACLES, pd.concat(parts), extras=True)
+    return replace(plan, obstacles=joined)
+
+
+def _on_the_picture(plan: Plan, shape: Any) -> None:
+    """Refuse what lies off the picture: nobody can have seen it there."""
+    if plan.grid is None:
+        return
+    centre = shape.centroid
+    x, y = plan.grid.from_crs(centre.x, centre.y, plan.field.crs)
+    if not plan.grid.contains_px(float(x), float(y)):
+        raise EditError("That place lies outside the picture.", hint="Draw on the picture.")
+
+
+def _number(command: Command, name: str) -> float:
+    value = command[name]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise EditError(f"{name} is not a number: {value!r}.")
+    return float(value)
+
+
+def _radius(command: Command) -> float:
+    radius_m = _number(command, "radius_m")
+    if not 0.1 <= radius_m <= 200.0:
+        raise EditError(f"A radius of {radius_m:g} m is outside 0.1 to 200 m.")
+    return radius_m
+
+
+def _places(values: Any) -> list[tuple[float, float]]:
+    try:
+        places = [(float(x), float(y)) for x, y in values]
+    except (TypeError, ValueError):
+        raise EditError("A place is two numbers, x and y.") from None
+    if not np.isfinite(places).all():
+        raise EditError("A place is two numbers, x and y.")
+    return places
+
+
+def _polygon(rings: Any, what: str) -> Polygon:
+    if not isinstance(rings, list) or not rings:
+        raise EditError(f"The {what} has no ring.")
+    places = [_places(ring) for ring in rings]
+    if any(len(set(ring)) < 3 for ring in places):
+        raise EditError(f"The {what} needs at least three corners.")
+    polygon = Polygon(places[0], places[1:])
+    if not polygon.is_valid:
+        raise EditError(
+            f"The {what} crosses itself ({shapely.is_valid_reason(polygon)}).",
+            hint="Move the corner back, or draw the shape anew.",
+        )
+    return shapely.orient_polygons(polygon)

@@ -1,0 +1,229 @@
+"""What the page may ask for: one session on one file, told in plain JSON values.
+
+The desk knows no HTTP. Each method takes and returns JSON values; a :class:`GeofieldError` says
+in words why something was refused, and nothing has changed then.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from geofield.errors import FormatError, GeofieldError
+from geofield.plan import Plan, read_plan
+from geofield.review.commands import Command
+from geofield.review.journal import Journal, fingerprint, play
+from geofield.review.picture import TiledPicture
+from geofield.review.session import Session
+from geofield.review.view import place_table, state_of, tracks_of
+from geofield.staging import refuse_locked
+
+THEME = {
+    "outline": "#ffd54f",
+    "doubt": "#ff8f00",
+    "track": "#ffffff",
+    "gap": "#ff80ab",
+    "headland": "#80deea",
+    "turn": "#b39ddb",
+    "unfit": "#ff1744",
+    "status": {
+        "detected": {"color": "#ff7043", "dash": None},
+        "possible": {"color": "#ffca28", "dash": [2, 6]},
+        "confirmed": {"color": "#66bb6a", "dash": None},
+        "added": {"color": "#42a5f5", "dash": None},
+        "rejected": {"color": "#bdbdbd", "dash": [6, 6]},
+    },
+}
+
+
+class ChangedError(FormatError):
+    """Another program changed the plan's file since it was read."""
+
+
+class Desk:
+    """A plan on the desk.
+
+    Parameters
+    ----------
+    path : Path
+        A GeoPackage of geofield.
+    picture : Path, optional
+        Shown below; the picture that lies beside the plan when not given.
+    """
+
+    def __init__(self, path: Path, picture: Path | None = None) -> None:
+        self.path = path
+        self.lock = threading.RLock()
+        self.holder: str | None = None
+        self._picture_path = picture or picture_beside(path)
+        self._read()
+
+    def _read(self) -> None:
+        self.seen = fingerprint(self.path)
+        plan = read_plan(self.path)
+        self.session = Session(plan)
+        self.journal = Journal(self.path)
+        self.brought_back = self.journal.replay(self.session)
+        self.picture = (
+            None
+            if self._picture_path is None
+            else TiledPicture.open(self._picture_path, plan.field.crs)
+        )
+
+    # -- what the page asks ------------------------------------------------------------------
+
+    def opening(self) -> dict[str, Any]:
+        """The session's state and what does not change: picture, file, places."""
+        with self.lock:
+            plan = self.session.plan
+            bounds = self._bounds(plan)
+            return {
+                **state_of(self.session),
+                "file": self.path.name,
+                "brought_back": self.brought_back,
+                "bounds": bounds,
+                "places": place_table(plan, bounds),
+                "picture": self._picture_facts(),
+                "scale": ground_scale(plan),
+                "theme": THEME,
+                "formats": _formats(),
+            }
+
+    def edit(self, command: Command) -> dict[str, Any]:
+        """Make an edit, undo or redo, and note it in the journal."""
+        with self.lock:
+            before = self.session.step
+            play(self.session, command)
+            if self.session.step is not before:
+                try:
+                    self.journal.write(command)
+                except OSError as error:
+                    raise FormatError(
+                        f"The edit is made, but could not be noted on the disk: {error.strerror}.",
+                        hint="Save to another place before you go on.",
+                    ) from error
+            return state_of(self.session)
+
+    def preview(self, command: Command) -> dict[str, Any]:
+        """The tracks that an edit would lead to."""
+        session = self.session
+        step = session.preview(command)
+        return tracks_of(step.plan, step.notes)
+
+    def save(self, target: str | None = None) -> dict[str, Any]:
+        """Write the plan into its file, or under another name beside it.
+
+        Raises
+        ------
+        ChangedError
+            When another program changed the file since it was read.
+        FormatError
+            When it is locked or cannot be written.
+        """
+        from geofield.plan_files import save_plan
+
+        with self.lock:
+            place = self.path if target is None else self._beside(target)
+            if place == self.path and fingerprint(self.path) != self.seen:
+                raise ChangedError(
+                    f"Another program changed {self.path.name} since it was opened here.",
+                    hint="Reload it (edits made here are kept in a file beside it), or save your "
+                    "edits under another name.",
+                )
+            refuse_locked(self.path)
+            step = self.session.step
+            same = place == self.path
+            save_plan(step.plan, place, read_from=self.path, overwrite=same)
+            if not same:
+                return {**state_of(self.session), "saved_as": place.name}
+            self.journal.clear()
+            self.seen = fingerprint(self.path)
+            self.session.mark_saved(step)
+            return {**state_of(self.session), "saved_as": self.path.name}
+
+    def reload(self) -> dict[str, Any]:
+        """Read the file again; edits that were not saved are kept beside it."""
+        with self.lock:
+            self._read()
+            return self.opening()
+
+    def export(self, name: str) -> dict[str, Any]:
+        """Write the plan as edited in another format, into a folder beside it."""
+        from geofield.formats import write_dataset
+
+        with self.lock:
+            dataset = self.session.plan.to_dataset()
+            folder = self.path.parent / "export"
+            written = write_dataset(
+                dataset, folder, [name], stem=self.path.stem, overwrite=True, inputs=[self.path]
+            )
+        return {"files": [str(path.relative_to(self.path.parent)) for path in written]}
+
+    def take(self, tab: str, *, force: bool = False) -> dict[str, Any]:
+        """Who edits: the first tab, or another that takes over."""
+        with self.lock:
+            if self.holder is None or force:
+                self.holder = tab
+            return {"yours": self.holder == tab}
+
+    def holds(self, tab: str) -> bool:
+        """Whether a tab may edit."""
+        return self.holder == tab
+
+    # -- inner -------------------------------------------------------------------------------
+
+    def _beside(self, name: str) -> Path:
+        """A new file in the plan's folder: the page names no other folder."""
+        if not name or Path(name).name != name or name.startswith("."):
+            raise FormatError(f"{name!r} is no plain file name.")
+        place = self.path.with_name(name if name.endswith(".gpkg") else f"{name}.gpkg")
+        if place.exists():
+            raise FormatError(f"{place.name} is there already.", hint="Choose another name.")
+        return place
+
+    def _bounds(self, plan: Plan) -> tuple[float, float, float, float]:
+        if self.picture is not None:
+            return self.picture.bounds
+        left, bottom, right, top = plan.field.polygon.bounds
+        margin = 0.1 * max(right - left, top - bottom)
+        return left - margin, bottom - margin, right + margin, top + margin
+
+    def _picture_facts(self) -> Mapping[str, Any] | None:
+        picture = self.picture
+        if picture is None:
+            return None
+        source = picture.reader.source
+        return {
+            "resolutions": picture.resolutions_m,
+            "infrared": picture.has_infrared,
+            "credit": " · ".join(
+                text for text in (source.attribution, source.licence, source.date) if text
+            ),
+        }
+
+
+def _formats() -> list[tuple[str, str]]:
+    from geofield.formats import FORMATS
+
+    return [(one.name, one.title) for one in FORMATS.values()]
+
+
+def ground_scale(plan: Plan) -> float:
+    """True metres on the ground per metre of the metric CRS, at the field's middle."""
+    from pyproj import Proj
+
+    middle = plan.field.polygon_lonlat.representative_point()
+    factors = Proj(plan.field.crs).get_factors(middle.x, middle.y)
+    return 1.0 / float(factors.meridional_scale)
+
+
+def picture_beside(path: Path) -> Path | None:
+    """The picture that a run left beside its plan."""
+    from geofield.formats.gpkg_read import scene_beside
+
+    try:
+        return scene_beside(path)
+    except GeofieldError:
+        return None

@@ -1,0 +1,70 @@
+// Speaks to the server: one request at a time for what drags, errors as words.
+
+const tab = crypto.randomUUID ? crypto.randomUUID() : String(Math.random());
+let token = "";
+
+export class Refused extends Error {
+  constructor(status, answer) {
+    super([answer.message, answer.hint].filter(Boolean).join(" "));
+    this.status = status;
+  }
+}
+
+async function ask(path, value) {
+  const options = value === undefined ? {} : {
+    method: "POST",
+    headers: {"Content-Type": "application/json", "X-Geofield-Token": token, "X-Geofield-Tab": tab},
+    body: JSON.stringify(value),
+  };
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw new Refused(0, {message: "gone"});
+  }
+  const answer = await response.json();
+  if (!response.ok) throw new Refused(response.status, answer);
+  return answer;
+}
+
+export async function open() {
+  const state = await ask("/api/state");
+  token = state.token;
+  const {yours} = await ask("/api/take", {});
+  return {...state, yours};
+}
+
+export const takeOver = () => ask("/api/take", {force: true});
+export const edit = command => ask("/api/edit", command);
+export const save = name => ask("/api/save", name ? {name} : {});
+export const reload = () => ask("/api/reload", {});
+export const stop = () => ask("/api/stop", {});
+export const exportAs = format => ask("/api/export", {format});
+
+let flying = false, waiting = null;
+
+// While a person drags, only the newest place counts: one request flies, one waits.
+export function preview(command, show, refused) {
+  waiting = command;
+  if (flying) return;
+  const send = async () => {
+    flying = true;
+    while (waiting) {
+      const next = waiting;
+      waiting = null;
+      try {
+        const answer = await ask("/api/preview", next);
+        if (waiting !== false) show(answer);
+      } catch (error) {
+        refused(error);
+      }
+    }
+    flying = false;
+    waiting = null;
+  };
+  send();
+}
+
+export function endPreview() {
+  waiting = flying ? false : null;
+}

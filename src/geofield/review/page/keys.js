@@ -1,0 +1,54 @@
+// The keys that map editors and labelling tools taught people.
+
+import {t} from "./words.js";
+
+const KEYS = [
+  ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
+  ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")],
+  ["m", "k_move", a => a.tool("select")], ["[", "k_size", a => a.smaller()], ["]", "k_size", a => a.larger()],
+  ["o", "k_outline", a => a.tool("outline")], ["Delete", "k_delete", a => a.remove()],
+  ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
+];
+const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
+const SHOWN = {Delete: "Del", Escape: "Esc"};
+
+export function listen(actions) {
+  // Captured before the map sees them: the map pans by arrows where no obstacle is chosen.
+  window.addEventListener("keydown", event => {
+    const control = event.ctrlKey || event.metaKey, key = event.key;
+    if (control && key.toLowerCase() === "s") return done(event, actions.save);
+    const typing = event.target.matches?.("input:not([type=checkbox]):not([type=range]), select, textarea");
+    if (typing || document.querySelector("dialog[open]")) return;
+    if (control && key.toLowerCase() === "z") return done(event, event.shiftKey ? actions.redo : actions.undo);
+    if (control && key.toLowerCase() === "y") return done(event, actions.redo);
+    if (control || event.altKey) return;
+    if (!document.getElementById("keys-on").checked && key !== "Escape") return;
+    if (key in ARROWS) {
+      const metres = event.shiftKey ? 0.1 : 0.5, [x, y] = ARROWS[key];
+      if (actions.nudge(x * metres, y * metres) !== false) done(event, () => {});
+      return;
+    }
+    const found = KEYS.find(([name]) => name === key || (name.length === 1 && name === key.toLowerCase()));
+    if (found) done(event, () => found[2](actions));
+  }, true);
+}
+
+function done(event, work) {
+  event.preventDefault();
+  event.stopPropagation();
+  work();
+}
+
+export function keyTable(table) {
+  const rows = [...KEYS.map(([key, name]) => [SHOWN[key] ?? key, name]), ["← ↑ ↓ →", "k_arrows"],
+    ["Ctrl+Z", "k_undo"], ["Ctrl+Shift+Z", "k_redo"], ["Ctrl+S", "k_save"]];
+  table.replaceChildren(...rows.map(([key, name]) => {
+    const line = document.createElement("tr"), left = document.createElement("td"), right = document.createElement("td");
+    const mark = document.createElement("kbd");
+    mark.textContent = key;
+    left.append(mark);
+    right.textContent = t(name);
+    line.append(left, right);
+    return line;
+  }));
+}

@@ -1,0 +1,250 @@
+// The page: puts server, map, tools, list and keys together.
+
+import * as api from "./api.js";
+import * as maps from "./map.js";
+import * as tools from "./tools.js";
+import {listen, keyTable} from "./keys.js";
+import {currentLanguage, label, number, setLanguage, t} from "./words.js";
+
+const $ = id => document.getElementById(id);
+let state, chosen = null, ended = false;
+const row = no => state.obstacles.find(each => each.no === no);
+const waits = each => each.status === "detected" || each.status === "possible";
+
+// -- saying ------------------------------------------------------------------------------
+
+let silence;
+function say(text, bad = false, button = null) {
+  const node = $("message");
+  node.textContent = text;
+  node.classList.toggle("bad", bad);
+  node.classList.toggle("on", Boolean(text));
+  if (button) {
+    const press = document.createElement("button");
+    press.textContent = button.text;
+    press.onclick = button.act;
+    node.append(" ", press);
+  }
+  clearTimeout(silence);
+  if (text && !button) silence = setTimeout(() => say(""), bad ? 9000 : 4000);
+}
+
+function refused(error) {
+  if (ended) return;
+  say(error.status === 0 ? t("gone") : error.status === 409 ? `${error.message} ${t("changed")}` : error.message, true);
+}
+
+async function act(work, after) {
+  try {
+    const answer = await work();
+    after?.(answer);
+    return true;
+  } catch (error) {
+    refused(error);
+    return false;
+  }
+}
+
+// -- showing -----------------------------------------------------------------------------
+
+function show(answer) {
+  state = {...state, ...answer};
+  if (chosen !== null && !row(chosen)) chosen = null;
+  maps.showOutline(state.field);
+  maps.showObstacles(state.obstacles);
+  showTracks(state);
+  maps.showHandle(chosen === null ? null : row(chosen));
+  showList();
+  showField();
+  for (const [name, value] of Object.entries(state.settings)) {
+    const input = $("settings").elements[name];
+    if (input && document.activeElement !== input) input.value = value;
+  }
+  $("undo").disabled = !state.can_undo;
+  $("redo").disabled = !state.can_redo;
+  $("save").disabled = !state.edited;
+  $("title").textContent = state.name + (state.edited ? ` · ${t("unsaved")}` : "");
+  document.title = `${state.edited ? "* " : ""}${state.name} – geofield`;
+}
+
+function showTracks(answer) {
+  maps.showTracks(answer);
+  const f = answer.figures;
+  if (f.tracks === undefined) return;
+  const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
+  $("figures").textContent = `${number(f.area_ha, 2)} ha · ${f.tracks} ${t("tracks")} · ${number(f.length_m / 1000, 2)} km · ${number(f.coverage_percent, 1)} %${unfit}`;
+  const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} (${f.segments}), ${number(f.length_m)} m`],
+    ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
+    ["heading", `${number(f.heading_deg, 1)}°`], ["lost_all", `${number(f.lost_m)} m`]];
+  if (f.turns !== null) facts.push(["turns", number(f.turns)]);
+  $("facts").replaceChildren(...facts.flatMap(([name, value]) => [node("dt", t(name)), node("dd", value)]));
+  $("notes").replaceChildren(...answer.notes.map(text => node("li", text)));
+}
+
+const node = (tag, text) => Object.assign(document.createElement(tag), {textContent: text});
+
+function showField() {
+  const field = state.field;
+  $("certainty").textContent = field.certainty !== null ? t("sure", {p: number(100 * field.certainty)})
+    : field.method === "drawn" ? t("drawn") : t("unknown");
+  const doubts = [...field.doubts];
+  if (field.frame.length) doubts.push(t("frame"));
+  $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
+}
+
+// The most doubtful first; those with a person's word last.
+function ordered() {
+  const doubt = each => waits(each) ? 1 - Math.abs(1 - 2 * (each.confidence ?? 0.5)) : -1;
+  return [...state.obstacles].sort((a, b) => doubt(b) - doubt(a) || a.no - b.no);
+}
+
+function showList() {
+  const all = state.obstacles.length, left = state.obstacles.filter(waits).length;
+  $("left").textContent = !all ? t("no_obstacles") : left ? t("left", {n: left, all}) : t("none_left", {all});
+  const focused = document.activeElement?.dataset?.no;
+  $("list").replaceChildren(...ordered().map(each => {
+    const item = document.createElement("li"), press = document.createElement("button");
+    press.dataset.no = each.no;
+    press.setAttribute("aria-current", String(each.no === chosen));
+    const size = each.radius_m === null ? t("other") : `${number(each.radius_m, 1)} m`;
+    const sure = each.confidence === null ? "" : ` · ${number(100 * each.confidence)} %`;
+    const cost = each.lost_m ? ` · ${t("lost", {m: number(each.lost_m)})}` : "";
+    press.append(node("b", each.no), node("span", `${t(each.status)}`), node("small", `${size}${sure}${cost}`));
+    press.onclick = () => choose(each.no, true);
+    item.append(press);
+    return item;
+  }));
+  if (focused) $("list").querySelector(`[data-no="${focused}"]`)?.focus();
+  $("list").querySelector('[aria-current="true"]')?.scrollIntoView({block: "nearest"});
+  for (const name of ["confirm", "reject"]) $(name).disabled = chosen === null;
+}
+
+function choose(no, zoom) {
+  chosen = no;
+  showList();
+  maps.sources.obstacles.changed();
+  maps.showHandle(no === null ? null : row(no));
+  if (no === null) return;
+  if (zoom) maps.zoomTo(row(no));
+  const each = row(no);
+  $("spoken").textContent = `${t("obstacles")} ${no}: ${t(each.status)}`;
+}
+
+function step(forth) {
+  const rows = ordered(), waiting = rows.filter(waits), pool = waiting.length ? waiting : rows;
+  if (!pool.length) return;
+  const place = pool.findIndex(each => each.no === chosen);
+  const next = place < 0 ? (forth ? 0 : pool.length - 1) : (place + (forth ? 1 : -1) + pool.length) % pool.length;
+  choose(pool[next].no, true);
+}
+
+// -- doing -------------------------------------------------------------------------------
+
+async function commit(command) {
+  const before = new Set(state.obstacles.map(each => each.no));
+  const done = await act(() => api.edit(command), show);
+  if (!done) return show({});
+  if ($("message").classList.contains("bad")) say("");
+  const fresh = state.obstacles.find(each => !before.has(each.no));
+  if (fresh) choose(fresh.no, false);
+}
+
+async function verdict(status) {
+  if (chosen === null) return;
+  const rows = ordered().filter(waits), place = rows.findIndex(each => each.no === chosen);
+  const following = rows[(place + 1) % rows.length]?.no;
+  await commit({do: "status", no: chosen, status});
+  if (status !== "detected" && place >= 0 && following !== undefined && following !== chosen) choose(following, true);
+}
+
+const nudge = (dx, dy) => chosen !== null && commit({do: "move", no: chosen, dx_m: dx, dy_m: dy});
+
+function resize(factor) {
+  const each = row(chosen);
+  if (each && each.radius_m !== null)
+    commit({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
+}
+
+const save = name => act(() => api.save(name), answer => {
+  show(answer);
+  say(t("saved", {name: answer.saved_as}));
+});
+
+const ACTIONS = {
+  next: () => step(true), previous: () => step(false), confirm: () => verdict("confirmed"), reject: () => verdict("rejected"),
+  reset: () => verdict("detected"), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
+  help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => resize(1 / 1.1), larger: () => resize(1.1),
+  remove: () => chosen !== null && commit({do: "delete", no: chosen}), tool: name => tools.use(name), nudge,
+  escape: () => { if (tools.current() === "select") choose(null); tools.use("select"); },
+};
+
+// -- beginning ---------------------------------------------------------------------------
+
+function toolButtons() {
+  $("tools").replaceChildren(...tools.TOOLS.map(name => {
+    const press = node("button", t(`t_${name}`));
+    press.dataset.tool = name;
+    press.onclick = () => tools.use(name);
+    return press;
+  }), Object.assign(node("button", t("t_delete")), {id: "remove", onclick: ACTIONS.remove}));
+  pressed();
+}
+
+function pressed() {
+  for (const press of $("tools").querySelectorAll("[data-tool]"))
+    press.setAttribute("aria-pressed", String(press.dataset.tool === tools.current()));
+}
+
+function words() {
+  label();
+  toolButtons();
+  keyTable($("key-table"));
+  $("legend").replaceChildren(...maps.legend());
+}
+
+async function start() {
+  label();
+  state = await api.open();
+  maps.build(state, () => chosen);
+  show(state);
+  maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
+  tools.begin({chosen: () => chosen, row, choose, commit, showTracks, refused, scale: () => state.scale,
+    measured: text => { $("measure").textContent = text; }, changed: pressed});
+  words();
+  listen(ACTIONS);
+  $("infrared-row").hidden = !state.picture?.infrared;
+  $("credit").textContent = state.picture?.credit ?? "";
+  $("export-format").replaceChildren(...state.formats.map(([name, title]) => new Option(title, name)));
+  $("language").value = currentLanguage();
+  for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more"])
+    $(name).onclick = () => ACTIONS[name]();
+  $("infrared").onchange = ({target}) => maps.showInfrared(target.checked, state);
+  $("opacity").oninput = ({target}) => maps.setOpacity(Number(target.value));
+  $("contrast").oninput = ({target}) => maps.setContrast(Number(target.value));
+  $("language").onchange = ({target}) => { setLanguage(target.value); words(); show({}); };
+  $("settings").onsubmit = event => {
+    event.preventDefault();
+    const given = {};
+    for (const input of event.target.elements) {
+      if (!input.name) continue;
+      const value = input.type === "number" ? Number(input.value) : input.value;
+      if (String(value) !== String(state.settings[input.name])) given[input.name] = value;
+    }
+    if (Object.keys(given).length) commit({do: "tracks", settings: given});
+  };
+  $("export").onclick = () => act(() => api.exportAs($("export-format").value),
+    answer => say(t("exported", {files: answer.files.join(", ")})));
+  $("save-as").onclick = async () => { if (await save($("save-name").value)) $("menu").close(); };
+  $("reload").onclick = () => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(answer.brought_back); });
+  $("stop").onclick = () => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); });
+  maps.map.on("pointermove", ({coordinate}) => {
+    const [lon, lat] = maps.lonlat(coordinate);
+    $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
+  });
+  window.addEventListener("beforeunload", event => { if (state.edited && !ended) event.preventDefault(); });
+  if (!state.yours) say(t("second"), true, {text: t("take"), act: () => act(() => api.takeOver(), () => say(""))});
+  else if (state.brought_back) say(state.brought_back);
+  document.body.dataset.ready = "yes";
+}
+
+start().catch(refused);

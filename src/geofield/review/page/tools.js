@@ -1,0 +1,148 @@
+// What the pointer does: select, move, resize, draw, edit corners, turn the tracks, measure.
+
+import * as maps from "./map.js";
+import {preview, endPreview} from "./api.js";
+
+export const TOOLS = ["select", "circle", "polygon", "outline", "anew", "direction", "measure"];
+let desk, active = "select", held = [];
+const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
+const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
+
+// `desk`: {chosen(), row(no), choose(no), commit(command), showTracks(answer), refused(error), measured(text), changed()}
+export function begin(given) {
+  desk = given;
+  maps.map.on("singleclick", event => {
+    if (active === "select") desk.choose(maps.obstacleAt(event.pixel), false);
+  });
+  maps.map.on("pointermove", event => {
+    if (event.dragging || active !== "select") return;
+    maps.map.getTargetElement().style.cursor = maps.obstacleAt(event.pixel) === null ? "" : "pointer";
+  });
+  maps.view.on("change:resolution", () => maps.showHandle(desk.row(desk.chosen())));
+  use("select");
+}
+
+export const current = () => active;
+
+export function use(name) {
+  for (const one of held) maps.map.removeInteraction(one);
+  maps.sources.sketch.clear(true);
+  desk.measured("");
+  active = name;
+  held = MAKERS[name]();
+  for (const one of held) maps.map.addInteraction(one);
+  desk.changed();
+}
+
+const live = command => preview(command, desk.showTracks, desk.refused);
+
+function commit(command) {
+  endPreview();
+  return desk.commit(command);
+}
+
+const MAKERS = {
+  select: () => [mover(), resizer()],
+  circle() {
+    const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "Circle", freehand: true});
+    const command = geometry => ({do: "circle", x: at(geometry.getCenter())[0], y: at(geometry.getCenter())[1],
+                                  radius_m: Math.max(0.3, Math.round(geometry.getRadius() * 1000) / 1000)});
+    draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => live(command(target))));
+    draw.on("drawend", async ({feature}) => {
+      await commit(command(feature.getGeometry()));
+      maps.sources.sketch.clear();
+    });
+    return [draw];
+  },
+  polygon: () => [shape("Polygon", geometry => ({do: "polygon", ring: ring(geometry)}))],
+  anew: () => [shape("Polygon", geometry => ({do: "outline", rings: [ring(geometry)]}), true)],
+  outline() {
+    const modify = new ol.interaction.Modify({source: maps.sources.outline, pixelTolerance: 12});
+    const command = () => ({do: "outline", rings: maps.sources.outline.getFeatures()[0].getGeometry()
+      .getCoordinates().map(part => part.slice(0, -1).map(at))});
+    let listening = null;
+    modify.on("modifystart", ({features}) => {
+      listening = features.item(0).getGeometry().on("change", () => live(command()));
+    });
+    modify.on("modifyend", () => {
+      ol.Observable.unByKey(listening);
+      commit(command());
+    });
+    return [modify];
+  },
+  direction() {
+    const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "LineString", maxPoints: 2});
+    const command = geometry => {
+      const [a, b] = geometry.getCoordinates();
+      return {do: "direction", a: at(a), b: at(b)};
+    };
+    draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => {
+      if (target.getLength() > 2) live(command(target));
+    }));
+    draw.on("drawend", async ({feature}) => {
+      await commit(command(feature.getGeometry()));
+      use("select");
+    });
+    return [draw];
+  },
+  measure() {
+    const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "LineString"});
+    const tell = geometry => desk.measured(maps.metres(geometry.getLength() * desk.scale()));
+    draw.on("drawstart", ({feature}) => {
+      maps.sources.sketch.clear(true);
+      feature.getGeometry().on("change", ({target}) => tell(target));
+    });
+    draw.on("drawend", ({feature}) => tell(feature.getGeometry()));
+    return [draw];
+  },
+};
+
+function shape(type, command, back = false) {
+  const draw = new ol.interaction.Draw({source: maps.sources.sketch, type});
+  draw.on("drawend", async ({feature}) => {
+    await commit(command(feature.getGeometry()));
+    maps.sources.sketch.clear();
+    if (back) use("select");
+  });
+  return draw;
+}
+
+// The chosen obstacle follows the pointer; others must be chosen first, so that none is moved by mistake.
+function mover() {
+  const translate = new ol.interaction.Translate({
+    filter: feature => feature.getId() === desk.chosen(),
+    layers: layer => layer.getSource() === maps.sources.obstacles,
+    hitTolerance: 4,
+  });
+  let from = null;
+  const command = event => ({do: "move", no: desk.chosen(), dx_m: at(event.coordinate)[0] - from[0], dy_m: at(event.coordinate)[1] - from[1]});
+  translate.on("translatestart", event => {
+    from = at(event.startCoordinate ?? event.coordinate);
+    maps.sources.handle.clear();
+  });
+  translate.on("translating", event => live(command(event)));
+  translate.on("translateend", event => {
+    const final = command(event);
+    if (Math.hypot(final.dx_m, final.dy_m) > 0) commit(final);
+  });
+  return translate;
+}
+
+function resizer() {
+  const translate = new ol.interaction.Translate({
+    layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: 6,
+  });
+  const command = event => {
+    const row = desk.row(desk.chosen()), [x, y] = row.centre;
+    const reach = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
+    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((reach - row.buffer_m) * 1000) / 1000)};
+  };
+  translate.on("translating", event => {
+    const row = desk.row(desk.chosen()), wanted = command(event);
+    maps.sources.obstacles.getFeatureById(row.no)?.setGeometry(
+      ol.geom.Polygon.fromCircle(new ol.geom.Circle(row.centre, wanted.radius_m + row.buffer_m), 64));
+    live(wanted);
+  });
+  translate.on("translateend", event => commit(command(event)));
+  return translate;
+}

@@ -1,0 +1,92 @@
+// The page's words in English and German.
+
+const WORDS = {
+  en: {
+    undo: "Undo", redo: "Redo", save: "Save", more: "More", keys: "Keys", tools: "Tools", map: "Map",
+    panel: "Findings", obstacles: "Obstacles", previous: "Previous", next: "Next", confirm: "Confirm",
+    reject: "Reject", outline: "Outline", tracks: "Tracks", spacing: "Spacing, m", headland: "Headland, m",
+    direction: "Direction or heading", last_strip: "Last strip", route: "Route", apply: "Apply", view: "View",
+    opacity: "Picture", contrast: "Contrast", infrared: "Near infrared", legend: "Legend", close: "Close",
+    keys_on: "Single keys are on", export_for: "For my terminal", export: "Export", save_as: "Save as",
+    reload: "Reload the file", stop: "End the session", language: "Language",
+    t_select: "Select", t_circle: "Add circle", t_polygon: "Add shape", t_outline: "Edit outline",
+    t_anew: "Draw outline anew", t_direction: "Turn tracks", t_measure: "Measure", t_delete: "Delete",
+    t_ground: "Ground belongs", t_notground: "Ground does not",
+    left: "{n} of {all} wait for your word", none_left: "All {all} have a person's word", no_obstacles: "None found",
+    detected: "detected", possible: "possible: not driven around", confirmed: "confirmed", rejected: "rejected",
+    added: "added by hand", other: "not round", tree: "tree", lost: "costs {m} m of track",
+    sure: "{p} % certain", drawn: "Drawn by a person", unknown: "Nobody measured its certainty",
+    frame: "Goes on outside the picture (dashed)", area: "Area", length: "Tracks", coverage: "Covered",
+    overlap: "Worked twice", heading: "Heading", lost_all: "Lost to obstacles", turns: "Turns",
+    unfit: "{n} turns do not fit", saved: "Saved in {name}", exported: "Written: {files}",
+    unsaved: "not saved", gone: "geofield has ended or cannot be reached. Your edits lie in the journal beside the plan.",
+    changed: "Reload the file, or save your edits under another name: see More.",
+    second: "This plan is being edited in another tab.", take: "Edit here instead", stopped: "The session has ended. You may close this page.",
+    l_track: "Track", l_gap: "Gap in a track", l_headland: "Headland track", l_turn: "Turn", l_unfit: "Turn that does not fit",
+    l_outline: "Outline", l_doubt: "Outline in doubt", l_frame: "Picture's frame: the field goes on",
+    k_next: "Next obstacle, the most doubtful first", k_prev: "Previous obstacle", k_confirm: "Confirm", k_reject: "Reject",
+    k_reset: "Take your word back", k_add: "Add a circle: press at its middle and drag", k_move: "Move by the arrow keys",
+    k_size: "Smaller, larger", k_outline: "Edit the outline's corners", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
+    k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
+  },
+  de: {
+    undo: "Zurück", redo: "Vor", save: "Speichern", more: "Mehr", keys: "Tasten", tools: "Werkzeuge", map: "Karte",
+    panel: "Befunde", obstacles: "Hindernisse", previous: "Voriges", next: "Nächstes", confirm: "Bestätigen",
+    reject: "Verwerfen", outline: "Umriss", tracks: "Spuren", spacing: "Abstand, m", headland: "Vorgewende, m",
+    direction: "Richtung oder Kurs", last_strip: "Letzter Streifen", route: "Fahrweg", apply: "Anwenden", view: "Ansicht",
+    opacity: "Bild", contrast: "Kontrast", infrared: "Nahes Infrarot", legend: "Legende", close: "Schließen",
+    keys_on: "Einzelne Tasten sind an", export_for: "Für mein Terminal", export: "Ausgeben", save_as: "Speichern als",
+    reload: "Datei neu laden", stop: "Sitzung beenden", language: "Sprache",
+    t_select: "Wählen", t_circle: "Kreis", t_polygon: "Fläche", t_outline: "Umriss ändern",
+    t_anew: "Umriss neu", t_direction: "Spuren drehen", t_measure: "Messen", t_delete: "Löschen",
+    t_ground: "Gehört dazu", t_notground: "Gehört nicht dazu",
+    left: "{n} von {all} warten auf Ihr Wort", none_left: "Alle {all} sind beurteilt", no_obstacles: "Keine gefunden",
+    detected: "gefunden", possible: "möglich: wird nicht umfahren", confirmed: "bestätigt", rejected: "verworfen",
+    added: "von Hand", other: "nicht rund", tree: "Baum", lost: "kostet {m} m Spur",
+    sure: "{p} % sicher", drawn: "Von Hand gezeichnet", unknown: "Niemand hat die Sicherheit gemessen",
+    frame: "Geht außerhalb des Bildes weiter (gestrichelt)", area: "Fläche", length: "Spuren", coverage: "Bearbeitet",
+    overlap: "Doppelt bearbeitet", heading: "Kurs", lost_all: "Durch Hindernisse verloren", turns: "Wendungen",
+    unfit: "{n} Wendungen passen nicht", saved: "Gespeichert in {name}", exported: "Geschrieben: {files}",
+    unsaved: "nicht gespeichert", gone: "geofield läuft nicht mehr. Ihre Änderungen liegen im Journal neben dem Plan.",
+    changed: "Laden Sie die Datei neu oder speichern Sie unter anderem Namen: siehe Mehr.",
+    second: "Dieser Plan wird in einem anderen Fenster bearbeitet.", take: "Hier bearbeiten", stopped: "Die Sitzung ist beendet. Sie können die Seite schließen.",
+    l_track: "Spur", l_gap: "Lücke in einer Spur", l_headland: "Spur im Vorgewende", l_turn: "Wendung", l_unfit: "Wendung passt nicht",
+    l_outline: "Umriss", l_doubt: "Zweifelhafter Umriss", l_frame: "Bildrand: das Feld geht weiter",
+    k_next: "Nächstes Hindernis, das zweifelhafteste zuerst", k_prev: "Voriges Hindernis", k_confirm: "Bestätigen", k_reject: "Verwerfen",
+    k_reset: "Ihr Wort zurücknehmen", k_add: "Kreis: in der Mitte drücken und ziehen", k_move: "Mit den Pfeiltasten verschieben",
+    k_size: "Kleiner, größer", k_outline: "Ecken des Umrisses ändern", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
+    k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
+  },
+};
+
+let language = remembered() || (navigator.language || "en").slice(0, 2);
+if (!(language in WORDS)) language = "en";
+
+function remembered() {
+  try { return localStorage.getItem("language"); } catch { return null; }
+}
+
+export function t(name, values = {}) {
+  const text = WORDS[language][name] ?? WORDS.en[name] ?? name;
+  return text.replace(/\{(\w+)\}/g, (_, key) => values[key]);
+}
+
+export const currentLanguage = () => language;
+
+export function setLanguage(name) {
+  language = name;
+  try { localStorage.setItem("language", name); } catch { /* private window */ }
+  label();
+}
+
+export const number = (value, digits = 0) =>
+  value === null || value === undefined ? "–"
+    : value.toLocaleString(language, {minimumFractionDigits: digits, maximumFractionDigits: digits});
+
+// Writes the words into everything that has a data-t or data-label attribute.
+export function label(root = document) {
+  document.documentElement.lang = language;
+  for (const node of root.querySelectorAll("[data-t]")) node.textContent = t(node.dataset.t);
+  for (const node of root.querySelectorAll("[data-label]")) node.setAttribute("aria-label", t(node.dataset.label));
+  for (const node of root.querySelectorAll("button[data-key]")) node.title = `${node.textContent} (${node.dataset.key})`;
+}

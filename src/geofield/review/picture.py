@@ -1,0 +1,210 @@
+"""The picture as tiles in the plan's metric CRS.
+
+A north-up picture in that CRS is cut as it is, without resampling; any other is reprojected
+tile by tile. Coarse levels come from the file's own overviews, so that a picture of any size
+needs the memory of one tile.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from PIL import Image
+from pyproj import CRS
+from rasterio.enums import Resampling
+from rasterio.warp import reproject, transform_bounds
+
+from geofield.errors import ImageryError
+from geofield.imagery import SceneReader
+from geofield.imagery.gdal import to_rasterio
+from geofield.model.scene import Scene
+
+TILE_PX = 512
+Show = Literal["colour", "infrared"]
+
+
+@dataclass(frozen=True)
+class TiledPicture:
+    """A picture and the levels in which it is shown.
+
+    Attributes
+    ----------
+    reader : SceneReader
+    crs : CRS
+        Of the tiles: the plan's metric CRS.
+    """
+
+    reader: SceneReader
+    crs: CRS
+
+    @classmethod
+    def open(cls, path: Path, crs: CRS) -> TiledPicture:
+        """Look at a picture without reading it."""
+        return cls(SceneReader.open(str(path)), crs)
+
+    @cached_property
+    def direct(self) -> bool:
+        """Whether tiles are cut from the picture without resampling."""
+        transform = self.reader.grid.transform
+        straight = transform.b == 0 and transform.d == 0 and transform.a == -transform.e
+        return bool(straight and self.reader.grid.crs == self.crs)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right, top in the tiles' CRS, metres."""
+        grid = self.reader.grid
+        x, y = grid.to_native([0, grid.width_px, grid.width_px, 0], [0, 0, *[grid.height_px] * 2])
+        left, bottom, right, top = (float(v) for v in (min(x), min(y), max(x), max(y)))
+        if self.direct:
+            return left, bottom, right, top
+        found = transform_bounds(
+            to_rasterio(grid.crs), to_rasterio(self.crs), left, bottom, right, top
+        )
+        return tuple(float(v) for v in found)  # type: ignore[return-value]
+
+    @cached_property
+    def resolutions_m(self) -> list[float]:
+        """Metres of the CRS per pixel, coarsest first; the last is the picture's own."""
+        own = (
+            float(self.reader.grid.transform.a)
+            if self.direct
+            else self.reader.grid.ground_resolution_m
+        )
+        left, bottom, right, top = self.bounds
+        longest = max(right - left, top - bottom) / own
+        levels = max(0, math.ceil(math.log2(longest / TILE_PX)))
+        return [own * 2.0**level for level in range(levels, -1, -1)]
+
+    @cached_property
+    def limits(self) -> tuple[float, float] | None:
+        """File values that become 0 and 255 in every tile."""
+        return self.reader.scaling or self._overview.scaling
+
+    @cached_property
+    def _overview(self) -> Scene:
+        grid = self.reader.grid
+        coarse = max(1.0, max(grid.shape) / 1024)
+        shape = (max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse)))
+        return self.reader.read(shape_px=shape)
+
+    @property
+    def has_infrared(self) -> bool:
+        """Whether the picture has a near infrared band."""
+        return "nir" in self.reader.roles.roles
+
+    def tile(self, level: int, column: int, row: int, show: Show) -> tuple[bytes, str]:
+        """One tile as an image file.
+
+        Returns
+        -------
+        bytes, str
+            The file and its media type.
+
+        Raises
+        ------
+        ImageryError
+            When there is no such tile.
+        """
+        if not 0 <= level < len(self.resolutions_m):
+            raise ImageryError(f"The picture has no level {level}.")
+        size_m = self.resolutions_m[level] * TILE_PX
+        left, _, right, top = self.bounds
+        bottom = self.bounds[1]
+        if not (0 <= column < (right - left) / size_m and 0 <= row < (top - bottom) / size_m):
+            raise ImageryError(f"The picture has no tile {column}, {row} at level {level}.")
+        corner = (left + column * size_m, top - row * size_m)
+        bands, valid = (
+            self._cut(level, column, row)
+            if self.direct
+            else self._warped(corner, self.resolutions_m[level])
+        )
+        return _encoded(_shown(bands, self.reader.roles, show), valid)
+
+    def _cut(self, level: int, column: int, row: int) -> tuple[Any, NDArray[np.bool_]]:
+        step = 2 ** (len(self.resolutions_m) - 1 - level)
+        grid = self.reader.grid
+        c0, r0 = column * TILE_PX * step, row * TILE_PX * step
+        width, height = (
+            min(TILE_PX * step, grid.width_px - c0),
+            min(TILE_PX * step, grid.height_px - r0),
+        )
+        shape = (max(1, round(height / step)), max(1, round(width / step)))
+        part = self.reader.read((c0, r0, width, height), shape_px=shape, scaling=self.limits)
+        return part, _padded(part.valid)
+
+    def _warped(
+        self, corner: tuple[float, float], resolution_m: float
+    ) -> tuple[Any, NDArray[np.bool_]]:
+        target = Affine(resolution_m, 0, corner[0], 0, -resolution_m, corner[1])
+        size_m = TILE_PX * resolution_m
+        window = self._window(corner, size_m)
+        if window is None:
+            empty = np.zeros((TILE_PX, TILE_PX), bool)
+            return None, empty
+        step = max(1.0, resolution_m / self.reader.grid.ground_resolution_m)
+        shape = (max(1, round(window[3] / step)), max(1, round(window[2] / step)))
+        part = self.reader.read(window, shape_px=shape, scaling=self.limits)
+        count = len(part.bands)
+        source = np.concatenate([part.bands, part.valid[None].astype(np.uint8) * 255])
+        made = np.zeros((count + 1, TILE_PX, TILE_PX), np.uint8)
+        reproject(
+            source,
+            made,
+            src_transform=part.grid.transform,
+            src_crs=to_rasterio(part.grid.crs),
+            dst_transform=target,
+            dst_crs=to_rasterio(self.crs),
+            resampling=Resampling.bilinear,
+        )
+        return (made[:count], part.roles), made[count] > 127
+
+    def _window(
+        self, corner: tuple[float, float], size_m: float
+    ) -> tuple[int, int, int, int] | None:
+        """The part of the picture below a tile, with a margin for the interpolation."""
+        grid = self.reader.grid
+        along = np.linspace(0, size_m, 9)
+        xx, yy = np.meshgrid(corner[0] + along, corner[1] - along)
+        x, y = grid.from_crs(xx.ravel(), yy.ravel(), self.crs)
+        margin = 2
+        c0, r0 = max(0, int(np.min(x)) - margin), max(0, int(np.min(y)) - margin)
+        c1 = min(grid.width_px, int(np.max(x)) + margin)
+        r1 = min(grid.height_px, int(np.max(y)) + margin)
+        return None if c1 <= c0 or r1 <= r0 else (c0, r0, c1 - c0, r1 - r0)
+
+
+def _shown(part: Any, roles: Any, show: Show) -> NDArray[np.uint8]:
+    """Three bands (rows, columns, 3): colour, or near infrared shown as red."""
+    if part is None:
+        return np.zeros((TILE_PX, TILE_PX, 3), np.uint8)
+    bands, names = (part.bands, part.roles) if isinstance(part, Scene) else part
+    by_name = dict(zip(names, bands, strict=True))
+    grey = by_name.get("grey", bands[0])
+    colour = [by_name.get(name, grey) for name in ("red", "green", "blue")]
+    if show == "infrared" and "nir" in by_name:
+        colour = [by_name["nir"], colour[0], colour[1]]
+    return np.stack([_padded(band) for band in colour], axis=-1)
+
+
+def _padded(band: NDArray[Any]) -> NDArray[Any]:
+    """A band with the size of a tile; the picture ends where it ends."""
+    rows, columns = band.shape
+    return np.pad(band, ((0, TILE_PX - rows), (0, TILE_PX - columns)))
+
+
+def _encoded(pixels: NDArray[np.uint8], valid: NDArray[np.bool_]) -> tuple[bytes, str]:
+    buffer = io.BytesIO()
+    if valid.all():
+        Image.fromarray(pixels).save(buffer, "JPEG", quality=92, subsampling=0)
+        return buffer.getvalue(), "image/jpeg"
+    alpha = valid.astype(np.uint8)[..., None] * np.uint8(255)
+    Image.fromarray(np.concatenate([pixels, alpha], axis=-1)).save(buffer, "PNG", compress_level=1)
+    return buffer.getvalue(), "image/png"

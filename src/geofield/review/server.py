@@ -1,0 +1,210 @@
+"""The page's server: this machine only, one plan, the standard library's HTTP.
+
+One person, one page, some requests a second: a framework would add dependencies and no feature.
+Nothing here knows fields or tracks; `desk` answers, `guard` says who may ask.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import resources
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from geofield.errors import GeofieldError
+from geofield.review.desk import ChangedError, Desk
+from geofield.review.guard import SECURITY_HEADERS, Guard
+
+#: The largest request that is read: an outline of a hundred thousand corners.
+MOST_BYTES = 4_000_000
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".md": "text/plain; charset=utf-8",
+}
+
+
+class ReviewServer(ThreadingHTTPServer):
+    """A server for one desk, bound to 127.0.0.1.
+
+    Parameters
+    ----------
+    desk : Desk
+    port : int
+        0 takes a free one.
+    """
+
+    daemon_threads = True
+    request_queue_size = 32
+
+    def __init__(self, desk: Desk, port: int = 0) -> None:
+        super().__init__(("127.0.0.1", port), _Handler)
+        self.desk = desk
+        self.guard = Guard(self.server_port)
+        self.files = _page_files()
+
+    @property
+    def address(self) -> str:
+        """What to open in the browser; holds the key."""
+        return f"http://127.0.0.1:{self.server_port}/?token={self.guard.token}"
+
+    def stop(self) -> None:
+        """End :meth:`serve_forever`, from whichever thread."""
+        threading.Thread(target=self.shutdown, daemon=True).start()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that closes its connections early is no fault."""
+
+
+def _page_files() -> dict[str, tuple[bytes, str]]:
+    """All files of the page by their address: no path from a request is ever opened."""
+    root = resources.files("geofield.review") / "page"
+    found: dict[str, tuple[bytes, str]] = {}
+    folders = [("", root)]
+    while folders:
+        prefix, folder = folders.pop()
+        for entry in folder.iterdir():
+            if entry.is_dir():
+                folders.append((f"{prefix}{entry.name}/", entry))
+                continue
+            suffix = entry.name[entry.name.rfind(".") :]
+            if suffix in _TYPES:
+                found[f"/{prefix}{entry.name}"] = (entry.read_bytes(), _TYPES[suffix])
+    return found
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: ReviewServer
+    protocol_version = "HTTP/1.1"
+    timeout = 60
+
+    def log_message(self, *_: Any) -> None:
+        """Requests are no news."""
+
+    def version_string(self) -> str:
+        """Nothing about versions to strangers."""
+        return "geofield"
+
+    def do_GET(self) -> None:
+        """The page, its state, tiles."""
+        address = urlsplit(self.path)
+        token = parse_qs(address.query).get("token", [""])[0]
+        if address.path == "/" and token and self.server.guard.opens(token, self._headers()):
+            # The key leaves the address line, so that no screenshot shows it.
+            self._send(303, b"", "text/plain", {"Location": "/", **self._cookie()})
+            return
+        if self._refused():
+            return
+        if address.path == "/api/state":
+            opening = self.server.desk.opening()
+            self._json(200, {**opening, "token": self.server.guard.token})
+        elif address.path.startswith("/tile/"):
+            self._tile(address.path)
+        else:
+            name = "/index.html" if address.path == "/" else address.path
+            found = self.server.files.get(name)
+            if found is None:
+                self._json(404, {"message": "There is no such page."})
+            else:
+                self._send(200, *found)
+
+    def do_POST(self) -> None:
+        """Edits, previews, saving."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdigit() or int(length) > MOST_BYTES:
+            self.close_connection = True
+            self._json(413, {"message": f"More than {MOST_BYTES} bytes, or of unknown length."})
+            return
+        body = self.rfile.read(int(length))
+        if self._refused():
+            return
+        try:
+            value = json.loads(body or b"{}")
+        except (ValueError, RecursionError):
+            value = None
+        if not isinstance(value, dict):
+            self._json(400, {"message": "The request is not a JSON object."})
+            return
+        try:
+            self._json(200, self._answer(urlsplit(self.path).path, value))
+        except ChangedError as error:
+            self._json(409, _words(error))
+        except GeofieldError as error:
+            self._json(422, _words(error))
+        except LookupError:
+            self._json(404, {"message": "There is no such request."})
+
+    def _answer(self, path: str, value: dict[str, Any]) -> dict[str, Any]:
+        desk, tab = self.server.desk, self.headers.get("X-Geofield-Tab", "")
+        if path == "/api/take":
+            return desk.take(tab, force=bool(value.get("force")))
+        if path == "/api/stop":
+            self.server.stop()
+            return {"stopped": True}
+        if not desk.holds(tab):
+            raise GeofieldError(
+                "Another tab is editing this plan.", hint="Go on there, or take over here."
+            )
+        if path == "/api/edit":
+            return desk.edit(value)
+        if path == "/api/preview":
+            return desk.preview(value)
+        if path == "/api/save":
+            name = value.get("name")
+            return desk.save(name if isinstance(name, str) else None)
+        if path == "/api/reload":
+            return desk.reload()
+        if path == "/api/export":
+            return desk.export(str(value.get("format", "")))
+        raise LookupError(path)
+
+    def _tile(self, path: str) -> None:
+        parts = path.split("/")[2:]
+        picture = self.server.desk.picture
+        if picture is None or len(parts) != 4 or not all(p.isdecimal() for p in parts[1:]):
+            self._json(404, {"message": "There is no such tile."})
+            return
+        level, column, row = (int(part) for part in parts[1:])
+        show = "infrared" if parts[0] == "infrared" else "colour"
+        try:
+            data, kind = picture.tile(level, column, row, show)  # type: ignore[arg-type]
+        except GeofieldError as error:
+            self._json(404, _words(error))
+            return
+        self._send(200, data, kind, {"Cache-Control": "private, max-age=3600"})
+
+    def _refused(self) -> bool:
+        reason = self.server.guard.refusal(self.command, self._headers())
+        if reason is None:
+            return False
+        self._json(403, {"message": reason})
+        return True
+
+    def _headers(self) -> dict[str, str]:
+        return {name.title(): value for name, value in self.headers.items()}
+
+    def _cookie(self) -> dict[str, str]:
+        return {"Set-Cookie": self.server.guard.cookie_header()}
+
+    def _json(self, status: int, value: dict[str, Any]) -> None:
+        data = json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
+        self._send(status, data, "application/json")
+
+    def _send(
+        self, status: int, data: bytes, kind: str, more: dict[str, str] | None = None
+    ) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(data)))
+        for name, value in {**SECURITY_HEADERS, **(more or {})}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(data)
+
+
+def _words(error: GeofieldError) -> dict[str, Any]:
+    return {"message": error.message, "hint": error.hint or ""}

@@ -1,0 +1,127 @@
+"""A session: a plan that is being edited, with undo, redo, and tracks that follow."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from geofield.errors import GeofieldWarning
+from geofield.pipeline import run_tracks
+from geofield.review.commands import Command, apply_command
+from geofield.settings import Settings
+
+if TYPE_CHECKING:
+    from geofield.plan import Plan
+
+#: Steps that can be undone; a plan shares its unchanged tables with its neighbours.
+MOST_STEPS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One state of the plan.
+
+    Attributes
+    ----------
+    plan : Plan
+        With the tracks that belong to it.
+    command : mapping or None
+        What led to it; None for the plan that was opened.
+    notes : tuple of str
+        What the planner had to tell.
+    """
+
+    plan: Plan
+    command: Command | None = None
+    notes: tuple[str, ...] = ()
+
+
+class Session:
+    """A plan and the edits made on it.
+
+    Examples
+    --------
+    >>> session = Session(gf.read_plan("out/field.gpkg"))             # doctest: +SKIP
+    >>> session.do({"do": "status", "no": 3, "status": "rejected"})   # doctest: +SKIP
+    >>> session.undo()                                                # doctest: +SKIP
+
+    Parameters
+    ----------
+    plan : Plan
+        Field and obstacles count as they are; tracks are planned where there are none.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._steps = [Step(plan) if plan.tracks is not None else planned(plan, None)]
+        self._at = 0
+        self._saved = self._steps[0]
+
+    @property
+    def step(self) -> Step:
+        """The state that is shown."""
+        return self._steps[self._at]
+
+    @property
+    def plan(self) -> Plan:
+        """The plan as edited so far."""
+        return self.step.plan
+
+    @property
+    def edited(self) -> bool:
+        """Whether there is anything that was not saved."""
+        return self.step is not self._saved
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to undo."""
+        return self._at > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether an undone edit can be made again."""
+        return self._at + 1 < len(self._steps)
+
+    def do(self, command: Command) -> Step:
+        """Make an edit and plan the tracks again.
+
+        Raises
+        ------
+        GeofieldError
+            When the edit or the tracks after it are refused; nothing has changed then.
+        """
+        step = self.preview(command)
+        self._steps = [*self._steps[: self._at + 1], step][-MOST_STEPS:]
+        self._at = len(self._steps) - 1
+        return step
+
+    def preview(self, command: Command) -> Step:
+        """What an edit would lead to, without making it."""
+        return planned(apply_command(self.plan, command), command)
+
+    def undo(self) -> Step:
+        """Go one edit back, if there is one."""
+        self._at = max(self._at - 1, 0)
+        return self.step
+
+    def redo(self) -> Step:
+        """Go one edit forth, if there is one."""
+        self._at = min(self._at + 1, len(self._steps) - 1)
+        return self.step
+
+    def mark_saved(self, step: Step) -> None:
+        """Note which state lies in the file now."""
+        self._saved = step
+
+
+def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
+    """A plan with the tracks that follow from its field, obstacles and settings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", GeofieldWarning)
+        settings = plan.settings or Settings()
+        after = run_tracks(replace(plan, tracks=None), settings=settings)
+    notes = dict.fromkeys(
+        str(each.message) for each in caught if issubclass(each.category, GeofieldWarning)
+    )
+    return Step(after, command, tuple(notes))

@@ -1,0 +1,30 @@
+"""A plan to review: a run of the real command on the sample, copied for each test."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `geofield run` leaves of the first sample field."""
+    folder = tmp_path_factory.mktemp("run")
+    command = [sys.executable, "-m", "geofield", "run", str(ROOT / "sample_data" / "field_1.tif")]
+    options = ["--lat", "35.075373", "--lon", "33.531142", "--spacing", "4", "--format", "gpkg"]
+    subprocess.run([*command, *options, "--out", str(folder)], check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture
+def plan_path(run_folder: Path, tmp_path: Path) -> Path:
+    """A copy of the plan, with its picture beside it."""
+    for name in ("field.gpkg", "scene.tif"):
+        shutil.copy(run_folder / name, tmp_path / name)
+    return tmp_path / "field.gpkg"

@@ -1,0 +1,315 @@
+"""The review page in a real browser: clicked, dragged and typed as a person would."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from axe_core_python.selenium import Axe
+from browser import Page, chromium, served
+from selenium import webdriver
+from selenium.common.exceptions import NoAlertPresentException
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+from geofield.plan import read_plan
+from geofield.review import Session
+
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
+
+
+@pytest.fixture(scope="module")
+def driver() -> Iterator[webdriver.Chrome]:
+    one = chromium()
+    yield one
+    one.quit()
+
+
+@pytest.fixture
+def page(driver: webdriver.Chrome, plan_path: Path) -> Iterator[Page]:
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        yield page
+        complaints = page.complaints()
+        page.run("window.onbeforeunload = null")
+        driver.get("about:blank")
+        with contextlib.suppress(NoAlertPresentException):
+            driver.switch_to.alert.accept()
+    assert not complaints
+
+
+def test_obstacles_reviewed_by_keys_and_saved(page: Page, plan_path: Path) -> None:
+    page.press("j", "c")  # the most doubtful is confirmed, the next one chosen
+    page.wait(lambda: "20 of 21" in page.text("left"))
+    page.press("r")
+    page.wait(lambda: "19 of 21" in page.text("left"))
+    page.press("]")
+    page.wait(lambda: "18 of 21" in page.text("left"))
+    rows = page.state()["obstacles"]
+    confirmed = [row for row in rows if row["status"] == "confirmed"]
+    rejected = [row for row in rows if row["status"] == "rejected"]
+    assert (len(confirmed), len(rejected)) == (2, 1)
+    page.chord(Keys.CONTROL, "s")
+    page.wait(lambda: "Saved in field.gpkg" in page.text("message"))
+    saved = read_plan(plan_path)
+    assert saved.obstacles is not None
+    by_number = saved.obstacles.set_index("obstacle_no")
+    for row in rows:
+        assert by_number.loc[row["no"], "status"] == row["status"]
+        assert by_number.loc[row["no"], "radius_m"] == pytest.approx(row["radius_m"], abs=1e-4)
+    assert not plan_path.with_name("field.gpkg.review.jsonl").exists()
+
+
+def test_what_is_saved_equals_the_same_edits_made_in_python(page: Page, plan_path: Path) -> None:
+    before = read_plan(plan_path)
+    page.press("j", "r", "j", "c")
+    page.wait(lambda: page.state()["can_undo"] and "19 of 21" in page.text("left"))
+    rows = page.state()["obstacles"]
+    page.button("save")
+    page.wait(lambda: "Saved" in page.text("message"))
+    session = Session(before)
+    for row in rows:
+        if row["status"] != "detected":
+            session.do({"do": "status", "no": row["no"], "status": row["status"]})
+    assert read_plan(plan_path) == session.plan
+
+
+def test_drawing_moving_and_resizing_with_the_pointer(page: Page) -> None:
+    field = page.state()["field"]
+    x = sum(place[0] for place in field["rings"][0]) / len(field["rings"][0])
+    y = sum(place[1] for place in field["rings"][0]) / len(field["rings"][0])
+    page.press("a")
+    page.drag((x, y), (x + 6, y))
+    page.wait(lambda: len(page.state()["obstacles"]) == 22)
+    added = page.obstacle(22)
+    assert added["status"] == "added"
+    assert added["radius_m"] == pytest.approx(6.0, abs=0.6)
+    assert added["centre"] == pytest.approx([x, y], abs=0.6)
+    # Tracks keep away from it as soon as it is there.
+    for _, x0, y0, x1, y1 in page.state()["tracks"]:
+        away = (
+            abs((y1 - y0) * (x - x0) - (x1 - x0) * (y - y0))
+            / ((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5
+        )
+        between = min(y0, y1) < y < max(y0, y1)
+        assert away > 5.9 or not between
+    page.press(Keys.ESCAPE)
+    page.click(*added["centre"])
+    page.wait(
+        lambda: (
+            page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+            == "22"
+        )
+    )
+    page.press("k", "j")
+    page.run("document.querySelector('#list [data-no=\"22\"]').click()")
+    time.sleep(0.3)
+    page.drag(tuple(added["centre"]), (x + 20, y - 10))
+    page.wait(lambda: page.obstacle(22)["centre"][0] > x + 15)
+    moved = page.obstacle(22)
+    assert moved["centre"] == pytest.approx([x + 20, y - 10], abs=0.8)
+    assert moved["radius_m"] == added["radius_m"]
+    edge = moved["radius_m"] + moved["buffer_m"]
+    cx, cy = moved["centre"]
+    page.drag((cx + edge, cy), (cx + edge + 4, cy))
+    page.wait(lambda: page.obstacle(22)["radius_m"] > 8)
+    assert page.obstacle(22)["radius_m"] == pytest.approx(added["radius_m"] + 4, abs=0.8)
+    page.press(Keys.ARROW_LEFT)
+    page.wait(lambda: page.obstacle(22)["centre"][0] < cx - 0.3)
+    assert page.obstacle(22)["centre"] == pytest.approx([cx - 0.5, cy], abs=0.01)
+    page.press(Keys.DELETE)
+    page.wait(lambda: len(page.state()["obstacles"]) == 21)
+    for _ in range(5):
+        page.chord(Keys.CONTROL, "z")
+    page.wait(lambda: not page.state()["can_undo"])
+    page.chord(Keys.CONTROL, Keys.SHIFT, "z")
+    page.wait(lambda: len(page.state()["obstacles"]) == 22)
+
+
+def test_the_outline_is_edited_and_tracks_turn(page: Page) -> None:
+    before = page.state()
+    corner = max(before["field"]["rings"][0], key=lambda place: place[0])
+    page.press("o")
+    page.drag(tuple(corner), (corner[0] - 15, corner[1]))
+    page.wait(lambda: page.state()["figures"]["area_ha"] < before["figures"]["area_ha"] - 0.05)
+    after = page.state()
+    assert after["field"]["method"] == "drawn"
+    assert after["field"]["certainty"] is None
+    assert "Drawn by a person" in page.text("certainty")
+    page.driver.find_element(By.CSS_SELECTOR, "[data-tool=direction]").click()
+    x, y = after["obstacles"][7]["centre"]
+    page.click(x - 20, y + 20)
+    page.click(x + 30, y - 30)
+    page.wait(lambda: abs(page.state()["figures"]["heading_deg"] - 135) < 4)
+
+
+def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> None:
+    before = page.state()
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    box.clear()
+    box.send_keys("5000", Keys.ENTER)
+    page.wait(lambda: "larger than the field" in page.text("message"))
+    assert page.state()["tracks"] == before["tracks"]
+    page.press(Keys.ESCAPE)
+    # A corner dragged across the other side: the outline crosses itself.
+    ring = before["field"]["rings"][0]
+    corner = max(ring, key=lambda place: place[0])
+    left = min(place[0] for place in ring)
+    page.run("document.activeElement.blur()")
+    page.press("o")
+    high = max(place[1] for place in ring)
+    page.drag(tuple(corner), (left - 10, high - 70))
+    page.wait(lambda: "crosses itself" in page.text("message"))
+    assert page.state()["field"]["rings"] == before["field"]["rings"]
+    assert page.state()["tracks"] == before["tracks"]
+
+
+def test_edits_come_back_after_the_server_is_killed(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    with served(plan_path) as (address, process):
+        page = Page(driver, address)
+        page.press("j", "r")
+        page.wait(lambda: "20 of 21" in page.text("left"))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        page.press("r")
+        page.wait(lambda: "geofield has ended" in page.text("message"))
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        assert "1 edits of a session" in page.text("message")
+        assert "20 of 21" in page.text("left")
+
+
+def test_another_program_changed_or_locked_the_file(page: Page, plan_path: Path) -> None:
+    page.press("j", "r")
+    page.wait(lambda: "20 of 21" in page.text("left"))
+    with closing(sqlite3.connect(plan_path)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        page.button("save")
+        page.wait(lambda: "open in another program" in page.text("message"))
+        other.rollback()
+        other.execute("UPDATE gpkg_contents SET description = 'edited' WHERE table_name = 'field'")
+        other.commit()
+    page.button("save")
+    page.wait(lambda: "Another program changed" in page.text("message"))
+    page.button("more")
+    page.driver.find_element(By.ID, "save-name").send_keys("mine")
+    page.button("save-as")
+    page.wait(lambda: plan_path.with_name("mine.gpkg").exists())
+    saved = read_plan(plan_path.with_name("mine.gpkg"))
+    assert saved.obstacles is not None
+    assert (saved.obstacles["status"] == "rejected").sum() == 1
+
+
+def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:
+    first = page.driver.current_window_handle
+    address = page.run("return location.href")
+    page.driver.switch_to.new_window("tab")
+    second = Page(page.driver, address)
+    assert "another tab" in second.text("message")
+    second.driver.find_element(By.CSS_SELECTOR, "#message button").click()
+    second.press("j", "r")
+    second.wait(lambda: "20 of 21" in second.text("left"))
+    second.driver.close()
+    second.driver.switch_to.window(first)
+    page.press("j", "r")
+    page.wait(lambda: "another tab" in page.text("message").lower())
+
+
+def test_a_name_with_a_script_in_it_is_only_a_name(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    name = "<img src=x onerror=document.title='owned'><script>document.title='owned'</script>"
+    with closing(sqlite3.connect(plan_path)) as file, file:
+        for (trigger,) in file.execute(
+            "SELECT name FROM sqlite_master WHERE type = 'trigger' AND tbl_name = 'field'"
+        ).fetchall():
+            file.execute(f"DROP TRIGGER {trigger}")
+        file.execute("UPDATE field SET name = ?", (name,))
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        assert page.text("title") == name
+        assert driver.title == f"{name} – geofield"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_accessibility_rules_hold(plan_path: Path, scheme: str, width: int) -> None:
+    with served(plan_path) as (address, _):
+        more = ["--force-dark-mode", "--blink-settings=preferredColorScheme=0"] * (scheme == "dark")
+        driver = chromium(width, 844, *more)
+        try:
+            driver.execute_cdp_cmd(
+                "Emulation.setDeviceMetricsOverride",
+                {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 500},
+            )
+            driver.execute_cdp_cmd(
+                "Emulation.setEmulatedMedia",
+                {"features": [{"name": "prefers-color-scheme", "value": scheme}]},
+            )
+            page = Page(driver, address)
+            for opened in (None, "help", "more"):
+                if opened:
+                    page.button(opened)
+                found = Axe().run(driver)
+                assert not [(v["id"], v["nodes"][0]["html"][:200]) for v in found["violations"]]
+                page.run("for (const one of document.querySelectorAll('dialog')) one.close()")
+            assert page.run("return document.documentElement.scrollWidth <= innerWidth")
+        finally:
+            driver.quit()
+
+
+def test_german_words_and_keys_switched_off(page: Page) -> None:
+    page.press("?")
+    page.wait(lambda: "Add a circle" in page.text("keys"))
+    page.driver.find_element(By.ID, "keys-on").click()
+    page.press(Keys.ESCAPE)
+    page.press("j", "r")
+    time.sleep(0.3)
+    assert not page.state()["can_undo"]
+    page.button("more")
+    page.driver.find_element(By.CSS_SELECTOR, "#language option[value=de]").click()
+    page.run("document.getElementById('menu').close()")
+    assert page.text("confirm") == "Bestätigen"
+    assert "warten auf Ihr Wort" in page.text("left")
+
+
+def test_the_page_asks_nobody_else(page: Page) -> None:
+    hosts = page.run(
+        "return [...new Set(performance.getEntriesByType('resource')"
+        ".map(entry => new URL(entry.name).host))]"
+    )
+    assert hosts == [page.run("return location.host")]
+    tiles = page.run(
+        "return performance.getEntriesByType('resource')"
+        ".filter(entry => entry.name.includes('/tile/')).length"
+    )
+    assert tiles >= 1
+
+
+def test_the_session_ends_from_the_page(driver: webdriver.Chrome, plan_path: Path) -> None:
+    with served(plan_path) as (address, process):
+        page = Page(driver, address)
+        page.button("more")
+        page.button("stop")
+        page.wait(lambda: "has ended" in page.text("message"))
+        assert process.wait(10) == 0
+
+
+def test_a_port_in_use_and_a_file_that_is_no_plan(plan_path: Path) -> None:
+    with served(plan_path) as (address, _):
+        port = address.split(":")[2].split("/")[0]
+        with served(plan_path, "--port", port) as (nothing, process):
+            assert nothing == ""
+            assert process.wait(20) == 1
+    other = shutil.copy(plan_path.with_name("scene.tif"), plan_path.with_name("x.gpkg"))
+    with served(Path(other)) as (nothing, process):
+        assert process.wait(20) == 1

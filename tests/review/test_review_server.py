@@ -1,0 +1,190 @@
+"""The page's server from outside: who gets in, what is refused, what tiles show."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+from PIL import Image
+from rasterio.warp import Resampling, calculate_default_transform, reproject
+
+from geofield.review.desk import Desk
+from geofield.review.picture import TILE_PX, TiledPicture
+from geofield.review.server import MOST_BYTES, ReviewServer
+
+
+class Visitor:
+    """Sends requests with exactly the headers that are said."""
+
+    def __init__(self, server: ReviewServer) -> None:
+        self.server = server
+        self.host = f"127.0.0.1:{server.server_port}"
+        self.cookie = server.guard.cookie_header().split(";")[0]
+
+    def ask(
+        self, method: str, path: str, body: bytes | None = None, **headers: str
+    ) -> tuple[int, dict[str, str], bytes]:
+        connection = http.client.HTTPConnection("127.0.0.1", self.server.server_port, timeout=10)
+        connection.putrequest(method, path, skip_host=True)
+        sent = {"Host": self.host, **{k.replace("_", "-"): v for k, v in headers.items()}}
+        if body is not None and "Content-Length" not in sent:
+            sent["Content-Length"] = str(len(body))
+        for name, value in sent.items():
+            connection.putheader(name, value)
+        connection.endheaders(body)
+        answer = connection.getresponse()
+        found = answer.status, dict(answer.getheaders()), answer.read()
+        connection.close()
+        return found
+
+    def post(self, path: str, value: Any, **headers: str) -> tuple[int, Any]:
+        keys = {"Cookie": self.cookie, "X_Geofield_Token": self.server.guard.token}
+        given = {**keys, "X_Geofield_Tab": "one", **headers}
+        body = value if isinstance(value, bytes) else json.dumps(value).encode()
+        status, _, data = self.ask("POST", path, body, **given)
+        return status, json.loads(data)
+
+
+@pytest.fixture
+def visitor(plan_path: Path) -> Iterator[Visitor]:
+    server = ReviewServer(Desk(plan_path))
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
+    thread.start()
+    yield Visitor(server)
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def test_only_the_printed_address_opens(visitor: Visitor) -> None:
+    token = visitor.server.guard.token
+    assert visitor.ask("GET", "/")[0] == 403
+    assert visitor.ask("GET", "/?token=guess")[0] == 403
+    assert visitor.ask("GET", f"/?token={token}", Host="evil.example")[0] == 403
+    status, headers, _ = visitor.ask("GET", f"/?token={token}")
+    assert (status, headers["Location"]) == (303, "/")
+    assert "HttpOnly" in headers["Set-Cookie"]
+    assert "SameSite=Strict" in headers["Set-Cookie"]
+    status, headers, body = visitor.ask("GET", "/", Cookie=visitor.cookie)
+    assert status == 200
+    assert b"<title>geofield review" in body
+    assert headers["Content-Security-Policy"].startswith("default-src 'self'")
+
+
+def test_strangers_change_nothing(visitor: Visitor) -> None:
+    edit = {"do": "status", "no": 3, "status": "rejected"}
+    visitor.post("/api/take", {})
+    before = visitor.server.desk.session.step
+    # A name that was pointed at this machine, another site's page, no cookie, no key, wrong key.
+    for wrong in (
+        {"Host": "evil.example"},
+        {"Host": f"evil.example:{visitor.server.server_port}"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Cookie": ""},
+        {"X_Geofield_Token": ""},
+        {"X_Geofield_Token": "guess"},
+        {"X_Geofield_Token": "ü"},
+    ):
+        headers = {k: v.encode("utf-8").decode("latin-1") for k, v in wrong.items()}
+        assert visitor.post("/api/edit", edit, **headers)[0] == 403, wrong
+    assert visitor.server.desk.session.step is before
+    assert visitor.post("/api/edit", edit)[0] == 200
+    assert visitor.server.desk.session.step is not before
+
+
+def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
+    visitor.post("/api/take", {})
+    assert visitor.post("/api/edit", b"[1, 2]")[0] == 400
+    assert visitor.post("/api/edit", b"\xff{")[0] == 400
+    assert visitor.post("/api/edit", b"[" * 100_000)[0] == 400
+    assert visitor.post("/api/nothing", {})[0] == 404
+    assert visitor.post("/api/edit", {}, Content_Length=str(MOST_BYTES + 1))[0] == 413
+    assert visitor.post("/api/edit", {}, Content_Length="-1")[0] == 413
+    status, answer = visitor.post("/api/edit", {"do": "status", "no": 77, "status": "rejected"})
+    assert (status, answer["message"]) == (422, "There is no obstacle 77.")
+    for path in ("/../desk.py", "/%2e%2e/desk.py", "/vendor/../../desk.py", "/etc/passwd", "//x/"):
+        assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404
+    for path in ("/tile/colour/99/0/0", "/tile/colour/0/-1/0", "/tile/colour/0/0/9", "/tile/x"):
+        assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404
+
+
+def test_a_second_tab_is_told(visitor: Visitor) -> None:
+    edit = {"do": "status", "no": 3, "status": "rejected"}
+    assert visitor.post("/api/take", {})[1] == {"yours": True}
+    assert visitor.post("/api/take", {}, X_Geofield_Tab="two")[1] == {"yours": False}
+    status, answer = visitor.post("/api/edit", edit, X_Geofield_Tab="two")
+    assert (status, answer["message"]) == (422, "Another tab is editing this plan.")
+    assert visitor.post("/api/take", {"force": True}, X_Geofield_Tab="two")[1] == {"yours": True}
+    assert visitor.post("/api/edit", edit, X_Geofield_Tab="two")[0] == 200
+    assert visitor.post("/api/edit", edit)[0] == 422
+
+
+def test_tiles_are_the_pictures_own_pixels(plan_path: Path) -> None:
+    scene = plan_path.with_name("scene.tif")
+    with rasterio.open(scene) as data:
+        pixels, crs = np.moveaxis(data.read([1, 2, 3]), 0, -1), data.crs
+    picture = TiledPicture.open(scene, Desk(plan_path).session.plan.field.crs)
+    assert picture.direct
+    assert picture.resolutions_m[-1] == pytest.approx(0.6)
+    data, kind = picture.tile(len(picture.resolutions_m) - 1, 0, 0, "colour")
+    # 480 px of picture in a tile of 512: what is not picture is transparent.
+    assert kind == "image/png"
+    shown = np.asarray(Image.open(io.BytesIO(data)))
+    assert shown.shape == (TILE_PX, TILE_PX, 4)
+    np.testing.assert_array_equal(shown[:480, :480, :3], pixels)
+    assert (shown[:480, :480, 3] == 255).all()
+    assert not shown[480:, :, 3].any()
+    assert crs is not None
+
+
+def test_a_picture_in_another_crs_lies_in_the_same_place(plan_path: Path, tmp_path: Path) -> None:
+    """Warped to Web Mercator and shown in the plan's zone, it covers the original."""
+    plain = plan_path.with_name("scene.tif")
+    other = tmp_path / "mercator.tif"
+    with rasterio.open(plain) as data:
+        made, width, height = calculate_default_transform(
+            data.crs, "EPSG:3857", data.width, data.height, *data.bounds
+        )
+        profile = {**data.profile, "crs": "EPSG:3857", "transform": made}
+        profile |= {"width": width, "height": height, "driver": "GTiff", "nodata": 0}
+        with rasterio.open(other, "w", **profile) as out:
+            for band in range(1, data.count + 1):
+                target = np.zeros((height, width), np.uint8)
+                reproject(
+                    data.read(band),
+                    target,
+                    src_transform=data.transform,
+                    src_crs=data.crs,
+                    dst_transform=made,
+                    dst_crs="EPSG:3857",
+                    resampling=Resampling.cubic,
+                )
+                out.write(target, band)
+    crs = Desk(plan_path).session.plan.field.crs
+    here, there = TiledPicture.open(plain, crs), TiledPicture.open(other, crs)
+    assert not there.direct
+    assert there.resolutions_m[-1] == pytest.approx(0.6, rel=0.01)
+    tile, _ = there.tile(len(there.resolutions_m) - 1, 0, 0, "colour")
+    shown = np.asarray(Image.open(io.BytesIO(tile)).convert("RGB"))[100:400, 100:400].astype(float)
+    tile, _ = here.tile(len(here.resolutions_m) - 1, 0, 0, "colour")
+    own = np.asarray(Image.open(io.BytesIO(tile)).convert("RGB")).astype(float)
+    # The corner and the pixel size differ a little: find the shift that fits best.
+    left = (there.bounds[0] - here.bounds[0]) / 0.6
+    top = (here.bounds[3] - there.bounds[3]) / 0.6
+    scale = there.resolutions_m[-1] / 0.6
+    at = np.arange(100, 400)
+    columns = np.rint(left + (at + 0.5) * scale - 0.5).astype(int)
+    rows = np.rint(top + (at + 0.5) * scale - 0.5).astype(int)
+    error = np.abs(shown - own[np.ix_(rows, columns)]).mean()
+    shifted = np.abs(shown - own[np.ix_(rows + 2, columns)]).mean()
+    assert error < 4.0
+    assert error < 0.6 * shifted

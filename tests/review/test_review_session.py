@@ -1,0 +1,179 @@
+"""Edits of a plan, undo and redo, and the journal that survives a kill."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.errors import GeofieldError
+from geofield.plan import Plan, read_plan
+from geofield.review import Session, apply_command
+from geofield.review.desk import ChangedError, Desk
+from geofield.review.journal import journal_path
+
+
+@pytest.fixture
+def plan(plan_path: Path) -> Plan:
+    return read_plan(plan_path)
+
+
+def row(plan: Plan, number: int):
+    assert plan.obstacles is not None
+    return plan.obstacles.set_index("obstacle_no").loc[number]
+
+
+def test_a_rejected_obstacle_gives_its_track_back(plan: Plan) -> None:
+    session = Session(plan)
+    assert plan.tracks is not None
+    before = plan.tracks.statistics
+    lost = {loss.obstacle_no: loss.length_m for loss in before.losses}[8]
+    session.do({"do": "status", "no": 8, "status": "rejected"})
+    after = session.plan.tracks.statistics  # type: ignore[union-attr]
+    assert after.length_m > before.length_m + 0.9 * lost > before.length_m
+    assert row(session.plan, 8)["status"] == "rejected"
+    session.undo()
+    assert session.plan.tracks.statistics.length_m == before.length_m  # type: ignore[union-attr]
+    session.redo()
+    assert session.plan.tracks.statistics.length_m == after.length_m  # type: ignore[union-attr]
+
+
+def test_a_moved_obstacle_stands_where_it_was_put(plan: Plan) -> None:
+    old = row(plan, 8)
+    moved = row(apply_command(plan, {"do": "move", "no": 8, "dx_m": 3.0, "dy_m": -2.0}), 8)
+    shift = np.subtract(moved.geometry.centroid.coords[0], old.geometry.centroid.coords[0])
+    assert shift == pytest.approx([3.0, -2.0], abs=1e-6)
+    assert moved["status"] == "confirmed"
+    # The columns say the same place.
+    assert plan.grid is not None
+    assert moved["x_px"] - old["x_px"] == pytest.approx(3.0 / 0.6, abs=0.01)
+    assert moved["lon"] > old["lon"]
+    assert moved["lat"] < old["lat"]
+
+
+def test_another_radius_grows_the_circle_and_its_margin_stays(plan: Plan) -> None:
+    old = row(plan, 8)
+    new = row(apply_command(plan, {"do": "radius", "no": 8, "radius_m": 7.0}), 8)
+    assert new["radius_m"] == 7.0
+    assert new["buffer_m"] == old["buffer_m"]
+    assert new.geometry.area == pytest.approx(np.pi * (7.0 + old["buffer_m"]) ** 2, rel=0.005)
+    assert new["radius_px"] / old["radius_px"] == pytest.approx(7.0 / old["radius_m"])
+
+
+def test_what_a_person_draws_is_driven_around(plan: Plan) -> None:
+    session = Session(plan)
+    x, y = plan.field.polygon.representative_point().coords[0]
+    session.do({"do": "circle", "x": x, "y": y, "radius_m": 5.0})
+    session.do({"do": "polygon", "ring": [[x + 20, y], [x + 30, y], [x + 30, y + 8]]})
+    after = session.plan
+    assert after.obstacles is not None
+    added = after.obstacles[after.obstacles["status"] == "added"]
+    assert list(added["kind"]) == ["tree", "other"]
+    assert after.tracks is not None
+    drive = shapely.union_all(after.tracks.segments.geometry.to_numpy())
+    assert drive.distance(shapely.Point(x, y)) >= 5.99
+    for shape in added.geometry:
+        assert drive.intersection(shape.buffer(-0.01)).length == 0
+
+
+def test_deleting_forgets_what_a_person_drew_and_rejects_what_was_found(plan: Plan) -> None:
+    x, y = plan.field.polygon.representative_point().coords[0]
+    drawn = apply_command(plan, {"do": "circle", "x": x, "y": y, "radius_m": 3.0})
+    assert drawn.obstacles is not None
+    assert plan.obstacles is not None
+    number = int(drawn.obstacles["obstacle_no"].max())
+    gone = apply_command(drawn, {"do": "delete", "no": number})
+    assert len(gone.obstacles) == len(plan.obstacles)  # type: ignore[arg-type]
+    assert row(apply_command(plan, {"do": "delete", "no": 8}), 8)["status"] == "rejected"
+
+
+def test_tracks_turn_with_a_dragged_line(plan: Plan) -> None:
+    session = Session(plan)
+    x, y = plan.field.polygon.representative_point().coords[0]
+    session.do({"do": "direction", "a": [x, y], "b": [x + 50, y + 50]})
+    assert session.plan.tracks is not None
+    # North of the grid is not true north there, by less than two degrees.
+    assert session.plan.tracks.heading_deg == pytest.approx(45.0, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ({"do": "dance"}, "no edit"),
+        ({"do": "status", "no": 999, "status": "rejected"}, "no obstacle 999"),
+        ({"do": "status", "no": 8, "status": "maybe"}, "no status"),
+        ({"do": "status", "status": "rejected"}, "needs a value"),
+        ({"do": "circle", "x": 0, "y": 0, "radius_m": 4}, "outside the picture"),
+        ({"do": "radius", "no": 8, "radius_m": -1}, "outside 0.1 to 200"),
+        ({"do": "radius", "no": 8, "radius_m": "wide"}, "not a number"),
+        ({"do": "outline", "rings": [[[0, 0], [10, 10], [10, 0], [0, 10]]]}, "crosses itself"),
+        ({"do": "outline", "rings": [[[0, 0], [10, 10]]]}, "three corners"),
+        ({"do": "outline", "rings": "all"}, "no ring"),
+        ({"do": "tracks", "settings": {"spacing_m": -2}}, "spacing_m"),
+        ({"do": "tracks", "settings": {"spacing_m": 5000}}, "larger than the field"),
+        ({"do": "tracks", "settings": {"colour": "red"}}, "no setting"),
+    ],
+)
+def test_bad_edits_are_refused_in_words_and_change_nothing(
+    plan: Plan, command: dict[str, object], words: str
+) -> None:
+    session = Session(plan)
+    before = session.step
+    with pytest.raises(GeofieldError, match=words):
+        session.do(command)
+    assert session.step is before
+
+
+def test_edits_come_back_after_a_kill(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.edit({"do": "move", "no": 8, "dx_m": 1.0, "dy_m": 0.0})
+    desk.edit({"do": "status", "no": 4, "status": "confirmed"})
+    desk.edit({"do": "undo"})
+    # The process dies while it writes a line.
+    with journal_path(plan_path).open("a", encoding="utf-8") as file:
+        file.write('{"do": "sta')
+    again = Desk(plan_path)
+    assert again.brought_back == "4 edits of a session that ended without saving were brought back."
+    assert again.session.plan == desk.session.plan
+    again.save()
+    assert not journal_path(plan_path).exists()
+    assert Desk(plan_path).brought_back is None
+    saved = read_plan(plan_path)
+    assert row(saved, 3)["status"] == "rejected"
+    assert row(saved, 4)["status"] == "detected"
+    assert row(saved, 8)["status"] == "confirmed"
+
+
+def test_edits_of_another_version_of_the_file_are_kept_aside(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    lines = journal_path(plan_path).read_text().splitlines()
+    journal_path(plan_path).write_text(
+        "\n".join([json.dumps({"sha256": "another"}), *lines[1:]]) + "\n"
+    )
+    again = Desk(plan_path)
+    assert "kept in field.gpkg.review.jsonl.1" in str(again.brought_back)
+    assert '"no": 3' in plan_path.with_name("field.gpkg.review.jsonl.1").read_text()
+    assert row(again.session.plan, 3)["status"] == "detected"
+
+
+def test_a_file_that_another_program_changed_is_not_overwritten(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    other = Desk(plan_path)
+    other.session.do({"do": "status", "no": 5, "status": "confirmed"})
+    other.save()
+    with pytest.raises(ChangedError, match="Another program changed"):
+        desk.save()
+    assert row(read_plan(plan_path), 5)["status"] == "confirmed"
+    assert desk.save("mine")["saved_as"] == "mine.gpkg"
+    assert row(read_plan(plan_path.with_name("mine.gpkg")), 3)["status"] == "rejected"
+    for name in ("../up", "a/b", "", ".hidden"):
+        with pytest.raises(GeofieldError, match="no plain file name"):
+            desk.save(name)
+    with pytest.raises(GeofieldError, match="there already"):
+        desk.save("mine")
