@@ -9,7 +9,9 @@ import xml.etree.ElementTree as ET
 import fiona
 import geojson_validator
 import geopandas as gpd
+import geoparquet_validator
 import numpy as np
+import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import shapely
@@ -199,3 +201,40 @@ def test_shapefile_by_fiona(folder):
         ring = row.geometry.coordinates[0]
         assert not shapely.is_ccw(shapely.LinearRing(ring))  # clockwise outside
     assert (folder / "shapefile" / "boundary.cpg").read_text().strip() == "UTF-8"
+
+
+@pytest.mark.filterwarnings("ignore:The inplace keyword")  # dask's own
+@pytest.mark.parametrize("layer", LAYERS)
+def test_dask_and_a_validator_read_geoparquet(folder, plan, layer):
+    import dask_geopandas
+
+    path = folder / "geoparquet" / f"{layer}.parquet"
+    ours = plan.table(layer)
+    theirs = dask_geopandas.read_parquet(path)
+    assert theirs.crs.to_epsg() == 32636
+    # Read without computing: the partitions' extents stand in the metadata.
+    extent = theirs.spatial_partitions.total_bounds
+    np.testing.assert_allclose(extent, ours.total_bounds, rtol=0, atol=1e-9)
+    mine = shapely.normalize(np.asarray(ours.geometry.to_numpy(), dtype=object))
+    shapes = shapely.normalize(np.asarray(theirs.compute().geometry.to_numpy(), dtype=object))
+    assert shapely.equals_exact(mine, shapes, 0).all()
+    report = geoparquet_validator.check(str(path))
+    assert geoparquet_validator.failed(report) == []
+    passed = [each["id"] for each in report["outcomes"] if each["status"] == "pass"]
+    assert "/conf/core/geo-metadata" in passed
+
+
+def test_fiboa_as_its_own_validator_reads_it(folder):
+    # It asks the Arrow schema for the metadata, wants id, collection and geometry never missing,
+    # and everything else, a box included, optional.
+    path = folder / "fiboa" / "field.parquet"
+    found = pq.read_schema(path)
+    schemas = json.loads(found.metadata[b"collection"])["schemas"]["geofield"]
+    assert any(each.startswith("https://fiboa.org/specification/") for each in schemas)
+    assert json.loads(found.metadata[b"geo"])["primary_column"] == "geometry"
+    needed = [field.name for field in found if not field.nullable]
+    assert needed == ["id", "collection", "geometry"]
+    assert found.field("metrics:area").type == "float"
+    assert str(found.field("determination:datetime").type) == "timestamp[ms, tz=UTC]"
+    report = geoparquet_validator.check(str(path))
+    assert geoparquet_validator.failed(report, "core") == []

@@ -111,4 +111,7 @@ def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
     data[GEOMETRY] = shapely.to_wkb(shapes, flavor="iso")
     table = pa.table(data, schema=fields)
     collection = json.dumps({"schemas": {COLLECTION: list(SCHEMAS)}})
-    write_geoparquet(path, iter([table]), fields, LONLAT, "Polygon", {"collection": collection})
+    # GeoParquet wants boxes as obligatory as the geometry, fiboa wants them optional.
+    write_geoparquet(
+        path, [table], fields, LONLAT, "Polygon", {"collection": collection}, covering=False
+    )

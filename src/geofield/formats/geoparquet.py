@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 GEOMETRY = "geometry"
 _ORIGIN_KEY = "geofield"
+_SIDES = ("xmin", "ymin", "xmax", "ymax")
 
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
@@ -61,6 +62,8 @@ def write_geoparquet(
     crs: CRS,
     geometry_type: str,
     metadata: Mapping[str, str],
+    *,
+    covering: bool = True,
 ) -> None:
     """Write Arrow tables with a WKB column `geometry` as one GeoParquet 1.1 file.
 
@@ -76,6 +79,8 @@ def write_geoparquet(
         Of all geometries.
     metadata : mapping
         Further key-value metadata.
+    covering : bool
+        Whether each row gets its bounding box, by which readers skip rows.
     """
     import pyarrow.parquet as pq
 
@@ -84,10 +89,12 @@ def write_geoparquet(
     stream = iter(tables)
     table = next(stream, fallback.empty_table())
     while table is not None:
-        table, box = _with_boxes(table)
+        table, box = _with_boxes(table, covering=covering)
         boxes.append(box)
         if writer is None:
-            writer = pq.ParquetWriter(path, table.schema, compression="zstd")
+            # Readers look for metadata in the Arrow schema where there is one; what is added
+            # when the last rows are in stands beside it, where only some of them look.
+            writer = pq.ParquetWriter(path, table.schema, compression="zstd", store_schema=False)
         writer.write_table(table)
         table = next(stream, None)
     column: dict[str, Any] = {
@@ -95,8 +102,9 @@ def write_geoparquet(
         "crs": crs.to_json_dict(),
         "geometry_types": [geometry_type],
         "orientation": "counterclockwise",
-        "covering": {"bbox": {side: ["bbox", side] for side in ("xmin", "ymin", "xmax", "ymax")}},
     }
+    if covering:
+        column["covering"] = {"bbox": {side: ["bbox", side] for side in _SIDES}}
     known = np.array([box for box in boxes if box is not None])
     if len(known):
         column["bbox"] = [
@@ -110,16 +118,21 @@ def write_geoparquet(
         writer.add_key_value_metadata({"geo": json.dumps(geo), **metadata})
 
 
-def _with_boxes(table: pa.Table) -> tuple[pa.Table, Any]:
+def _with_boxes(table: pa.Table, *, covering: bool) -> tuple[pa.Table, Any]:
+    """The table with a column of boxes, where wanted, and the box of all rows."""
     import pyarrow as pa
 
     shapes = shapely.from_wkb(table[GEOMETRY].to_numpy())
+    total = shapely.total_bounds(shapes) if len(shapes) else None
+    if not covering:
+        return table, total
     bounds = shapely.bounds(shapes).reshape(-1, 4)
     box = pa.StructArray.from_arrays(
-        [pa.array(bounds[:, side]) for side in range(4)], names=["xmin", "ymin", "xmax", "ymax"]
+        [pa.array(bounds[:, side]) for side in range(4)], names=list(_SIDES)
     )
-    total = shapely.total_bounds(shapes) if len(shapes) else None
-    return table.append_column("bbox", box), total
+    # As optional as the geometry it covers.
+    field = pa.field("bbox", box.type, nullable=table.schema.field(GEOMETRY).nullable)
+    return table.append_column(field, box), total
 
 
 def read(path: Path) -> Dataset:
