@@ -16,8 +16,8 @@ import rasterio
 from PIL import Image
 from rasterio.warp import Resampling, calculate_default_transform, reproject
 
+from geofield.imagery.display import TILE_PX, TiledPicture
 from geofield.review.desk import Desk
-from geofield.review.picture import TILE_PX, TiledPicture
 from geofield.review.server import MOST_BYTES, ReviewServer
 
 
@@ -111,7 +111,13 @@ def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
     assert visitor.post("/api/edit", {}, Content_Length="-1")[0] == 413
     status, answer = visitor.post("/api/edit", {"do": "status", "no": 77, "status": "rejected"})
     assert (status, answer["message"]) == (422, "There is no obstacle 77.")
-    for path in ("/../desk.py", "/%2e%2e/desk.py", "/vendor/../../desk.py", "/etc/passwd", "//x/"):
+    for path in (
+        "/../desk.py",
+        "/%2e%2e/desk.py",
+        "/web/vendor/../../desk.py",
+        "/etc/passwd",
+        "//x/",
+    ):
         assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404
     for path in ("/tile/colour/99/0/0", "/tile/colour/0/-1/0", "/tile/colour/0/0/9", "/tile/x"):
         assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404

@@ -252,4 +252,13 @@ CATALOGUE: tuple[Format, ...] = (
             Drop("the confidence of obstacles", "obstacles.confidence"),
         ),
     ),
+    Format(
+        "html",
+        "Web page in one file",
+        ("{stem}.html",),
+        ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns"),
+        "geofield.web.html:write",
+        drops=(Drop("settings and evidence", "provenance"),),
+        crs="metric",
+    ),
 )

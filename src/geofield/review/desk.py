@@ -12,30 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from geofield.errors import FormatError, GeofieldError
+from geofield.imagery.display import TiledPicture
 from geofield.plan import Plan, read_plan
 from geofield.review.commands import Command
 from geofield.review.journal import Journal, fingerprint, play
-from geofield.review.picture import TiledPicture
 from geofield.review.session import Session
-from geofield.review.view import place_table, state_of, tracks_of
+from geofield.review.shown import state_of, tracks_of
 from geofield.staging import refuse_locked
-
-THEME = {
-    "outline": "#ffd54f",
-    "doubt": "#ff8f00",
-    "track": "#ffffff",
-    "gap": "#ff80ab",
-    "headland": "#80deea",
-    "turn": "#b39ddb",
-    "unfit": "#ff1744",
-    "status": {
-        "detected": {"color": "#ff7043", "dash": None},
-        "possible": {"color": "#ffca28", "dash": [2, 6]},
-        "confirmed": {"color": "#66bb6a", "dash": None},
-        "added": {"color": "#42a5f5", "dash": None},
-        "rejected": {"color": "#bdbdbd", "dash": [6, 6]},
-    },
-}
+from geofield.theme import web_theme
+from geofield.web.view import ground_scale, margin_bounds, place_table
 
 
 class ChangedError(FormatError):
@@ -84,10 +69,10 @@ class Desk:
                 "file": self.path.name,
                 "brought_back": self.brought_back,
                 "bounds": bounds,
-                "places": place_table(plan, bounds),
+                "places": place_table(plan.field.crs, bounds),
                 "picture": self._picture_facts(),
-                "scale": ground_scale(plan),
-                "theme": THEME,
+                "scale": ground_scale(plan.field.polygon, plan.field.crs),
+                "theme": web_theme(),
                 "formats": _formats(),
             }
 
@@ -184,11 +169,7 @@ class Desk:
         return place
 
     def _bounds(self, plan: Plan) -> tuple[float, float, float, float]:
-        if self.picture is not None:
-            return self.picture.bounds
-        left, bottom, right, top = plan.field.polygon.bounds
-        margin = 0.1 * max(right - left, top - bottom)
-        return left - margin, bottom - margin, right + margin, top + margin
+        return margin_bounds(plan.field.polygon) if self.picture is None else self.picture.bounds
 
     def _picture_facts(self) -> Mapping[str, Any] | None:
         picture = self.picture
@@ -208,15 +189,6 @@ def _formats() -> list[tuple[str, str]]:
     from geofield.formats import FORMATS
 
     return [(one.name, one.title) for one in FORMATS.values()]
-
-
-def ground_scale(plan: Plan) -> float:
-    """True metres on the ground per metre of the metric CRS, at the field's middle."""
-    from pyproj import Proj
-
-    middle = plan.field.polygon_lonlat.representative_point()
-    factors = Proj(plan.field.crs).get_factors(middle.x, middle.y)
-    return 1.0 / float(factors.meridional_scale)
 
 
 def picture_beside(path: Path) -> Path | None:

@@ -62,9 +62,11 @@ class ReviewServer(ThreadingHTTPServer):
 
 def _page_files() -> dict[str, tuple[bytes, str]]:
     """All files of the page by their address: no path from a request is ever opened."""
-    root = resources.files("geofield.review") / "page"
     found: dict[str, tuple[bytes, str]] = {}
-    folders = [("", root)]
+    folders = [
+        ("", resources.files("geofield.review") / "page"),
+        ("web/", resources.files("geofield.web")),
+    ]
     while folders:
         prefix, folder = folders.pop()
         for entry in folder.iterdir():

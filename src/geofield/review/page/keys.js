@@ -1,6 +1,6 @@
 // The keys that map editors and labelling tools taught people.
 
-import {t} from "./words.js";
+import {t} from "./web/words.js";
 
 const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],

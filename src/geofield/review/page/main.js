@@ -3,8 +3,9 @@
 import * as api from "./api.js";
 import * as maps from "./map.js";
 import * as tools from "./tools.js";
+import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
-import {currentLanguage, label, number, setLanguage, t} from "./words.js";
+import {currentLanguage, label, number, setLanguage, t} from "./web/words.js";
 
 const $ = id => document.getElementById(id);
 let state, chosen = null, ended = false;
@@ -199,7 +200,7 @@ function words() {
   label();
   toolButtons();
   keyTable($("key-table"));
-  $("legend").replaceChildren(...maps.legend());
+  $("legend").replaceChildren(...legend());
 }
 
 async function start() {

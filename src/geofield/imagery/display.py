@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pyproj import CRS
 from rasterio.enums import Resampling
+from rasterio.transform import from_bounds
 from rasterio.warp import reproject, transform_bounds
 
 from geofield.errors import ImageryError
@@ -28,6 +30,7 @@ from geofield.imagery.gdal import to_rasterio
 from geofield.model.scene import Scene
 
 TILE_PX = 512
+_Part = tuple[NDArray[np.uint8], Sequence[str], NDArray[np.bool_]]
 Show = Literal["colour", "infrared"]
 
 
@@ -121,14 +124,44 @@ class TiledPicture:
         if not (0 <= column < (right - left) / size_m and 0 <= row < (top - bottom) / size_m):
             raise ImageryError(f"The picture has no tile {column}, {row} at level {level}.")
         corner = (left + column * size_m, top - row * size_m)
-        bands, valid = (
+        bands, roles, valid = (
             self._cut(level, column, row)
             if self.direct
             else self._warped(corner, self.resolutions_m[level])
         )
-        return _encoded(_shown(bands, self.reader.roles, show), valid)
+        return _encoded(_shown(bands, roles, show), valid)
 
-    def _cut(self, level: int, column: int, row: int) -> tuple[Any, NDArray[np.bool_]]:
+    def whole(self, long_side_px: int) -> tuple[bytes, str]:
+        """All of the picture as one image file over :attr:`bounds`.
+
+        Parameters
+        ----------
+        long_side_px : int
+            At most; a smaller picture keeps its own pixels.
+        """
+        left, bottom, right, top = self.bounds
+        own = self.resolutions_m[-1]
+        resolution_m = max(own, max(right - left, top - bottom) / long_side_px)
+        shape = (
+            max(1, round((top - bottom) / resolution_m)),
+            max(1, round((right - left) / resolution_m)),
+        )
+        grid = self.reader.grid
+        coarse = max(1.0, resolution_m / own)
+        part = self.reader.read(
+            shape_px=(max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse))),
+            scaling=self.limits,
+        )
+        bands, valid = _reprojected(
+            part, from_bounds(left, bottom, right, top, shape[1], shape[0]), shape, self.crs
+        )
+        buffer = io.BytesIO()
+        alpha = valid.astype(np.uint8)[..., None] * np.uint8(255)
+        pixels = np.concatenate([_shown(bands, part.roles, "colour"), alpha], axis=-1)
+        Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
+        return buffer.getvalue(), "image/webp"
+
+    def _cut(self, level: int, column: int, row: int) -> _Part:
         step = 2 ** (len(self.resolutions_m) - 1 - level)
         grid = self.reader.grid
         c0, r0 = column * TILE_PX * step, row * TILE_PX * step
@@ -138,33 +171,20 @@ class TiledPicture:
         )
         shape = (max(1, round(height / step)), max(1, round(width / step)))
         part = self.reader.read((c0, r0, width, height), shape_px=shape, scaling=self.limits)
-        return part, _padded(part.valid)
+        return np.stack([_padded(band) for band in part.bands]), part.roles, _padded(part.valid)
 
-    def _warped(
-        self, corner: tuple[float, float], resolution_m: float
-    ) -> tuple[Any, NDArray[np.bool_]]:
+    def _warped(self, corner: tuple[float, float], resolution_m: float) -> _Part:
         target = Affine(resolution_m, 0, corner[0], 0, -resolution_m, corner[1])
         size_m = TILE_PX * resolution_m
         window = self._window(corner, size_m)
         if window is None:
-            empty = np.zeros((TILE_PX, TILE_PX), bool)
-            return None, empty
+            nothing = np.zeros((1, TILE_PX, TILE_PX), np.uint8)
+            return nothing, ("grey",), nothing[0] > 0
         step = max(1.0, resolution_m / self.reader.grid.ground_resolution_m)
         shape = (max(1, round(window[3] / step)), max(1, round(window[2] / step)))
         part = self.reader.read(window, shape_px=shape, scaling=self.limits)
-        count = len(part.bands)
-        source = np.concatenate([part.bands, part.valid[None].astype(np.uint8) * 255])
-        made = np.zeros((count + 1, TILE_PX, TILE_PX), np.uint8)
-        reproject(
-            source,
-            made,
-            src_transform=part.grid.transform,
-            src_crs=to_rasterio(part.grid.crs),
-            dst_transform=target,
-            dst_crs=to_rasterio(self.crs),
-            resampling=Resampling.bilinear,
-        )
-        return (made[:count], part.roles), made[count] > 127
+        bands, valid = _reprojected(part, target, (TILE_PX, TILE_PX), self.crs)
+        return bands, part.roles, valid
 
     def _window(
         self, corner: tuple[float, float], size_m: float
@@ -181,17 +201,32 @@ class TiledPicture:
         return None if c1 <= c0 or r1 <= r0 else (c0, r0, c1 - c0, r1 - r0)
 
 
-def _shown(part: Any, roles: Any, show: Show) -> NDArray[np.uint8]:
+def _reprojected(
+    part: Scene, target: Affine, shape: tuple[int, int], crs: CRS
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """A scene's bands on another grid, and where they hold data."""
+    source = np.concatenate([part.bands, part.valid[None].astype(np.uint8) * 255])
+    made = np.zeros((len(source), *shape), np.uint8)
+    reproject(
+        source,
+        made,
+        src_transform=part.grid.transform,
+        src_crs=to_rasterio(part.grid.crs),
+        dst_transform=target,
+        dst_crs=to_rasterio(crs),
+        resampling=Resampling.bilinear,
+    )
+    return made[:-1], made[-1] > 127
+
+
+def _shown(bands: NDArray[np.uint8], roles: Sequence[str], show: Show) -> NDArray[np.uint8]:
     """Three bands (rows, columns, 3): colour, or near infrared shown as red."""
-    if part is None:
-        return np.zeros((TILE_PX, TILE_PX, 3), np.uint8)
-    bands, names = (part.bands, part.roles) if isinstance(part, Scene) else part
-    by_name = dict(zip(names, bands, strict=True))
+    by_name = dict(zip(roles, bands, strict=True))
     grey = by_name.get("grey", bands[0])
     colour = [by_name.get(name, grey) for name in ("red", "green", "blue")]
     if show == "infrared" and "nir" in by_name:
         colour = [by_name["nir"], colour[0], colour[1]]
-    return np.stack([_padded(band) for band in colour], axis=-1)
+    return np.stack(colour, axis=-1)
 
 
 def _padded(band: NDArray[Any]) -> NDArray[Any]:

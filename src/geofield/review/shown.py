@@ -1,0 +1,49 @@
+"""A session as the page sees it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from geofield.settings import Settings
+from geofield.web.view import obstacles_view, outline_view, tracks_view
+
+if TYPE_CHECKING:
+    from geofield.plan import Plan
+    from geofield.review.session import Session
+
+
+def state_of(session: Session) -> dict[str, Any]:
+    """All that the page shows of a session and that an edit may change."""
+    plan = session.plan
+    return {
+        **tracks_of(plan, session.step.notes),
+        "name": plan.field.name,
+        "field_id": plan.field.field_id,
+        "crs": plan.field.crs.name,
+        "field": field_of(plan),
+        "obstacles": obstacles_view(plan.obstacles, plan.tracks),
+        "settings": (plan.settings or Settings()).tracks.model_dump(mode="json"),
+        "edited": session.edited,
+        "can_undo": session.can_undo,
+        "can_redo": session.can_redo,
+    }
+
+
+def tracks_of(plan: Plan, notes: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Tracks and figures: what changes while a person drags."""
+    return tracks_view(plan.tracks, plan.field.area_ha, notes)
+
+
+def field_of(plan: Plan) -> dict[str, Any]:
+    """The outline; what a person drew is in no doubt."""
+    field = plan.field
+    drawn = plan.outline_edited or field.method in ("drawn", "boundary")
+    quality = None if drawn else field.quality
+    return outline_view(
+        field.polygon,
+        field.crs,
+        plan.grid,
+        method="drawn" if drawn else field.method,
+        certainty=None if quality is None else quality.score,
+        doubts=() if quality is None else quality.reasons,
+    )

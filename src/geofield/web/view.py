@@ -1,0 +1,187 @@
+"""Field, obstacles and tracks as a page sees them: plain JSON values.
+
+Coordinates are in the metric CRS of the plan, rounded to millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS, Proj
+
+from geofield.crs import LONLAT, transformer
+from geofield.grid import Grid
+from geofield.tracks.direction import picture_frame
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from geofield.model.tracks import Tracks
+
+#: An outline this near to the picture's frame goes on outside, pixels.
+_FRAME_PX = 1.5
+_DIGITS = 3
+
+
+def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """Tracks, gaps, turns and figures: what changes while a person edits.
+
+    Parameters
+    ----------
+    tracks : Tracks or None
+    area_ha : float
+        Of the field.
+    notes : sequence of str
+        Told beside the tracks' own.
+    """
+    if tracks is None:
+        return {"tracks": [], "gaps": [], "headland": [], "route": [], "figures": {}, "notes": []}
+    numbers = tracks.segments["track_no"].to_numpy(dtype=np.int64).tolist()
+    gaps, around, turns = tracks.gaps, tracks.headland_tracks, tracks.turns
+    return {
+        "tracks": [[no, *end] for no, end in zip(numbers, _ends(tracks.segments), strict=True)],
+        "gaps": [
+            [*end, "" if cause is None else str(cause)]
+            for end, cause in zip(_ends(gaps), gaps["cause"], strict=True)
+        ],
+        "headland": [] if around is None else _lines(around.geometry.to_numpy()),
+        "route": []
+        if turns is None
+        else [
+            {"line": line, "fits": fits != "no"}
+            for line, fits in zip(_lines(turns.geometry.to_numpy()), turns["fits"], strict=True)
+        ],
+        "figures": _figures(tracks, area_ha),
+        "notes": [*tracks.notes, *notes],
+    }
+
+
+def outline_view(
+    polygon: shapely.Polygon,
+    crs: CRS,
+    grid: Grid | None,
+    *,
+    method: str,
+    certainty: float | None,
+    doubts: Sequence[str],
+) -> dict[str, Any]:
+    """The outline, its doubts in words, and where it runs along the picture's frame."""
+    rings = _lines([polygon.exterior, *polygon.interiors])
+    return {
+        "rings": [ring[:-1] for ring in rings],
+        "method": method,
+        "certainty": _number(certainty),
+        "doubts": list(doubts),
+        "frame": _along_frame(polygon, crs, grid),
+    }
+
+
+def obstacles_view(
+    obstacles: gpd.GeoDataFrame | None, tracks: Tracks | None
+) -> list[dict[str, Any]]:
+    """Every obstacle with its shape, what is known of it and what it costs."""
+    if obstacles is None:
+        return []
+    lost = {} if tracks is None else {one.obstacle_no: one.length_m for one in tracks.losses}
+    centres = np.round(
+        shapely.get_coordinates(shapely.centroid(obstacles.geometry.to_numpy())), _DIGITS
+    ).tolist()
+    rows = []
+    for row, centre in zip(obstacles.itertuples(), centres, strict=True):
+        parts = shapely.get_parts(row.geometry)
+        rows.append(
+            {
+                "no": int(row.obstacle_no),
+                "kind": row.kind,
+                "status": row.status,
+                "confidence": _number(row.confidence),
+                "radius_m": _number(row.radius_m),
+                "buffer_m": _number(row.buffer_m),
+                "lost_m": _number(lost.get(int(row.obstacle_no))),
+                "centre": centre,
+                "rings": [
+                    ring[:-1] for part in parts for ring in _lines([part.exterior, *part.interiors])
+                ],
+            }
+        )
+    return rows
+
+
+def place_table(crs: CRS, bounds: tuple[float, float, float, float]) -> dict[str, Any]:
+    """Longitude and latitude on 3 x 3 places of an extent, to interpolate between.
+
+    Over some kilometres a parabola in each direction errs by far less than a millimetre.
+    """
+    x = np.linspace(bounds[0], bounds[2], 3)
+    y = np.linspace(bounds[1], bounds[3], 3)
+    xx, yy = np.meshgrid(x, y)
+    lon, lat = transformer(crs, LONLAT).transform(xx, yy)
+    return {"x": x.tolist(), "y": y.tolist(), "lon": lon.tolist(), "lat": lat.tolist()}
+
+
+def ground_scale(polygon: shapely.Polygon, crs: CRS) -> float:
+    """True metres on the ground per metre of the metric CRS, at the field's middle."""
+    middle = polygon.representative_point()
+    lon, lat = transformer(crs, LONLAT).transform(middle.x, middle.y)
+    return 1.0 / float(Proj(crs).get_factors(lon, lat).meridional_scale)
+
+
+def margin_bounds(polygon: shapely.Polygon) -> tuple[float, float, float, float]:
+    """What to show of a field without a picture: its extent and a tenth around it."""
+    left, bottom, right, top = polygon.bounds
+    margin = 0.1 * max(right - left, top - bottom)
+    return left - margin, bottom - margin, right + margin, top + margin
+
+
+def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:
+    found, turns = tracks.statistics, tracks.turns
+    return {
+        "area_ha": _number(area_ha),
+        "tracks": found.track_count,
+        "segments": found.segment_count,
+        "length_m": _number(found.length_m),
+        "coverage_percent": _number(found.coverage_percent),
+        "overlap_percent": _number(found.overlap_percent),
+        "heading_deg": _number(tracks.heading_deg),
+        "lost_m": _number(sum(loss.length_m for loss in found.losses)),
+        "turns": None if turns is None else len(turns),
+        "turns_that_do_not_fit": None if turns is None else int((turns["fits"] == "no").sum()),
+    }
+
+
+def _along_frame(polygon: shapely.Polygon, crs: CRS, grid: Grid | None) -> list[list[list[float]]]:
+    """The stretches of an outline where the field goes on outside the picture."""
+    if grid is None:
+        return []
+    near_m = _FRAME_PX * grid.ground_resolution_m
+    near = shapely.buffer(picture_frame(grid, crs).exterior, near_m)
+    along = shapely.line_merge(shapely.intersection(polygon.exterior, near))
+    return _lines([line for line in shapely.get_parts(along) if shapely.length(line) > 2 * near_m])
+
+
+def _ends(lines: gpd.GeoDataFrame) -> list[list[float]]:
+    """First and last place of each line: x0, y0, x1, y1."""
+    xy = shapely.get_coordinates(lines.geometry.to_numpy()).reshape(-1, 4)
+    rounded: list[list[float]] = np.round(xy, _DIGITS).tolist()
+    return rounded
+
+
+def _lines(lines: Any) -> list[list[list[float]]]:
+    """The coordinates of each line: lists of x, y."""
+    shapes = np.asarray(lines, dtype=object)
+    xy, row = shapely.get_coordinates(shapes, return_index=True)
+    rounded = np.round(xy, _DIGITS).tolist()
+    ends = np.searchsorted(row, np.arange(len(shapes) + 1))
+    return [rounded[start:end] for start, end in pairwise(ends)]
+
+
+def _number(value: Any) -> float | None:
+    if value is None:
+        return None
+    number = float(value)
+    return round(number, 4) if math.isfinite(number) else None
