@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
     from geofield.settings import Settings
+    from geofield.web.html import PlanPage
 
 SOFTWARE = f"geofield {__version__}"
 
@@ -193,6 +194,25 @@ class Plan:
             timings_s=timings_s,
             inputs=inputs,
         )
+
+    def explore(self, *, height_px: int = 560) -> PlanPage:
+        """The plan as an interactive map in a notebook; works without a network.
+
+        >>> plan.explore()                                           # doctest: +SKIP
+
+        Parameters
+        ----------
+        height_px : int
+            Of the map.
+
+        Returns
+        -------
+        PlanPage
+            Shows itself; `save` writes it as a file that opens in any browser.
+        """
+        from geofield.web.html import PlanPage, document
+
+        return PlanPage(document(self.to_dataset(), self.scene), height_px)
 
     def _field_table(self) -> gpd.GeoDataFrame:
         from geofield.tracks.direction import find_baseline

@@ -25,11 +25,13 @@ from rasterio.transform import from_bounds
 from rasterio.warp import reproject, transform_bounds
 
 from geofield.errors import ImageryError
+from geofield.grid import Grid
 from geofield.imagery import SceneReader
 from geofield.imagery.gdal import to_rasterio
 from geofield.model.scene import Scene
 
 TILE_PX = 512
+Bounds = tuple[float, float, float, float]
 _Part = tuple[NDArray[np.uint8], Sequence[str], NDArray[np.bool_]]
 Show = Literal["colour", "infrared"]
 
@@ -56,22 +58,12 @@ class TiledPicture:
     @cached_property
     def direct(self) -> bool:
         """Whether tiles are cut from the picture without resampling."""
-        transform = self.reader.grid.transform
-        straight = transform.b == 0 and transform.d == 0 and transform.a == -transform.e
-        return bool(straight and self.reader.grid.crs == self.crs)
+        return _direct(self.reader.grid, self.crs)
 
     @cached_property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Bounds:
         """Left, bottom, right, top in the tiles' CRS, metres."""
-        grid = self.reader.grid
-        x, y = grid.to_native([0, grid.width_px, grid.width_px, 0], [0, 0, *[grid.height_px] * 2])
-        left, bottom, right, top = (float(v) for v in (min(x), min(y), max(x), max(y)))
-        if self.direct:
-            return left, bottom, right, top
-        found = transform_bounds(
-            to_rasterio(grid.crs), to_rasterio(self.crs), left, bottom, right, top
-        )
-        return tuple(float(v) for v in found)  # type: ignore[return-value]
+        return _bounds(self.reader.grid, self.crs)
 
     @cached_property
     def resolutions_m(self) -> list[float]:
@@ -89,14 +81,10 @@ class TiledPicture:
     @cached_property
     def limits(self) -> tuple[float, float] | None:
         """File values that become 0 and 255 in every tile."""
-        return self.reader.scaling or self._overview.scaling
-
-    @cached_property
-    def _overview(self) -> Scene:
         grid = self.reader.grid
         coarse = max(1.0, max(grid.shape) / 1024)
         shape = (max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse)))
-        return self.reader.read(shape_px=shape)
+        return self.reader.scaling or self.reader.read(shape_px=shape).scaling
 
     @property
     def has_infrared(self) -> bool:
@@ -131,35 +119,12 @@ class TiledPicture:
         )
         return _encoded(_shown(bands, roles, show), valid)
 
-    def whole(self, long_side_px: int) -> tuple[bytes, str]:
-        """All of the picture as one image file over :attr:`bounds`.
-
-        Parameters
-        ----------
-        long_side_px : int
-            At most; a smaller picture keeps its own pixels.
-        """
-        left, bottom, right, top = self.bounds
-        own = self.resolutions_m[-1]
-        resolution_m = max(own, max(right - left, top - bottom) / long_side_px)
-        shape = (
-            max(1, round((top - bottom) / resolution_m)),
-            max(1, round((right - left) / resolution_m)),
-        )
+    def reduced(self, long_side_px: int) -> Scene:
+        """All of the picture with at most that many pixels on its longer side."""
         grid = self.reader.grid
-        coarse = max(1.0, resolution_m / own)
-        part = self.reader.read(
-            shape_px=(max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse))),
-            scaling=self.limits,
-        )
-        bands, valid = _reprojected(
-            part, from_bounds(left, bottom, right, top, shape[1], shape[0]), shape, self.crs
-        )
-        buffer = io.BytesIO()
-        alpha = valid.astype(np.uint8)[..., None] * np.uint8(255)
-        pixels = np.concatenate([_shown(bands, part.roles, "colour"), alpha], axis=-1)
-        Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
-        return buffer.getvalue(), "image/webp"
+        coarse = max(1.0, max(grid.shape) / long_side_px)
+        shape = (max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse)))
+        return self.reader.read(shape_px=shape, scaling=self.limits)
 
     def _cut(self, level: int, column: int, row: int) -> _Part:
         step = 2 ** (len(self.resolutions_m) - 1 - level)
@@ -199,6 +164,53 @@ class TiledPicture:
         c1 = min(grid.width_px, int(np.max(x)) + margin)
         r1 = min(grid.height_px, int(np.max(y)) + margin)
         return None if c1 <= c0 or r1 <= r0 else (c0, r0, c1 - c0, r1 - r0)
+
+
+def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, Bounds]:
+    """A scene as one image file in a metric CRS.
+
+    Parameters
+    ----------
+    scene : Scene
+    crs : CRS
+    long_side_px : int
+        At most; a smaller scene keeps its own pixels.
+
+    Returns
+    -------
+    bytes, str, (left, bottom, right, top)
+        The file, its media type, and where its edges lie.
+    """
+    bounds = left, bottom, right, top = _bounds(scene.grid, crs)
+    longest = max(scene.grid.shape)
+    size = min(longest, long_side_px) / max(right - left, top - bottom)
+    shape = (max(1, round((top - bottom) * size)), max(1, round((right - left) * size)))
+    if _direct(scene.grid, crs) and shape == scene.grid.shape:
+        bands, valid = scene.bands, scene.valid
+    else:
+        target = from_bounds(left, bottom, right, top, shape[1], shape[0])
+        bands, valid = _reprojected(scene, target, shape, crs)
+    buffer = io.BytesIO()
+    alpha = valid.astype(np.uint8)[..., None] * np.uint8(255)
+    pixels = np.concatenate([_shown(bands, scene.roles, "colour"), alpha], axis=-1)
+    Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
+    return buffer.getvalue(), "image/webp", bounds
+
+
+def _direct(grid: Grid, crs: CRS) -> bool:
+    """Whether a grid is north-up with square pixels in a CRS."""
+    t = grid.transform
+    return bool(t.b == 0 and t.d == 0 and t.a == -t.e and grid.crs == crs)
+
+
+def _bounds(grid: Grid, crs: CRS) -> Bounds:
+    """The extent of a grid in a CRS; a warped one is covered whole."""
+    x, y = grid.to_native([0, grid.width_px, grid.width_px, 0], [0, 0, *[grid.height_px] * 2])
+    own = (float(np.min(x)), float(np.min(y)), float(np.max(x)), float(np.max(y)))
+    if grid.crs == crs:
+        return own
+    left, bottom, right, top = transform_bounds(to_rasterio(grid.crs), to_rasterio(crs), *own)
+    return float(left), float(bottom), float(right), float(top)
 
 
 def _reprojected(

@@ -10,12 +10,15 @@ import base64
 import html
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from geofield import schema
 from geofield.model.dataset import Dataset
+from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
+from geofield.staging import staged_file
 from geofield.theme import web_theme
 from geofield.web import inlined, page_file
 from geofield.web.view import (
@@ -38,9 +41,46 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     return [path]
 
 
-def document(dataset: Dataset) -> str:
-    """The page as text."""
-    values = plan_values(dataset)
+@dataclass(frozen=True, slots=True)
+class PlanPage:
+    """A page that shows itself in a notebook.
+
+    Attributes
+    ----------
+    text : str
+        The whole HTML document.
+    height_px : int
+    """
+
+    text: str
+    height_px: int = 560
+
+    def __repr__(self) -> str:
+        return f"<map of a plan, {len(self.text) / 1e6:.1f} MB: shown in a notebook, or save(path)>"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.text)}" style="width:100%;border:0;'
+            f'height:{self.height_px}px" sandbox="allow-scripts"></iframe>'
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page as a file that opens in any browser."""
+        with staged_file(path, overwrite=overwrite) as place:
+            place.write_text(self.text, encoding="utf-8")
+        return Path(path)
+
+
+def document(dataset: Dataset, scene: Scene | None = None) -> str:
+    """The page as text.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    scene : Scene, optional
+        The picture; that beside the plan when not given.
+    """
+    values = plan_values(dataset, scene)
     data = json.dumps(values, ensure_ascii=False, separators=(",", ":"))
     source = dataset.provenance.source
     credit = " · ".join(text for text in (source.attribution, source.licence, source.date) if text)
@@ -68,7 +108,7 @@ def document(dataset: Dataset) -> str:
 """
 
 
-def plan_values(dataset: Dataset) -> dict[str, Any]:
+def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
     """What the page shows, as JSON values."""
     row = dataset.table(schema.FIELD.name).iloc[0]
     polygon, crs = row.geometry, dataset.crs
@@ -80,7 +120,7 @@ def plan_values(dataset: Dataset) -> dict[str, Any]:
         tracks = Tracks.from_tables(
             dataset.tables, evidence["tracks"], grid=dataset.grid, outline=polygon
         )
-    picture, bounds = _picture(dataset)
+    picture, bounds = _picture(dataset, scene)
     bounds = bounds or margin_bounds(polygon)
     certainty, doubts = row.get("certainty"), row.get("doubts")
     return {
@@ -106,15 +146,20 @@ def plan_values(dataset: Dataset) -> dict[str, Any]:
     }
 
 
-def _picture(dataset: Dataset) -> tuple[str | None, tuple[float, float, float, float] | None]:
+def _picture(
+    dataset: Dataset, scene: Scene | None
+) -> tuple[str | None, tuple[float, float, float, float] | None]:
     """The picture as a data address, and where it lies."""
-    if dataset.scene_path is None or not dataset.scene_path.exists():
-        return None, None
-    from geofield.imagery.display import TiledPicture
+    from geofield.imagery.display import TiledPicture, shown_scene
 
-    picture = TiledPicture.open(dataset.scene_path, dataset.crs)
-    data, kind = picture.whole(LONG_SIDE_PX)
-    return f"data:{kind};base64,{base64.b64encode(data).decode()}", picture.bounds
+    if scene is not None:
+        data, kind, bounds = shown_scene(scene, dataset.crs, LONG_SIDE_PX)
+    elif dataset.scene_path is not None and dataset.scene_path.exists():
+        picture = TiledPicture.open(dataset.scene_path, dataset.crs)
+        data, kind, bounds = shown_scene(picture.reduced(LONG_SIDE_PX), dataset.crs, LONG_SIDE_PX)
+    else:
+        return None, None
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}", bounds
 
 
 def _in_script(text: str) -> str:

@@ -1,0 +1,94 @@
+"""A plan as one HTML file, opened in a real browser from the disk."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.support.ui import WebDriverWait
+
+import geofield as gf
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("review")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the main job, and the page exported from its plan."""
+    folder = tmp_path_factory.mktemp("page")
+    geofield = [sys.executable, "-m", "geofield"]
+    place = ["--lat", "35.075373", "--lon", "33.531142", "--spacing", "4", "--format", "gpkg"]
+    picture = str(ROOT / "sample_data" / "field_1.tif")
+    for command in (
+        ["run", picture, *place, "--route", "shortest", "--turning-radius", "5"],
+        ["export", str(folder / "field.gpkg"), "-f", "html"],
+    ):
+        subprocess.run([*geofield, *command, "--out", str(folder)], check=True, capture_output=True)
+    return folder
+
+
+def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path) -> None:
+    binary, program = shutil.which("chromium"), shutil.which("chromedriver")
+    if not binary or not program:
+        pytest.skip("Chromium and its driver are not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1200,800"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(program))
+    try:
+        driver.get((folder / "field.html").as_uri())
+        WebDriverWait(driver, 20).until(
+            lambda d: d.execute_script("return document.body.dataset.ready")
+        )
+        asked = driver.execute_script(
+            "return performance.getEntriesByType('resource').map(e => e.name)"
+            ".filter(name => !name.startsWith('data:') && !name.startsWith('blob:'))"
+        )
+        assert asked == []
+        assert not [e for e in driver.get_log("browser") if e["level"] == "SEVERE"]
+        shown = driver.execute_script("return document.querySelector('aside').innerText")
+        plan = gf.read_plan(folder / "field.gpkg")
+        assert plan.tracks is not None
+        assert f"{plan.field.area_ha:.2f} ha" in shown
+        assert f"{len(plan.tracks.lines)} ·" in shown
+        assert "Turn that does not fit" in shown
+    finally:
+        driver.quit()
+
+
+def test_the_page_holds_the_plan_in_its_own_zone(folder: Path) -> None:
+    text = (folder / "field.html").read_text(encoding="utf-8")
+    found = re.search(r'<script type="application/json" id="plan">(.*?)</script>', text, re.S)
+    assert found is not None
+    values = json.loads(found.group(1))
+    plan = gf.read_plan(folder / "field.gpkg")
+    assert plan.obstacles is not None
+    assert plan.tracks is not None
+    assert values["field"]["rings"][0][0] == pytest.approx(
+        list(plan.field.polygon.exterior.coords[0]), abs=6e-4
+    )
+    assert len(values["obstacles"]) == len(plan.obstacles)
+    assert len(values["tracks"]) == len(plan.tracks.segments)
+    assert values["picture"].startswith("data:image/webp;base64,")
+
+
+def test_names_cannot_break_out(folder: Path, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    plan = gf.read_plan(folder / "field.gpkg")
+    evil = "</script><script>document.title='owned'</script><!--"
+    page = replace(plan, field=replace(plan.field, name=evil)).explore()
+    assert evil not in page.text
+    assert "sandbox" in page._repr_html_()
+    assert len(repr(page)) < 100
+    assert page.save(tmp_path / "map.html").read_text(encoding="utf-8") == page.text
