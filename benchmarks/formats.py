@@ -107,7 +107,7 @@ def large_plan(tracks: int = 1500, segments: int = 38_000, obstacles: int = 10_0
             "lat": lat,
             "lon": lon,
         },
-        circle_polygons(cx, cy, radius + 0.5),
+        circle_polygons(cx, cy, radius + 0.5, UTM),
         UTM,
     )
     outline = shapely.box(X0, Y0, X0 + tracks * SPACING_M, Y0 + LENGTH_M)

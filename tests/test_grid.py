@@ -142,7 +142,7 @@ def test_ground_resolution_is_what_a_tape_measures(lat: float) -> None:
     grid = Grid.web_mercator(lat=lat, lon=33.5, zoom=18)
     by_sphere = web_mercator_resolution(18) * math.cos(math.radians(lat))
     assert grid.ground_resolution_m == pytest.approx(by_sphere, rel=5e-3)
-    assert grid.metric_scale(320, 320) == pytest.approx(grid.ground_resolution_m, rel=1e-3)
+    assert grid.resolution_at(320, 320) == pytest.approx(grid.ground_resolution_m, rel=1e-9)
     # Far from the stretched metres of EPSG:3857 wherever the cosine matters.
     if lat:
         assert grid.ground_resolution_m < 0.99 * web_mercator_resolution(18)

@@ -201,27 +201,18 @@ class Grid:
         The side of the square with the pixel's area, from geodesic lengths. The study's
         equation (3) measures on a sphere; it differs by up to 0.4 %.
         """
-        x, y = self.width_px / 2, self.height_px / 2
+        return float(self.resolution_at(self.width_px / 2, self.height_px / 2))
+
+    def resolution_at(self, x_px: ArrayLike, y_px: ArrayLike) -> Any:
+        """Metres per pixel on the ground at pixel positions; scalars or arrays."""
+        x, y = np.asarray(x_px, float), np.asarray(y_px, float)
         lon, lat = self.to_lonlat(
-            np.array([x - 0.5, x + 0.5, x, x]), np.array([y, y, y - 0.5, y + 0.5])
+            np.stack([x - 0.5, x + 0.5, x, x]), np.stack([y, y, y - 0.5, y + 0.5])
         )
         azimuth_x, _, length_x = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
         azimuth_y, _, length_y = _GEOD.inv(lon[2], lat[2], lon[3], lat[3])
-        return math.sqrt(length_x * length_y * abs(math.sin(math.radians(azimuth_y - azimuth_x))))
-
-    def metric_scale(self, x_px: ArrayLike, y_px: ArrayLike) -> Any:
-        """Metres of the metric CRS per pixel at pixel positions; scalars or arrays."""
-        x, y = np.asarray(x_px, float), np.asarray(y_px, float)
-        east_x, north_x = self.to_crs(
-            np.stack([x - 0.5, x + 0.5]), np.stack([y, y]), self.metric_crs
-        )
-        east_y, north_y = self.to_crs(
-            np.stack([x, x]), np.stack([y - 0.5, y + 0.5]), self.metric_crs
-        )
-        cross = (east_x[1] - east_x[0]) * (north_y[1] - north_y[0]) - (north_x[1] - north_x[0]) * (
-            east_y[1] - east_y[0]
-        )
-        return _like(np.sqrt(np.abs(cross)))
+        sine = np.sin(np.radians(np.subtract(azimuth_y, azimuth_x)))
+        return _like(np.sqrt(np.multiply(length_x, length_y) * np.abs(sine)))
 
     def corners_lonlat(self) -> list[tuple[float, float]]:
         """The four corners, clockwise from the top-left, as (lon, lat) in degrees."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield import __version__, schema
+from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset, Provenance
@@ -221,7 +222,8 @@ class Plan:
         baseline = find_baseline(
             one.polygon, "longest_edge", one.crs, spacing_m=1.0, grid=self.grid
         )
-        edge_m = baseline.edge.length_m if baseline.edge else None
+        edge = baseline.edge
+        edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)
         heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
         return schema.table(
             schema.FIELD,

@@ -10,7 +10,13 @@ from affine import Affine
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import (
+    LONLAT,
+    ground_areas_m2,
+    ground_lengths_m,
+    ground_scale,
+    transformer,
+)
 from geofield.grid import Grid
 from geofield.model import Dataset, ImagerySource, Provenance, Tracks
 from geofield.model.obstacles import circle_polygons
@@ -19,7 +25,17 @@ UTM = CRS.from_epsg(32636)
 #: South-west corner of the test field, EPSG:32636, on Cyprus.
 X0, Y0 = 549_000.0, 3_881_000.0
 ORIGIN = np.array([X0, Y0])
+#: Units of the zone per metre on the ground: its lengths are 0.037 % short here.
+SCALE = ground_scale(UTM, X0 + 60, Y0 + 30)
 NAME = "Großer Acker Ñandú 田"
+
+
+def length_m(line):
+    return float(ground_lengths_m([line], UTM)[0])
+
+
+def area_ha(polygon):
+    return float(ground_areas_m2([polygon], UTM)[0]) / 1e4
 
 
 def make_dataset(*, points: bool = True, optional: bool = False) -> Dataset:
@@ -35,7 +51,7 @@ def make_dataset(*, points: bool = True, optional: bool = False) -> Dataset:
         [(55, 10), (62, 10), (62, 17), (55, 17)], [[(57, 12), (59, 12), (59, 14), (57, 14)]]
     )
     shapes = [
-        *circle_polygons(centres[:, 0], centres[:, 1], radius + margin),
+        *circle_polygons(centres[:, 0], centres[:, 1], radius + margin, UTM),
         shapely.transform(shed, lambda c: c + ORIGIN),
     ]
     middle = np.array([[s.centroid.x, s.centroid.y] for s in shapes])
@@ -67,9 +83,9 @@ def make_dataset(*, points: bool = True, optional: bool = False) -> Dataset:
         {
             "field_id": ["35.0712N33.5371E"],
             "name": [NAME],
-            "area_ha": [outline.area / 1e4],
-            "perimeter_m": [outline.exterior.length],
-            "longest_edge_m": [120.0],
+            "area_ha": [area_ha(outline)],
+            "perimeter_m": [outline.exterior.length / SCALE],
+            "longest_edge_m": [120.0 / SCALE],
             "heading_deg": [90.35],
             "method": ["auto"],
             "imagery": ["ortho.tif"],
@@ -108,9 +124,17 @@ def _optional(outline):
     ring = shapely.LineString(outline.buffer(-2, join_style="mitre").exterior.coords)
     a, b, c = np.array([(10, 2.5), (50, 2.5), (50, 7.5)]) + ORIGIN
     rows = {
-        "headland": ({"headland_no": [1], "width_m": [4.0], "area_ha": [strip.area / 1e4]}, strip),
+        "headland": (
+            {"headland_no": [1], "width_m": [4.0], "area_ha": [area_ha(strip)]},
+            strip,
+        ),
         "headland_tracks": (
-            {"pass_no": [1], "segment_no": [1], "offset_m": [2.0], "length_m": [ring.length]},
+            {
+                "pass_no": [1],
+                "segment_no": [1],
+                "offset_m": [2.0],
+                "length_m": [length_m(ring)],
+            },
             ring,
         ),
         "route": (
@@ -142,7 +166,7 @@ def _tracks(outline, obstacles):
             free = shapely.difference(free, geometry)
         parts = sorted(shapely.get_parts(free), key=lambda line: line.coords[0][0])
         for position, part in enumerate(parts, start=1):
-            rows["segments"].append((number, position, part.length))
+            rows["segments"].append((number, position, length_m(part)))
             shapes["segments"].append(shapely.LineString(part.coords))
         for position, (a, b) in enumerate(pairwise(parts), start=1):
             gap = shapely.LineString([a.coords[-1], b.coords[0]])
@@ -152,10 +176,10 @@ def _tracks(outline, obstacles):
                 if gap.distance(shape) < 1e-6
             ]
             cause = f"obstacle {hit[0]}" if hit else "border"
-            rows["gaps"].append((number, position, gap.length, cause, hit[0] if hit else None))
+            rows["gaps"].append((number, position, length_m(gap), cause, hit[0] if hit else None))
             shapes["gaps"].append(gap)
         rows["tracks"].append(
-            (number, 90.35, len(parts), len(parts) - 1, None, sum(p.length for p in parts))
+            (number, 90.35, len(parts), len(parts) - 1, None, sum(map(length_m, parts)))
         )
         shapes["tracks"].append(shapely.multilinestrings(parts))
     return tuple(

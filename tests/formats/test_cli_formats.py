@@ -79,7 +79,7 @@ def test_info(plan_file):
     assert facts["rows"]["segments"] == 23
     assert facts["obstacles"] == {"added": 1, "confirmed": 1, "detected": 1, "rejected": 1}
     assert facts["origin"]["licence"] == "CC BY 4.0"
-    assert "0.6384" in run(info, plan_file).stdout
+    assert "0.6389" in run(info, plan_file).stdout
 
 
 def test_info_of_a_picture(sample):

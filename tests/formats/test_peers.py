@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import shapely
-from formats_plan import NAME, make_dataset
+from formats_plan import NAME, SCALE, make_dataset
 
 from geofield import schema
 from geofield.formats import validate_file, write_dataset
@@ -135,8 +135,8 @@ def test_fiboa(folder, plan):
     assert any("fiboa" in uri and "v0.3.0" in uri for uri in content["schemas"]["geofield"])
     assert isinstance(feature["id"], str)
     shape = plan.table("field").geometry.iloc[0]
-    assert properties["metrics:area"] == pytest.approx(shape.area, abs=0.01)
-    assert properties["metrics:perimeter"] == pytest.approx(shape.length, abs=0.01)
+    assert properties["metrics:area"] == pytest.approx(shape.area / SCALE**2, abs=0.01)
+    assert properties["metrics:perimeter"] == pytest.approx(shape.length / SCALE, abs=0.01)
     assert properties["determination:method"] == "auto-imagery"
     assert properties["determination:datetime"] == "2020-06-01T00:00:00Z"
     parquet = gpd.read_parquet(folder / "fiboa" / "field.parquet")

@@ -44,7 +44,7 @@ def test_same_rows_and_shapes(dataset, tmp_path, name, product, layers):
             dataset.table(layer),
             back.table(layer),
             precision_m=FORMATS[name].precision_m,
-            number_tolerance=0.0 if FORMATS[name].precision_m == 0 else 1e-9,
+            number_tolerance=0.0 if FORMATS[name].precision_m == 0 else 1e-8,
         )
 
 

@@ -151,7 +151,7 @@ def _obstacles(x0: float, y0: float, grid: Grid, crs: CRS):
     radius = np.array([3.25, 2.5, 4.125, np.nan])
     lon, lat = Grid.to_lonlat(grid, *grid.from_crs(x, y, crs))
     x_px, y_px = grid.from_crs(x, y, crs)
-    shapes = list(circle_polygons(x[:3], y[:3], radius[:3] + 1.0))
+    shapes = list(circle_polygons(x[:3], y[:3], radius[:3] + 1.0, crs))
     shapes.append(shapely.box(58.0 + x0, 18.0 + y0, 62.0 + x0, 22.0 + y0).buffer(1.0))
     return schema.table(
         schema.OBSTACLES,

@@ -39,6 +39,7 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
     from geofield.crs import authority_name
     from geofield.formats import detect, read_dataset
     from geofield.formats.arrow import to_lonlat
+    from geofield.model.field import Field
 
     found = detect(file)
     dataset = read_dataset(file, crs=crs)
@@ -57,9 +58,10 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
     if len(field):
         shape = field.geometry.iloc[0]
         place = to_lonlat(field.geometry.to_numpy()[:1], dataset.crs)[0].representative_point()
+        one = Field(shape, dataset.crs)
         facts["field"] = {
-            "area (ha)": round(shape.area / 10_000, 4),
-            "perimeter (m)": round(shape.exterior.length, 1),
+            "area (ha)": round(one.area_ha, 4),
+            "perimeter (m)": round(one.perimeter_m, 1),
             "lat": round(place.y, 6),
             "lon": round(place.x, 6),
         }

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
+from pyproj import CRS
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from geofield.crs import is_metric
+from geofield.crs import ground_areas_m2, is_metric
 from geofield.errors import CRSError, GeofieldError, ObstacleError
 from geofield.model.obstacles import active
 
@@ -272,7 +273,7 @@ def _circles(frame: gpd.GeoDataFrame, within: Any) -> tuple[FloatArray, FloatArr
     if "radius_m" in frame.columns:
         radius = frame["radius_m"].to_numpy(dtype="float64", na_value=np.nan)
     else:
-        area = shapely.area(geometry)
+        area = ground_areas_m2(geometry, CRS(frame.crs))
         radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)
     if within is not None:
         keep = shapely.covers(within, centre)

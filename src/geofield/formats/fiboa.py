@@ -13,7 +13,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.crs import LONLAT
+from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.geoparquet import GEOMETRY, write_geoparquet
 from geofield.formats.origin import lineage
@@ -54,8 +54,8 @@ def _properties(row: Mapping[str, Any], shape: Any, dataset: Dataset) -> dict[st
         "id": str(row["field_id"]),
         "collection": COLLECTION,
         "category": ["operational"],
-        "metrics:area": round(float(shape.area), 2),
-        "metrics:perimeter": round(float(shapely.length(shape)), 2),
+        "metrics:area": round(float(ground_areas_m2([shape], dataset.crs)[0]), 2),
+        "metrics:perimeter": round(float(ground_lengths_m([shape], dataset.crs)[0]), 2),
         "determination:method": _DRAWN.get(method, "auto-imagery"),
         "determination:details": f"{method}; {lineage(dataset)}".strip("; "),
     }

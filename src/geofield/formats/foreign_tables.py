@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, grid_north_deg, transformer
+from geofield.crs import LONLAT, grid_north_deg, ground_lengths_m, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
@@ -77,8 +77,8 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     data |= {
         "name": [path.stem if names is None else str(names.iloc[0])],
         "field_id": [Field(polygon, crs).field_id if ids is None else str(ids.iloc[0])],
-        "area_ha": [polygon.area / 10_000.0],
-        "perimeter_m": [polygon.exterior.length],
+        "area_ha": [Field(polygon, crs).area_ha],
+        "perimeter_m": [Field(polygon, crs).perimeter_m],
     }
     data.setdefault("method", ["boundary"])
     return schema.table(schema.FIELD, data, [polygon], crs)
@@ -108,7 +108,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     x, y = shapely.get_x(centre), shapely.get_y(centre)
     if is_point.any():
         geometry[is_point] = circle_polygons(
-            x[is_point], y[is_point], radius[is_point] + margin[is_point]
+            x[is_point], y[is_point], radius[is_point] + margin[is_point], crs
         )
     lon, lat = transformer(crs, LONLAT).transform(x, y)
     data: dict[str, Any] = {
@@ -145,7 +145,7 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     segment = numbers_like(frame, _SEGMENT)
     if np.isnan(segment).any():
         segment = pd.Series(track).groupby(track).cumcount().to_numpy() + 1
-    lengths = shapely.length(geometry)
+    lengths = ground_lengths_m(geometry, crs)
     segments = schema.conform(
         schema.SEGMENTS,
         schema.table(

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from geofield import schema
+from geofield.crs import ground_areas_m2
 from geofield.formats.arrow import to_lonlat
 from geofield.formats.avoided import avoided, passed_through
 from geofield.formats.names import line_names, safe_name
@@ -80,7 +81,7 @@ def aggps(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
     columns: dict[str, Column] = {
         "id": ("int", range(1, len(field) + 1)),
         "Name": ("str", [dataset.name] * len(field)),
-        "Area": ("float", list(field.area)),
+        "Area": ("float", list(ground_areas_m2(field.geometry.to_numpy(), dataset.crs))),
     }
     yield _layer(dataset, folder / "boundary", "Polygon", field, columns)
     bends = shapely.get_num_points(np.asarray(segments.geometry.to_numpy(), dtype=object)) > 2
@@ -88,7 +89,7 @@ def aggps(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
         # 0 is a straight line, 1 a curve.
         "id": ("int", [int(bend) for bend in bends]),
         "Name": ("str", line_names(segments)),
-        "Length": ("float", list(segments.length)),
+        "Length": ("float", list(segments["length_m"])),
     }
     yield _layer(dataset, folder / "swaths", "LineString", segments, columns)
     obstacles = avoided(dataset)

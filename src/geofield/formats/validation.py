@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from geofield import schema
+from geofield.crs import ground_lengths_m
 from geofield.errors import FormatWarning, GeofieldError
 from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
@@ -163,7 +164,11 @@ def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
     tracks = dataset.table("tracks")
     if not len(tracks) or not len(segments):
         return
-    sums = segments.assign(length=segments.length).groupby("track_no")["length"].sum()
+    sums = (
+        segments.assign(length=ground_lengths_m(segments.geometry.to_numpy(), dataset.crs))
+        .groupby("track_no")["length"]
+        .sum()
+    )
     told = tracks.set_index("track_no")["length_m"].astype("float64")
     both = told.index.intersection(sums.index)
     off = (told[both] - sums[both]).abs() > LENGTH_TOLERANCE_M

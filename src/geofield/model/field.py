@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from shapely import Polygon
 
-from geofield.crs import LONLAT, authority_name, is_metric, parse_crs, transformer
+from geofield.crs import (
+    LONLAT,
+    authority_name,
+    ground_areas_m2,
+    ground_scale_of,
+    is_metric,
+    parse_crs,
+    transformer,
+)
 from geofield.errors import CRSError, FieldError
 from geofield.grid import Grid
 
@@ -46,7 +54,7 @@ class Field:
     polygon : shapely.Polygon
         Valid and not empty, in `crs`; may have holes.
     crs : CRS
-        Projected, in true ground metres.
+        Projected, in metres (see `geofield.crs.ground_scale`).
     name, field_id : str
         For people and files; `field_id` is made from the place where none is given.
     method : str
@@ -102,13 +110,13 @@ class Field:
 
     @property
     def area_ha(self) -> float:
-        """Area without holes, hectares."""
-        return float(self.polygon.area) / 10_000.0
+        """Area without holes, hectares on the ground."""
+        return float(ground_areas_m2([self.polygon], self.crs)[0]) / 10_000.0
 
     @property
     def perimeter_m(self) -> float:
-        """Length of the outer ring, metres."""
-        return float(shapely.length(shapely.get_exterior_ring(self.polygon)))
+        """Length of the outer ring, metres on the ground."""
+        return float(self.polygon.exterior.length / ground_scale_of(self.polygon, self.crs))
 
     @property
     def polygon_lonlat(self) -> Polygon:

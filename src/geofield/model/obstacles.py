@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, ground_scale, ground_scale_of, transformer
 from geofield.errors import ObstacleError
 from geofield.grid import Grid
 
@@ -38,7 +38,7 @@ class ObstacleShapes:
     Attributes
     ----------
     circles : float array (n, 3)
-        Centre x, centre y, radius, metres, in the metric CRS.
+        Centre x, centre y, radius, all in units of the metric CRS, as polygons are.
     circle_no : int array (n,)
         The obstacle numbers of the circles.
     polygons : object array (m,)
@@ -52,10 +52,22 @@ class ObstacleShapes:
     polygon_no: NDArray[np.int64]
 
 
-def circle_polygons(x: ArrayLike, y: ArrayLike, radius: ArrayLike) -> NDArray[np.object_]:
-    """Polygons that stand for circles, 64 vertices each, all on the circle."""
+def circle_polygons(
+    x: ArrayLike, y: ArrayLike, radius_m: ArrayLike, crs: CRS
+) -> NDArray[np.object_]:
+    """Polygons that stand for circles, 64 vertices each, all on the circle.
+
+    Parameters
+    ----------
+    x, y : array (n,)
+        Centres in the metric CRS.
+    radius_m : array (n,)
+        Metres on the ground.
+    crs : CRS
+    """
     points = shapely.points(np.asarray(x, float), np.asarray(y, float))
-    circles = shapely.buffer(points, np.asarray(radius, float), quad_segs=QUARTER_SEGMENTS)
+    radius = np.asarray(radius_m, float) * ground_scale(crs, x, y)
+    circles = shapely.buffer(points, radius, quad_segs=QUARTER_SEGMENTS)
     # Counter-clockwise, as files hold them: a plan read back is then the same.
     return np.atleast_1d(shapely.orient_polygons(circles))
 
@@ -89,7 +101,7 @@ def from_circles_px(
     target = grid.metric_crs if crs is None else crs
     x, y = (np.asarray(v) for v in grid.to_crs(x_px, y_px, target))
     lon, lat = (np.asarray(v) for v in grid.to_lonlat(x_px, y_px))
-    radius_m = radius_px * np.asarray(grid.metric_scale(x_px, y_px))
+    radius_m = radius_px * np.asarray(grid.resolution_at(x_px, y_px))
     count = len(x_px)
     return schema.table(
         schema.OBSTACLES,
@@ -106,7 +118,7 @@ def from_circles_px(
             "lat": lat,
             "lon": lon,
         },
-        circle_polygons(x, y, radius_m + buffer_m) if count else [],
+        circle_polygons(x, y, radius_m + buffer_m, target) if count else [],
         target,
     )
 
@@ -134,7 +146,9 @@ def from_polygons(
     lon, lat = transformer(crs, LONLAT).transform(x, y)
     missing = np.full(count, np.nan)
     x_px, y_px = grid.from_crs(x, y, crs) if grid is not None else (missing, missing)
-    grown = shapely.buffer(shapes, buffer_m, quad_segs=8) if buffer_m else shapes
+    grown = shapes
+    if buffer_m:
+        grown = shapely.buffer(shapes, buffer_m * ground_scale_of(shapes, crs), quad_segs=8)
     return schema.table(
         schema.OBSTACLES,
         {
@@ -215,6 +229,8 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
             hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
         )
     total = radius + margin
+    sized = np.isfinite(total)
+    total[sized] *= ground_scale_of(geometry[sized], CRS(obstacles.crs))
     is_circle = _still_round(geometry, total)
     centre = shapely.centroid(geometry[is_circle])
     return ObstacleShapes(

@@ -82,6 +82,7 @@ def track_statistics(
     headland_tracks: gpd.GeoDataFrame | None,
     outline: Polygon | None,
     spacing_m: float,
+    scale: float,
     blocked_count: int,
     losses: tuple[ObstacleLoss, ...],
 ) -> TrackStatistics:
@@ -92,7 +93,7 @@ def track_statistics(
     area = worked = coverage = overlap = nan
     if outline is not None:
         area = float(outline.area)
-        strips = _strips(segments, headland_tracks, spacing_m)
+        strips = _strips(segments, headland_tracks, spacing_m * scale)
         union = shapely.intersection(shapely.union_all(strips), outline).area
         single = float(shapely.area(shapely.intersection(strips, outline)).sum())
         worked = float(union)
@@ -109,8 +110,8 @@ def track_statistics(
         mean_segment_m=float(length.mean()) if len(length) else nan,
         longest_segment_m=float(length.max()) if len(length) else nan,
         shortest_segment_m=float(length.min()) if len(length) else nan,
-        area_ha=area / 10_000.0,
-        worked_ha=worked / 10_000.0,
+        area_ha=area / scale**2 / 10_000.0,
+        worked_ha=worked / scale**2 / 10_000.0,
         coverage_percent=coverage,
         overlap_percent=overlap,
         losses=losses,
@@ -118,7 +119,7 @@ def track_statistics(
 
 
 def _strips(
-    segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, spacing_m: float
+    segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, width: float
 ) -> np.ndarray:
     """The strip that each segment works, as a rectangle; those of the headland, as they bend."""
     ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
@@ -126,7 +127,7 @@ def _strips(
         return np.empty(0, dtype=object)
     along = ends[:, 1] - ends[:, 0]
     along /= np.hypot(along[:, 0], along[:, 1])[:, None]
-    side = np.column_stack((-along[:, 1], along[:, 0])) * (spacing_m / 2.0)
+    side = np.column_stack((-along[:, 1], along[:, 0])) * (width / 2.0)
     corners = np.stack(
         (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
     )
@@ -135,7 +136,7 @@ def _strips(
         return strips
     around = shapely.buffer(
         headland_tracks.geometry.to_numpy(),
-        spacing_m / 2.0,
+        width / 2.0,
         cap_style="flat",
         join_style="mitre",
     )

@@ -13,7 +13,7 @@ from pyproj import CRS
 from shapely import Polygon
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.grid import Grid
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
@@ -135,6 +135,15 @@ class Tracks:
         )
 
     @cached_property
+    def ground_scale(self) -> float:
+        """Units of the CRS per metre on the ground, at the field's middle."""
+        if self.outline is not None:
+            return float(ground_scale_of(self.outline, self.crs))
+        if not len(self.segments):
+            return 1.0
+        return float(ground_scale_of(shapely.box(*self.segments.total_bounds), self.crs))
+
+    @cached_property
     def statistics(self) -> TrackStatistics:
         """Counts, lengths and areas, computed when first asked for."""
         return track_statistics(
@@ -144,6 +153,7 @@ class Tracks:
             headland_tracks=self.headland_tracks,
             outline=self.outline,
             spacing_m=self.spacing_m,
+            scale=self.ground_scale,
             blocked_count=self.blocked_count,
             losses=self.losses,
         )
@@ -161,7 +171,7 @@ class Tracks:
     def point_chunks(self, rows: int = 200_000) -> Iterator[gpd.GeoDataFrame]:
         """The track points in tables of about `rows` rows, for streaming."""
         coordinates = shapely.get_coordinates(self.segments.geometry.to_numpy()).reshape(-1, 2, 2)
-        length = np.hypot(*(coordinates[:, 1] - coordinates[:, 0]).T)
+        length = np.hypot(*(coordinates[:, 1] - coordinates[:, 0]).T) / self.ground_scale
         counts = points_per_segment(length, self.step_m)
         track_no = self.segments["track_no"].to_numpy(dtype=np.int64)
         segment_no = self.segments["segment_no"].to_numpy(dtype=np.int64)

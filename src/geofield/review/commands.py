@@ -103,7 +103,7 @@ def set_radius(plan: Plan, command: Command) -> Plan:
     return _reshaped(
         plan,
         command,
-        circle_polygons(centre.x, centre.y, radius_m + buffer_m)[0],
+        circle_polygons(centre.x, centre.y, radius_m + buffer_m, plan.field.crs)[0],
         {"radius_m": radius_m, "radius_px": row["radius_px"] * radius_m / row["radius_m"]},
     )
 
@@ -223,9 +223,11 @@ def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: floa
     )
     if radius_m is not None:
         row["kind"], row["radius_m"] = "tree", radius_m
-        row.geometry = circle_polygons([x], [y], [radius_m + buffer_m])
+        row.geometry = circle_polygons([x], [y], [radius_m + buffer_m], crs)
         if plan.grid is not None:
-            row["radius_px"] = radius_m / float(plan.grid.metric_scale(row["x_px"], row["y_px"])[0])
+            row["radius_px"] = radius_m / float(
+                plan.grid.resolution_at(row["x_px"], row["y_px"])[0]
+            )
     parts = [part for part in (before, row) if part is not None and len(part)]
     joined = schema.conform(schema.OBSTACLES, pd.concat(parts), extras=True)
     return replace(plan, obstacles=joined)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from shapely.geometry.base import BaseGeometry
 
+from geofield.crs import ground_scale, ground_scale_of
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
 from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, active, numbered, shapes_of
 
@@ -75,7 +76,7 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     frame = frame.set_geometry(gpd.GeoSeries(geometry, index=frame.index, crs=crs))
     kind = shapely.get_type_id(geometry)
     point, line = np.isin(kind, _POINTS), np.isin(kind, _LINES)
-    shapes = _grown(shapes_of(frame[~(point | line)]), clearance_m)
+    shapes = _grown(shapes_of(frame[~(point | line)]), clearance_m, crs)
     if not (point.any() or line.any()):
         return shapes
     return _with_thin(shapes, frame, point, line, clearance_m)
@@ -124,7 +125,7 @@ def _with_thin(
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     number = frame["obstacle_no"].to_numpy(dtype=np.int64)
     own = np.nan_to_num(_column(frame, "radius_m")) + np.nan_to_num(_column(frame, "buffer_m"))
-    width = own + clearance_m
+    width = (own + clearance_m) * ground_scale_of(geometry, CRS(frame.crs))
     bare = np.flatnonzero((point | line) & ~(width > 0.0))
     if len(bare):
         raise TrackError(
@@ -148,14 +149,15 @@ def _column(frame: gpd.GeoDataFrame, name: str) -> NDArray[np.float64]:
     return np.asarray(frame[name].to_numpy(dtype="float64", na_value=np.nan))
 
 
-def _grown(shapes: ObstacleShapes, clearance_m: float) -> ObstacleShapes:
+def _grown(shapes: ObstacleShapes, clearance_m: float, crs: CRS) -> ObstacleShapes:
     if clearance_m == 0.0:
         return shapes
     circles = shapes.circles.copy()
-    circles[:, 2] += clearance_m
+    circles[:, 2] += clearance_m * ground_scale(crs, circles[:, 0], circles[:, 1])
     polygons = shapes.polygons
     if len(polygons):
-        polygons = shapely.buffer(polygons, clearance_m, quad_segs=QUARTER_SEGMENTS)
+        grown = clearance_m * ground_scale_of(polygons, crs)
+        polygons = shapely.buffer(polygons, grown, quad_segs=QUARTER_SEGMENTS)
     return ObstacleShapes(circles, shapes.circle_no, polygons, shapes.polygon_no)
 
 

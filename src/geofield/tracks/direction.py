@@ -15,7 +15,7 @@ import shapely
 from pyproj import CRS
 from shapely import LineString, Polygon
 
-from geofield.crs import grid_north_deg
+from geofield.crs import grid_north_deg, ground_scale
 from geofield.errors import TrackError
 from geofield.grid import Grid
 from geofield.methods import LONGEST_EDGE, method
@@ -83,15 +83,17 @@ def find_baseline(
     """
     centre = polygon.centroid
     north = grid_north_deg(crs, centre.x, centre.y)
+    scale = ground_scale(crs, centre.x, centre.y)
     if isinstance(direction, str):
         if direction == "longest_edge":
             frame = None if grid is None else picture_frame(grid, crs)
-            return _from_edge(longest_edge(polygon, tolerance_m=tolerance_m, frame=frame), north)
+            edge = longest_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
+            return _from_edge(edge, north)
         if direction in LONGEST_EDGE:
             line = method(LONGEST_EDGE, direction)(polygon)
             return _from_edge(StraightRun(*shapely.get_coordinates(line).ravel().tolist()), north)
         if direction in ("fewest", "fewest_turns"):
-            along = fewest_direction(polygon, spacing_m, turns=direction == "fewest_turns")
+            along = fewest_direction(polygon, spacing_m * scale, turns=direction == "fewest_turns")
             return _from_vector(along, north)
         heading = _number(direction)
         if heading is None:

@@ -20,7 +20,7 @@ from geofield.tracks.shapes import FIELD, Edges, polygon_edges
 
 
 def fewest_direction(
-    polygon: Polygon, spacing_m: float, *, turns: bool = False, tolerance_m: float = 1.0
+    polygon: Polygon, spacing: float, *, turns: bool = False, tolerance: float = 1.0
 ) -> tuple[float, float]:
     """Find the direction, exact over the candidates.
 
@@ -28,10 +28,11 @@ def fewest_direction(
     ----------
     polygon : shapely.Polygon
         In a metric CRS.
-    spacing_m : float
+    spacing : float
+        Between neighbouring tracks, in units of the CRS.
     turns : bool
         Fewest pieces first and tracks second, instead of the other way round.
-    tolerance_m : float
+    tolerance : float
         Simplifies the outline before its edges become candidates.
 
     Returns
@@ -44,10 +45,10 @@ def fewest_direction(
         polygon, TrackFrame.of((centre.x, centre.y), (1.0, 0.0), left=True), FIELD
     )
     best: tuple[tuple[float, float, float], float] | None = None
-    for angle in candidate_angles(polygon, tolerance_m):
+    for angle in candidate_angles(polygon, tolerance):
         turned = _turned(edges, float(angle))
         near, far = float(turned.va.min()), float(turned.va.max())
-        positions = track_positions(near, far, spacing_m, first_m=near + spacing_m / 2.0)
+        positions = track_positions(near, far, spacing, first_m=near + spacing / 2.0)
         pieces, _ = clip_tracks(positions, turned)
         tracks = float(len(positions))
         count = float(len(pieces))
@@ -59,9 +60,9 @@ def fewest_direction(
     return float(np.cos(angle)), float(np.sin(angle))
 
 
-def candidate_angles(polygon: Polygon, tolerance_m: float = 1.0) -> FloatArray:
+def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
     """Directions to try, radians counter-clockwise from the CRS's x axis, 0 <= angle < pi."""
-    outline = shapely.get_exterior_ring(polygon.simplify(tolerance_m))
+    outline = shapely.get_exterior_ring(polygon.simplify(tolerance))
     hull = polygon.convex_hull
     rings = [outline]
     if isinstance(hull, Polygon):

@@ -1,8 +1,9 @@
 """The working frame of a field's tracks: u along the tracks, v across them, near the origin.
 
 Coordinates of a metric CRS are large (a northing needs 23 bits before the metre), and rotating
-them as they are costs about 1e-9 m. All computing is therefore done in a frame whose origin lies
-in the field; only finished ends are carried back.
+them as they are costs about 1e-9 m; and its unit is not quite a metre on the ground. All computing
+is therefore done in a frame whose origin lies in the field and whose unit is the metre there; only
+finished ends are carried back.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ class TrackFrame:
         Unit vector of the tracks (the axis u), in the CRS.
     across_x, across_y : float
         Unit vector from one track to the next (the axis v): perpendicular to u, on either side.
+    scale : float
+        Units of the CRS per metre on the ground (`geofield.crs.ground_scale`).
     """
 
     origin_x_m: float
@@ -36,10 +39,16 @@ class TrackFrame:
     along_y: float
     across_x: float
     across_y: float
+    scale: float = 1.0
 
     @classmethod
     def of(
-        cls, origin: tuple[float, float], along: tuple[float, float], *, left: bool = False
+        cls,
+        origin: tuple[float, float],
+        along: tuple[float, float],
+        *,
+        left: bool = False,
+        scale: float = 1.0,
     ) -> TrackFrame:
         """Make a frame from an origin and a direction.
 
@@ -51,27 +60,35 @@ class TrackFrame:
             Direction of the tracks, any length but zero.
         left : bool
             Whether v points to the left of the direction instead of to the right.
+        scale : float
+            Units of the CRS per metre on the ground.
         """
         length = float(np.hypot(*along))
         ux, uy = along[0] / length, along[1] / length
         side = -1.0 if left else 1.0
         return cls(
-            float(np.rint(origin[0])), float(np.rint(origin[1])), ux, uy, side * uy, -side * ux
+            float(np.rint(origin[0])),
+            float(np.rint(origin[1])),
+            ux,
+            uy,
+            side * uy,
+            -side * ux,
+            scale,
         )
 
     def to_frame(self, x: Any, y: Any) -> tuple[FloatArray, FloatArray]:
-        """Carry CRS coordinates into the frame: (u, v) in metres."""
-        dx = np.asarray(x, dtype=np.float64) - self.origin_x_m
-        dy = np.asarray(y, dtype=np.float64) - self.origin_y_m
+        """Carry CRS coordinates into the frame: (u, v) in ground metres."""
+        dx = (np.asarray(x, dtype=np.float64) - self.origin_x_m) / self.scale
+        dy = (np.asarray(y, dtype=np.float64) - self.origin_y_m) / self.scale
         return (
             dx * self.along_x + dy * self.along_y,
             dx * self.across_x + dy * self.across_y,
         )
 
     def to_crs(self, u: Any, v: Any) -> tuple[FloatArray, FloatArray]:
-        """Carry frame coordinates back to the CRS: (x, y) in metres."""
-        u = np.asarray(u, dtype=np.float64)
-        v = np.asarray(v, dtype=np.float64)
+        """Carry frame coordinates back to the CRS: (x, y) in its units."""
+        u = np.asarray(u, dtype=np.float64) * self.scale
+        v = np.asarray(v, dtype=np.float64) * self.scale
         return (
             self.origin_x_m + (u * self.along_x + v * self.across_x),
             self.origin_y_m + (u * self.along_y + v * self.across_y),

@@ -18,13 +18,14 @@ _MITRE_LIMIT = 2.0
 _MIN_PIECE_M = 1e-3
 
 
-def inset(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseGeometry:
+def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometry:
     """Move the border inwards by a width.
 
     Parameters
     ----------
     outline : shapely.Polygon
-    width_m : float
+    width : float
+        In units of the outline's CRS.
     holes : bool
         Whether the strip runs around holes too; otherwise they stay as they are.
 
@@ -34,14 +35,26 @@ def inset(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseGeome
         Empty where the field is nowhere wider than twice the width.
     """
     if holes or not outline.interiors:
-        return shapely.buffer(outline, -width_m, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+        return shapely.buffer(outline, -width, join_style="mitre", mitre_limit=_MITRE_LIMIT)
     shell = Polygon(outline.exterior)
-    inner = shapely.buffer(shell, -width_m, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    inner = shapely.buffer(shell, -width, join_style="mitre", mitre_limit=_MITRE_LIMIT)
     return shapely.intersection(inner, outline)
 
 
-def main_area(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseGeometry:
+def main_area(
+    outline: Polygon, width_m: float, *, scale: float, holes: bool = False
+) -> BaseGeometry:
     """The field without its headland: what straight tracks are laid in.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon
+    width_m : float
+        Metres on the ground.
+    scale : float
+        Units of the outline's CRS per metre on the ground.
+    holes : bool
+        Whether the headland runs around holes too.
 
     Raises
     ------
@@ -50,7 +63,7 @@ def main_area(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseG
     """
     if not np.isfinite(width_m) or width_m < 0.0:
         raise TrackError(f"headland_m is {width_m}; it must be 0 or more metres.")
-    inner = inset(outline, width_m, holes=holes)
+    inner = inset(outline, width_m * scale, holes=holes)
     parts = [p for p in shapely.get_parts(inner) if isinstance(p, Polygon) and p.area > 0.0]
     if not parts:
         raise TrackError(
@@ -61,7 +74,7 @@ def main_area(outline: Polygon, width_m: float, *, holes: bool = False) -> BaseG
 
 
 def headland_table(
-    outline: Polygon, inner: BaseGeometry, width_m: float, crs: CRS
+    outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float
 ) -> gpd.GeoDataFrame:
     """Layer `headland`: the field less its main area, one row."""
     strip = shapely.difference(outline, inner)
@@ -71,7 +84,7 @@ def headland_table(
         {
             "headland_no": np.array([1]),
             "width_m": [width_m],
-            "area_ha": [sum(p.area for p in parts) / 10_000.0],
+            "area_ha": [sum(p.area for p in parts) / scale**2 / 10_000.0],
         },
         # As files hold it: a plan read back is then the same.
         [shapely.orient_polygons(MultiPolygon(parts))],
@@ -86,6 +99,7 @@ def headland_track_table(
     width_m: float,
     spacing_m: float,
     crs: CRS,
+    scale: float,
     holes: bool = False,
 ) -> gpd.GeoDataFrame:
     """Layer `headland_tracks`: rings half a spacing from the border and every spacing inwards.
@@ -108,7 +122,7 @@ def headland_track_table(
     lines: list[BaseGeometry] = []
     for index in range(passes):
         offset = min((index + 0.5) * spacing_m, width_m)
-        area = inset(outline, offset, holes=holes)
+        area = inset(outline, offset * scale, holes=holes)
         rings: list[BaseGeometry] = []
         for part in shapely.get_parts(area):
             rings.append(shapely.LineString(part.exterior.coords))
@@ -132,7 +146,7 @@ def headland_track_table(
             "pass_no": columns[:, 0].astype(np.int64),
             "segment_no": columns[:, 1].astype(np.int64),
             "offset_m": columns[:, 2],
-            "length_m": shapely.length(lines) if lines else np.empty(0),
+            "length_m": shapely.length(lines) / scale if lines else np.empty(0),
         },
         lines,
         crs,

@@ -23,15 +23,18 @@ _EPS_M = 1e-7
 def on_the_border(positions: FloatArray, edges: Edges) -> FloatArray:
     """Leave out a first or last track that only touches a corner of the field.
 
-    A track on the border itself is one where an edge of the field lies along it.
+    A track on the border itself is one where an edge of the field lies along it; it is moved
+    onto that edge by the last digits that it may be off.
     """
     near, far = float(edges.va.min()), float(edges.va.max())
+    positions = positions.copy()
     keep = np.ones(len(positions), dtype=bool)
     for at in {0, len(positions) - 1} if len(positions) else set():
         place = positions[at]
         if min(abs(place - near), abs(place - far)) <= _EPS_M:
             along = (np.abs(edges.va - place) <= _EPS_M) & (np.abs(edges.vb - place) <= _EPS_M)
             keep[at] = bool(along.any())
+            positions[at] = near if abs(place - near) <= _EPS_M else far
     return positions[keep]
 
 

@@ -37,13 +37,13 @@ class StraightRun:
     y1: float
 
     @property
-    def length_m(self) -> float:
-        """Length in metres."""
+    def length(self) -> float:
+        """Length in units of the CRS."""
         return float(np.hypot(self.x1 - self.x0, self.y1 - self.y0))
 
 
 def longest_edge(
-    polygon: Polygon, *, tolerance_m: float = 1.0, frame: Polygon | None = None
+    polygon: Polygon, *, tolerance: float = 1.0, frame: Polygon | None = None
 ) -> StraightRun:
     """Find the longest straight run of a polygon's outer ring.
 
@@ -51,9 +51,9 @@ def longest_edge(
     ----------
     polygon : shapely.Polygon
         In a metric CRS.
-    tolerance_m : float
-        How far a vertex may lie from the line. The default is that of outlines digitised from
-        imagery of half a metre per pixel.
+    tolerance : float
+        How far a vertex may lie from the line, in units of the CRS. The default is that of
+        outlines digitised from imagery of half a metre per pixel.
     frame : shapely.Polygon, optional
         The picture that the outline was found in. Where the outline runs along it, the field goes
         on outside: that is no edge of the field, and nobody drives along it.
@@ -65,15 +65,15 @@ def longest_edge(
     ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
     if shapely.get_num_coordinates(ring) > 400:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
-        ring = shapely.simplify(ring, tolerance_m / 4.0)
+        ring = shapely.simplify(ring, tolerance / 4.0)
     xy = shapely.get_coordinates(ring)[:-1]
     barred = np.zeros(len(xy), dtype=bool)
     if frame is not None:
-        barred = _along_frame(xy, frame, 2.0 * tolerance_m)
+        barred = _along_frame(xy, frame, 2.0 * tolerance)
         lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
         if lengths[~barred].sum() < _REAL_SHARE * lengths.sum():
             barred[:] = False
-    first, count = _longest_run(xy, tolerance_m, barred)
+    first, count = _longest_run(xy, tolerance, barred)
     run = xy[np.arange(first, first + count + 1) % len(xy)]
     return fit_run(run)
 
@@ -100,16 +100,16 @@ def fit_run(run: FloatArray) -> StraightRun:
     return StraightRun(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
 
 
-def _along_frame(xy: FloatArray, frame: Polygon, tolerance_m: float) -> NDArray[np.bool_]:
+def _along_frame(xy: FloatArray, frame: Polygon, tolerance: float) -> NDArray[np.bool_]:
     """Which edges of a ring run along one side of the frame."""
     corners = shapely.get_coordinates(frame.exterior)
     sides = np.asarray(shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1)))
     points = np.asarray(shapely.points(xy))
-    near = shapely.distance(points[:, None], sides[None, :]) <= tolerance_m
+    near = shapely.distance(points[:, None], sides[None, :]) <= tolerance
     return np.asarray((near & np.roll(near, -1, axis=0)).any(axis=1))
 
 
-def _longest_run(xy: FloatArray, tolerance_m: float, barred: NDArray[np.bool_]) -> tuple[int, int]:
+def _longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) -> tuple[int, int]:
     """First vertex and number of edges of the longest run of a ring without its closing vertex.
 
     No run goes over an edge that is barred.
@@ -132,15 +132,15 @@ def _longest_run(xy: FloatArray, tolerance_m: float, barred: NDArray[np.bool_]) 
             axis[active] = angle
         # Angles are reckoned from the first edge, so that the cut at 180 degrees lies behind.
         turn = (angle - axis[active] + np.pi) % (2.0 * np.pi) - np.pi
-        near = distance <= tolerance_m
+        near = distance <= tolerance
         first_far = ~near & np.isinf(low[active])
         axis[active[first_far]] = angle[first_far]
         turn[first_far] = 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            spread = np.where(near, np.inf, np.arcsin(np.minimum(tolerance_m / distance, 1.0)))
+            spread = np.where(near, np.inf, np.arcsin(np.minimum(tolerance / distance, 1.0)))
         inside = near | ((turn >= low[active]) & (turn <= high[active]))
         # The outline may not turn back along itself: that is another edge.
-        ahead = distance >= reach[active] - tolerance_m
+        ahead = distance >= reach[active] - tolerance
         good = inside & ahead & ~near
         if good.any():
             lengths = np.where(good, distance, -1.0)

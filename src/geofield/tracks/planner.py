@@ -9,6 +9,7 @@ import numpy as np
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from geofield.crs import ground_scale
 from geofield.errors import TrackError, TrackWarning
 from geofield.grid import Grid
 from geofield.model.obstacles import ObstacleShapes
@@ -63,7 +64,7 @@ def plan_tracks(
     crs : CRS, str or int
         Of the field; projected, in metres (usually the UTM zone).
     spacing_m : float
-        Between neighbouring tracks.
+        Between neighbouring tracks. This and all other lengths are metres on the ground.
     direction : str, float, LineString or pair of points
         ``longest_edge`` (of the outer ring), ``hough`` (the study's way to it), ``fewest`` (tracks)
         or ``fewest_turns`` (pieces), a heading in degrees clockwise from true north, or an A-B
@@ -118,10 +119,11 @@ def plan_tracks(
         grid=grid,
     )
     centre = outline.centroid
-    frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left)
+    scale = ground_scale(metric_crs, centre.x, centre.y)
+    frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left, scale=scale)
     inner: BaseGeometry = outline
     if headland_m != 0.0:
-        inner = main_area(outline, headland_m, holes=headland_holes)
+        inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
     edges = polygon_edges(inner, frame, FIELD)
     positions, spacing_m, more = _positions(
         edges,
@@ -137,13 +139,16 @@ def plan_tracks(
     pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
-        optional["headland"] = headland_table(outline, inner, headland_m, metric_crs)
+        optional["headland"] = headland_table(
+            outline, inner, headland_m, crs=metric_crs, scale=scale
+        )
         optional["headland_tracks"] = headland_track_table(
             outline,
             shapes,
             width_m=headland_m,
             spacing_m=float(wanted_m),
             crs=metric_crs,
+            scale=scale,
             holes=headland_holes,
         )
     return _tracks(

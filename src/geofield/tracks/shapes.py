@@ -46,7 +46,7 @@ class Edges:
 
 @dataclass(frozen=True, slots=True)
 class Discs:
-    """True circles in the track frame: centres and radii in metres, and their obstacle."""
+    """True circles in the track frame: centres and radii in ground metres, and their obstacle."""
 
     u: FloatArray
     v: FloatArray
@@ -120,8 +120,9 @@ def join_edges(first: Edges, second: Edges) -> Edges:
 
 
 def discs_in_frame(
-    x: FloatArray, y: FloatArray, radius_m: FloatArray, owner: IntArray, frame: TrackFrame
+    x: FloatArray, y: FloatArray, radius: FloatArray, owner: IntArray, frame: TrackFrame
 ) -> Discs:
-    """Carry circles of the metric CRS into the frame."""
+    """Carry circles of the metric CRS, radii in its units, into the frame."""
     u, v = frame.to_frame(x, y)
-    return Discs(u, v, np.asarray(radius_m, dtype=np.float64), np.asarray(owner, dtype=np.int64))
+    radius_m = np.asarray(radius, dtype=np.float64) / frame.scale
+    return Discs(u, v, radius_m, np.asarray(owner, dtype=np.int64))

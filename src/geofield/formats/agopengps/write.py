@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from geofield import schema
+from geofield.crs import ground_areas_m2
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
 from geofield.formats.arrow import exact_geometry, to_lonlat
@@ -68,7 +69,7 @@ def _field(name: str, plane: LocalPlane, stamp: str) -> list[str]:
 
 
 def _boundary(dataset: Dataset, polygon: Any, plane: LocalPlane) -> list[str]:
-    area_ha = polygon.area / 10_000.0
+    area_ha = float(ground_areas_m2([polygon], dataset.crs)[0]) / 10_000.0
     step = next(step for limit, step in _STEPS if area_ha < limit)
     obstacles = avoided(dataset)
     rings = [polygon.exterior, *polygon.interiors]

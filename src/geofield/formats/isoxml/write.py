@@ -16,6 +16,7 @@ import shapely
 from pyproj import Geod
 
 from geofield import schema
+from geofield.crs import ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
@@ -79,7 +80,7 @@ def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, A
         "PFD",
         A="PFD1",
         C=cut_name(dataset.name, DESIGNATOR),
-        D=str(round(polygon.area)),
+        D=str(round(float(ground_areas_m2([polygon], dataset.crs)[0]))),
         E="CTR1",
         F="FRM1",
     )
@@ -95,23 +96,26 @@ def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, A
 
 def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:
     outline = to_lonlat(np.array([polygon], dtype=object), dataset.crs)[0]
-    _add_polygon(part, PolygonType.BOUNDARY, dataset.name, polygon.area, outline)
+    area_m2 = float(ground_areas_m2([polygon], dataset.crs)[0])
+    _add_polygon(part, PolygonType.BOUNDARY, dataset.name, area_m2, outline)
     obstacles = avoided(dataset)
     shapes = exact_geometry(schema.OBSTACLES, obstacles)
     placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes
     names = [f"Obstacle {number}" for number in obstacles["obstacle_no"]]
     # Some readers pass over the holes of a boundary: an obstacle is a polygon of its own.
-    for name, shape, lonlat in zip(names, shapes, placed, strict=True):
-        _add_polygon(part, PolygonType.OBSTACLE, name, shape.area, lonlat)
+    areas_m2 = ground_areas_m2(shapes, dataset.crs)
+    for name, each_m2, lonlat in zip(names, areas_m2, placed, strict=True):
+        _add_polygon(part, PolygonType.OBSTACLE, name, each_m2, lonlat)
     if version < 4:
         return
     if dataset.has("headland"):
         rows = dataset.table("headland").explode(ignore_index=True)
         shapes = np.asarray(rows.geometry.to_numpy(), dtype=object)
-        for number, (shape, lonlat) in enumerate(
-            zip(shapes, to_lonlat(shapes, dataset.crs), strict=True), start=1
+        areas_m2 = ground_areas_m2(shapes, dataset.crs)
+        for number, (each_m2, lonlat) in enumerate(
+            zip(areas_m2, to_lonlat(shapes, dataset.crs), strict=True), start=1
         ):
-            _add_polygon(part, PolygonType.HEADLAND, f"Headland {number}", shape.area, lonlat)
+            _add_polygon(part, PolygonType.HEADLAND, f"Headland {number}", each_m2, lonlat)
     trees = obstacles["kind"].to_numpy() == "tree"
     for name, shape in zip(np.array(names)[trees], placed[trees], strict=True):
         centre = shape.centroid
@@ -229,7 +233,7 @@ def _heading_deg(line: Any) -> float:
 
 
 def _offsets(dataset: Dataset) -> tuple[Any, Any] | None:
-    """The first track as a straight line, and how far right of it the others' middles lie."""
+    """The first track as a straight line, and the others' middles right of it, ground metres."""
     tracks = dataset.table(schema.TRACKS.name)
     if not len(tracks):
         return None
@@ -238,7 +242,8 @@ def _offsets(dataset: Dataset) -> tuple[Any, Any] | None:
     direction = (end - start) / np.hypot(*(end - start))
     middles = np.array([(line[0] + line[-1]) / 2 for line in coordinates])
     right = np.array([direction[1], -direction[0]])
-    return shapely.LineString([start, end]), (middles - start) @ right
+    scale = ground_scale_of(dataset.table(schema.FIELD.name).geometry.iloc[0], dataset.crs)
+    return shapely.LineString([start, end]), (middles - start) @ right / scale
 
 
 def _reference(dataset: Dataset) -> tuple[Any, int, int] | None:

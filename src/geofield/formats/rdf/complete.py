@@ -9,7 +9,13 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, grid_north_deg, transformer
+from geofield.crs import (
+    LONLAT,
+    grid_north_deg,
+    ground_areas_m2,
+    ground_lengths_m,
+    transformer,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -22,14 +28,14 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS) -> None:
     segments from tracks that have none. An obstacle without a word on its status counts as
     added by a person, so that no re-run drops it.
     """
-    _field(tables["field"])
+    _field(tables["field"], crs)
     _obstacles(tables["obstacles"], crs)
     _numbers(tables)
     if len(tables["tracks"]) and not len(tables["segments"]):
         tables["segments"] = _segments(tables["tracks"], crs)
     _tracks(tables)
     for name in ("tracks", "segments", "gaps"):
-        _fill(tables[name], "length_m", shapely.length(tables[name].geometry.to_numpy()))
+        _fill(tables[name], "length_m", ground_lengths_m(tables[name].geometry.to_numpy(), crs))
     _positions(tables["track_points"], crs)
 
 
@@ -39,11 +45,15 @@ def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
         frame.loc[missing, column] = np.asarray(values)[missing.to_numpy()]
 
 
-def _field(frame: gpd.GeoDataFrame) -> None:
+def _field(frame: gpd.GeoDataFrame, crs: CRS) -> None:
     shapes = frame.geometry.to_numpy()
-    _fill(frame, "area_ha", shapely.area(shapes) / 1e4)
+    _fill(frame, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
     if len(frame):
-        _fill(frame, "perimeter_m", shapely.length(shapely.get_exterior_ring(shapes)))
+        _fill(
+            frame,
+            "perimeter_m",
+            ground_lengths_m(shapely.get_exterior_ring(shapes), crs),
+        )
 
 
 def _obstacles(frame: gpd.GeoDataFrame, crs: CRS) -> None:

@@ -16,7 +16,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, ground_areas_m2, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import LayerMap, all_terms, layer_map, value_iri
 from geofield.formats.rdf.namespaces import (
@@ -225,7 +225,8 @@ def _measures(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Property]:
     """Square metres of polygons: GeoSPARQL's own property beside the layer's columns."""
     if layer.layer.geometry not in ("Polygon", "MultiPolygon"):
         return []
-    return [Property(GEO + "hasMetricArea", DOUBLE, (float_texts(frame.geometry.area.to_numpy()),))]
+    areas_m2 = ground_areas_m2(frame.geometry.to_numpy(), CRS(frame.crs))
+    return [Property(GEO + "hasMetricArea", DOUBLE, (float_texts(areas_m2),))]
 
 
 def _grid_coordinates(geometry: Any) -> list[Property]:

@@ -366,7 +366,7 @@ def _from_positions(
                 f"how large a pixel of <{SVG_CIRCLE}r> is.",
                 hint=f"Add gf:radiusInMetres to it (<{STUDY_OBSTACLE}no> names it).",
             )
-        geometry[usable] = circle_polygons(x, y, radius + margin)
+        geometry[usable] = circle_polygons(x, y, radius + margin, crs)
     elif layer.layer.geometry == "Point":
         geometry[usable] = shapely.points(x, y)
 

@@ -11,9 +11,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
+from shapely import Polygon
 
 from geofield import schema
 from geofield.errors import TrackError, TrackWarning
+from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.route.order import PATTERNS, IntArray, Pattern, nearest_start
@@ -73,11 +75,14 @@ def plan_route(
             "These tracks do not know their field and obstacles.", hint="Plan them anew first."
         )
     _check(pattern, curve, skip, margin_m)
+    # Ways are planned in metres on the ground, and carried back to the CRS when they are done.
+    scale = tracks.ground_scale
+    outline, shapes = _on_the_ground(outline, shapes, scale)
     if turning_radius_m is not None:
         _check_radius(turning_radius_m, outline.bounds, margin_m)
-    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)
+    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2) / scale
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
-    place = None if start is None else _place(start)
+    place = None if start is None else _place(start) / scale
     passage = Passage(outline, shapes, margin_m=margin_m)
     rows, backward = nearest_start(ends, track_no, skip if pattern == "skip" else 0, place)
     if pattern == "shortest":
@@ -109,6 +114,22 @@ def plan_route(
         warnings.warn(note, TrackWarning, stacklevel=2)
         notes = (*notes, note)
     return replace(tracks, route=route, turns=table, notes=notes)
+
+
+def _on_the_ground(
+    outline: Polygon, shapes: ObstacleShapes, scale: float
+) -> tuple[Polygon, ObstacleShapes]:
+    """Field and obstacles with one unit to a metre on the ground."""
+
+    def shrunk(coordinates: FloatArray) -> FloatArray:
+        return coordinates / scale
+
+    return shapely.transform(outline, shrunk), ObstacleShapes(
+        shapes.circles / scale,
+        shapes.circle_no,
+        shapely.transform(shapes.polygons, shrunk),
+        shapes.polygon_no,
+    )
 
 
 def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
@@ -171,18 +192,19 @@ def _tables(
     radius_m: float | None,
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
     """Layers `route` and `turns`; work gets the odd sequence numbers, ways the even ones."""
+    scale = tracks.ground_scale
     ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)[rows]
     ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
     early = np.array([turn.early_m for turn in turns] + [0.0] * (len(rows) > len(turns)))
     late = np.array([0.0] * (len(rows) > len(turns)) + [turn.late_m for turn in turns])
-    whole = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    whole = np.hypot(*(ends[:, 1] - ends[:, 0]).T) / scale
     along = (ends[:, 1] - ends[:, 0]) / whole[:, None]
     ends = ends + np.stack((along * late[:, None], -along * early[:, None]), axis=1)
     work_m = whole - early - late
     count = len(rows) + len(turns)
     geometry = np.empty(count, dtype=object)
     geometry[0::2] = shapely.linestrings(ends) if len(ends) else []
-    lines = [shapely.LineString(_two(turn.places)) for turn in turns]
+    lines = [shapely.LineString(_two(turn.places) * scale) for turn in turns]
     geometry[1::2] = lines
     length = np.empty(count)
     length[0::2] = work_m
