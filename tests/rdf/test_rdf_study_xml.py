@@ -34,6 +34,8 @@ def test_it_has_the_studys_elements(plan, tmp_path):
 def test_the_registry_writes_and_reads(plan, tmp_path, name):
     from test_rdf_read import assert_same_tables
 
-    paths = write_dataset(plan, tmp_path, [name], options={"base_iri": "https://a.example/"})
+    paths = write_dataset(
+        plan, tmp_path, [name], options={"base_iri": "https://a.example/", "points": "yes"}
+    )
     assert {p.name for p in paths} == {f.format(stem="field") for f in FORMATS[name].files}
-    assert_same_tables(read_dataset(paths[0]), plan)
+    assert_same_tables(read_dataset(paths[0]), plan, points=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pyoxigraph as ox
 import pytest
 import rdflib
@@ -10,6 +12,7 @@ from rdflib.compare import isomorphic
 
 from geofield.errors import FormatError
 from geofield.formats.rdf import write
+from geofield.formats.rdf.names import Names
 
 WRITERS = {
     "xml": write.write_rdfxml,
@@ -64,8 +67,12 @@ def test_the_base_names_every_feature(plan, tmp_path):
     graph = triples(write.write_ntriples(plan, tmp_path, options={"base_iri": BASE.rstrip("/")}))
     own = {str(t.subject.value) for t in graph}
     assert all(iri.startswith(BASE) for iri in own)
-    assert f"{BASE}field/cy-1/track/7/geometry" in own
-    assert f"{BASE}field/cy-1/obstacle/3" in own
+    field = f"{BASE}field/35.075N33.531E/cy-1"
+    names = Names.of(plan, base=BASE)
+    assert names.field == field
+    assert re.fullmatch(f"{field}/plan/[0-9a-f]{{12}}", names.plan)
+    assert f"{names.plan}/track/7/geometry" in own
+    assert f"{names.survey}/obstacle/3" in own
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from geofield import schema
 from geofield.formats.format import Drop, Format
 
 _ALL = tuple(layer.name for layer in schema.LAYERS)
-_RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name")
+_RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name", "points")
 
 _TERMINAL_DROPS = (
     Drop("rejected obstacles and the status, radius and confidence of the others", "obstacles"),
@@ -238,7 +238,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.rdf.read:read",
         validator="geofield.formats.rdf.validate:check",
         precision_m=0.0,
-        options=("base_iri", "plan_name"),
+        options=("base_iri", "plan_name", "points"),
     ),
     Format(
         "study-xml",

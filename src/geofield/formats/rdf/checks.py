@@ -12,10 +12,11 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
-from geofield.formats.rdf.layers import LayerMap, layer_maps
+from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
 from geofield.formats.rdf.namespaces import GEO, GF, GML, STUDY_POINT, expand
 from geofield.formats.rdf.parse import Graph
 from geofield.formats.rdf.problem import Problem
+from geofield.formats.rdf.scope import track_of
 from geofield.formats.rdf.wkt import geometry_of
 
 #: Farther than this from its field, in degrees (about 10 km), nothing belongs to it.
@@ -43,7 +44,7 @@ def check_graph(graph: Graph) -> Iterator[Problem]:
 
 def _unnamed(graph: Graph) -> Iterator[Problem]:
     for layer in layer_maps():
-        for iri in graph.of_type(expand(layer.cls)):
+        for iri in graph.of_type(*classes(layer)):
             if ":" not in iri:
                 yield Problem(
                     f"A {layer.cls} has no IRI.",
@@ -59,7 +60,7 @@ def _double_numbers(graph: Graph) -> Iterator[Problem]:
         if not layer.layer.key or layer.layer.name == "field":
             continue
         seen: dict[tuple[Any, ...], str] = {}
-        for iri in graph.of_type(expand(layer.cls)):
+        for iri in graph.of_type(*classes(layer)):
             key = _key(graph, layer, iri)
             if key is None:
                 continue
@@ -90,17 +91,14 @@ def _double_study_points(graph: Graph) -> Iterator[Problem]:
 
 def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
     """What must be unique: the owner, then the layer's own key numbers."""
-    owner = next(
-        (graph.value(iri, GF + n) for n in ("onTrack", "inPlan", "inField") if
-         graph.value(iri, GF + n)),
-        None,
-    )  # fmt: skip
+    owners = ("gf:onTrack", "gf:inPlan", "gf:inSurvey", "gf:inField")
+    owner = next(filter(None, (graph.value(iri, name) for name in owners)), None)
     linked = {link.column for link in layer.links}
     if layer.layer.name == "track_points":
         # Points are numbered through the whole plan, not per track.
-        owner = graph.value(owner, GF + "inPlan") if owner else None
+        owner = graph.value(track_of(graph, iri), "gf:inPlan")
     elif layer.layer.name == "route":
-        owner = graph.value(iri, GF + "inPlan")
+        owner = graph.value(iri, "gf:inPlan")
     names = {column.name: name for column, name in layer.properties()}
     numbers = [graph.value(iri, expand(names[key])) for key in layer.layer.key if key not in linked]
     if any(number is None for number in numbers):
@@ -110,11 +108,13 @@ def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
 
 def _dangling(graph: Graph) -> Iterator[Problem]:
     """Links to things of a class of which the file has some, but not this one."""
-    present = {each.cls: set(graph.of_type(expand(each.cls))) for each in layer_maps()}
+    present = {each.cls: set(graph.of_type(*classes(each))) for each in layer_maps()}
+    present["gf:Field"] = set(graph.of_type("gf:Field"))
     present["geo:Geometry"] = {iri for iri, node in graph.nodes.items() if GEO + "asWKT" in node}
     links = {
         GF + "onTrack": "gf:Track", GF + "onSegment": "gf:Segment", GF + "causedBy": "gf:Obstacle",
         GF + "fromTrack": "gf:Track", GF + "toTrack": "gf:Track", GF + "inField": "gf:Field",
+        GF + "inSurvey": "gf:Survey", GF + "basedOn": "gf:Survey",
         GEO + "hasDefaultGeometry": "geo:Geometry", GEO + "hasGeometry": "geo:Geometry",
     }  # fmt: skip
     for iri, node in graph.nodes.items():
@@ -228,7 +228,7 @@ def _places(graph: Graph, shapes: _Geometries) -> Iterator[Problem]:
         return
     ((field, home),) = fields.items()
     for layer in layer_maps():
-        for iri in graph.of_type(expand(layer.cls)):
+        for iri in graph.of_type(*classes(layer)):
             bounds = shapes.bounds_lonlat(graph.value(iri, GEO + "hasDefaultGeometry") or "")
             if bounds is None or iri == field or _near(home, bounds[0], bounds[1], _FAR_DEG):
                 continue

@@ -16,12 +16,13 @@ from geofield.crs import (
     ground_lengths_m,
     transformer,
 )
+from geofield.grid import Grid
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
 
-def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS) -> None:
+def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -> None:
     """Fill gaps in the tables of a file in place; never change a value that is there.
 
     Lengths, areas and positions come from the geometry, counts from the other tables,
@@ -37,6 +38,8 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS) -> None:
     for name in ("tracks", "segments", "gaps"):
         _fill(tables[name], "length_m", ground_lengths_m(tables[name].geometry.to_numpy(), crs))
     _positions(tables["track_points"], crs)
+    if grid is not None:
+        _pixels(tables["track_points"], grid, crs)
 
 
 def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
@@ -80,8 +83,16 @@ def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
         return
     centre = shapely.centroid(frame.geometry.to_numpy())
     lon, lat = transformer(crs, LONLAT).transform(shapely.get_x(centre), shapely.get_y(centre))
-    _fill(frame, "lon", lon)
-    _fill(frame, "lat", lat)
+    # To 0.1 mm: a place that was written with fewer decimals is that place again.
+    _fill(frame, "lon", np.round(lon, 9))
+    _fill(frame, "lat", np.round(lat, 9))
+
+
+def _pixels(frame: gpd.GeoDataFrame, grid: Grid, crs: CRS) -> None:
+    shapes = frame.geometry.to_numpy()
+    x_px, y_px = grid.from_crs(shapely.get_x(shapes), shapely.get_y(shapes), crs)
+    _fill(frame, "x_px", x_px)
+    _fill(frame, "y_px", y_px)
 
 
 def _numbers(tables: dict[str, gpd.GeoDataFrame]) -> None:

@@ -9,39 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import pyoxigraph as ox
 import shapely
 
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
-from geofield.formats.rdf.features import Names, feature_group, row_iris
-from geofield.formats.rdf.iris import NOT_IN_IRI, check_base, field_iri, path_part, plan_iri
+from geofield.formats.rdf.features import feature_group, point_group, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps
-from geofield.formats.rdf.namespaces import (
-    CC,
-    DATE,
-    DC,
-    DCAT,
-    DCTERMS,
-    GEO,
-    GF,
-    LABEL,
-    PROV,
-    SOSA,
-    crs_iri,
-)
-from geofield.formats.rdf.nodes import (
-    IRI,
-    Group,
-    Nodes,
-    Property,
-    constant,
-    float_texts,
-    joined,
-    node,
-    one,
-    strings,
-)
+from geofield.formats.rdf.names import NOT_IN_IRI, Names
+from geofield.formats.rdf.namespaces import crs_iri, node
+from geofield.formats.rdf.triples import Column, Group, Nodes, named, single, term
 from geofield.model.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -63,6 +41,8 @@ LICENCES = {
 }
 #: Metres by which `geo:sfWithin` may miss, for corners that are computed, not measured.
 WITHIN_TOLERANCE_M = 0.001
+#: The files of RDF/XML; also the order of the others.
+PRODUCTS = ("field", "obstacles", "tracks")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,34 +52,14 @@ class Description:
     Attributes
     ----------
     dataset : Dataset
-    base : str
-        Ends in ``/``.
     names : Names
-    plan : str
-        Name of the track plan, empty for the field's own.
+    points : bool
+        Whether the track points are told: most of the bytes, and segments imply them.
     """
 
     dataset: Dataset
-    base: str
     names: Names
-    plan: str = ""
-
-    @classmethod
-    def of(cls, dataset: Dataset, *, base: str | None = None, plan: str = "") -> Description:
-        """The description of a dataset under a base IRI.
-
-        Raises
-        ------
-        FormatError
-            When the base cannot name features.
-        """
-        checked = check_base(base)
-        field_table = dataset.table("field")
-        identifier = dataset.name
-        if len(field_table) and not pd.isna(field_table["field_id"].iloc[0]):
-            identifier = str(field_table["field_id"].iloc[0])
-        field = field_iri(checked, identifier)
-        return cls(dataset, checked, Names(field, plan_iri(field, plan)), plan)
+    points: bool = False
 
     @property
     def accuracy_m(self) -> float | None:
@@ -107,27 +67,18 @@ class Description:
         grid = self.dataset.grid
         return None if grid is None else round(grid.ground_resolution_m, 4)
 
-    @property
-    def imagery(self) -> str:
-        """The IRI of the picture; empty where nothing is known of one."""
-        provenance, grid = self.dataset.provenance, self.dataset.grid
-        known = grid is not None or provenance.source.name or provenance.source.licence
-        if not known:
-            return ""
-        name = provenance.source.name
-        return f"{self.base}imagery/{path_part(name)}" if name else f"{self.names.field}/imagery"
-
-    # -- products ------------------------------------------------------------------------
-
     def everything(self) -> Iterator[Group]:
         """All there is, in order."""
-        for product in ("field", "obstacles", "tracks"):
+        for product in PRODUCTS:
             yield from self.product(product)
 
     def product(self, product: str) -> Iterator[Group]:
         """What belongs into one of the files `field`, `obstacles`, `tracks`."""
         if product == "field":
             yield from self.origin()
+            yield from self._field()
+        elif product == "tracks":
+            yield from self._plan()
         for layer in layer_maps():
             if layer.product == product:
                 yield from self.layer(layer)
@@ -136,169 +87,184 @@ class Description:
         """A layer's features, and what only they have."""
         name = layer.layer.name
         if name == schema.TRACK_POINTS.name:
-            for chunk in self.dataset.point_chunks():
-                yield feature_group(layer, chunk, self.names)
-            return
-        if not self.dataset.has(name):
-            return
-        frame = keyed(layer, self.dataset.table(name))
-        if name == self._first_in_plan():
-            yield self._plan_node()
-        extra = self._extra(name, frame)
-        group = feature_group(layer, frame, self.names, extra=extra, accuracy_m=self.accuracy_m)
-        yield group
+            for chunk in self.dataset.point_chunks() if self.points else ():
+                yield point_group(chunk, self.names)
+        elif self.dataset.has(name):
+            frame = self.table(layer)
+            extra = self.belonging(name, frame)
+            yield feature_group(layer, frame, self.names, extra=extra, accuracy_m=self.accuracy_m)
+            if name == schema.OBSTACLES.name:
+                yield from self.detections(frame)
+
+    def table(self, layer: LayerMap) -> gpd.GeoDataFrame:
+        """A layer's table, a number in every row; a field's without what its own node tells."""
+        table = self.dataset.table(layer.layer.name)
+        if layer.layer.name != schema.FIELD.name:
+            return keyed(layer, table)
+        apart = ["heading_deg"] if self._has_plan() else []
+        return table.drop(columns=[*apart, "field_id", "name"])
+
+    def belonging(self, name: str, frame: gpd.GeoDataFrame) -> list[Column]:
+        """What the rows of a layer say beyond their columns: what they belong to."""
+        names, count = self.names, len(frame)
+
+        def all_to(predicate: str, iri: str) -> Column:
+            return (node(predicate), [ox.NamedNode(iri) if iri else None] * count)
+
+        result: list[Column] = []
+        if name in (schema.FIELD.name, schema.OBSTACLES.name, schema.TRACKS.name):
+            result.append(all_to("gf:inField", names.field))
+        if name in (schema.FIELD.name, schema.OBSTACLES.name):
+            result.append(all_to("prov:wasDerivedFrom", names.imagery))
+        if name == schema.FIELD.name:
+            result.append(all_to("prov:wasGeneratedBy", names.run))
         if name == schema.OBSTACLES.name:
-            yield from self._detections(layer, frame)
-
-    def _first_in_plan(self) -> str:
-        """The first layer that belongs to the plan and has rows; points stand elsewhere."""
-        names = [each.layer.name for each in layer_maps() if each.in_plan and each.metric_geometry]
-        return next((name for name in names if self.dataset.has(name)), "")
-
-    def _extra(self, name: str, frame: gpd.GeoDataFrame) -> list[Property]:
-        count = len(frame)
-        result: list[Property] = []
-        if name in (schema.OBSTACLES.name, schema.TRACKS.name):
-            result.append(Property(GF + "inField", IRI, (constant(self.names.field, count),)))
-            result += self._within(frame)
+            result.append(all_to("gf:inSurvey", names.survey))
         if name == schema.TRACKS.name:
-            result.append(
-                Property(PROV + "wasDerivedFrom", IRI, (constant(self.names.field, count),))
-            )
+            result.append(all_to("prov:wasDerivedFrom", names.survey))
+        if name in (schema.OBSTACLES.name, schema.TRACKS.name):
+            result.append(self._within(frame))
         layer = layer_map(name)
         if layer.in_plan and layer.says_plan:
-            result.append(Property(GF + "inPlan", IRI, (constant(self._plan_iri(), count),)))
+            result.append(all_to("gf:inPlan", names.plan))
         if name == schema.ROUTE.name:
-            steps = row_iris(layer, frame, self.names).to_pylist()
-            following = strings([*steps[1:], None])
-            result.append(Property(GF + "nextStep", IRI, (following,)))
-        source = self.imagery if name in ("field", "obstacles") else ""
-        if source:
-            result.append(Property(PROV + "wasDerivedFrom", IRI, (constant(source, count),)))
+            steps = row_iris(layer, frame, names)
+            result.append((node("gf:nextStep"), named([*steps[1:], None])))
         return result
 
-    def _within(self, frame: gpd.GeoDataFrame) -> list[Property]:
-        fields = self.dataset.table("field")
-        if not len(fields):
-            return []
-        outline = shapely.buffer(fields.geometry.iloc[0], WITHIN_TOLERANCE_M)
-        shapely.prepare(outline)
-        within = shapely.within(frame.geometry.to_numpy(), outline)
-        if not within.any():
-            return []
-        import pyarrow as pa
-
-        texts = pa.array([self.names.field if inside else None for inside in within], pa.string())
-        return [Property(GEO + "sfWithin", IRI, (texts,))]
+    def _within(self, frame: gpd.GeoDataFrame) -> Column:
+        fields = self.dataset.table(schema.FIELD.name)
+        within = np.zeros(len(frame), bool)
+        if len(fields):
+            outline = shapely.buffer(fields.geometry.iloc[0], WITHIN_TOLERANCE_M)
+            shapely.prepare(outline)
+            within = shapely.within(frame.geometry.to_numpy(), outline)
+        field = ox.NamedNode(self.names.field)
+        return (node("geo:sfWithin"), [field if inside else None for inside in within])
 
     # -- nodes that are not rows -----------------------------------------------------------
 
-    def _plan_iri(self) -> str:
-        return self.names.plan if self.plan else f"{self.names.field}/plan"
-
-    def _plan_node(self) -> Group:
-        software = self.dataset.provenance.software
-        return node(
-            self._plan_iri(),
-            (GF + "TrackPlan", PROV + "Entity"),
-            one(LABEL, f"Tracks of {self.dataset.name}"),
-            one(GF + "inField", self.names.field, datatype=IRI),
-            one(GF + "planner", software),
-            one(PROV + "wasDerivedFrom", self.names.field, datatype=IRI),
-            one(PROV + "wasGeneratedBy", self._activity, datatype=IRI),
+    def _field(self) -> Iterator[Group]:
+        """The field itself: what stays the same whoever surveys it."""
+        table = self.dataset.table(schema.FIELD.name)
+        if not len(table):
+            return
+        row, place = table.iloc[0], f"{self.names.survey}/geometry"
+        identifier, name = (None if pd.isna(row[c]) else str(row[c]) for c in ("field_id", "name"))
+        crs = crs_iri(self.dataset.crs)
+        metric = [f"{place}/EPSG-{crs.rpartition('/')[2]}"] if crs else []
+        yield single(
+            self.names.field,
+            "gf:Field s4agri:Parcel geo:Feature",
+            dcterms_identifier=identifier,
+            rdfs_label=name,
+            prov_wasDerivedFrom=_thing(self.names.imagery),
+            geo_hasDefaultGeometry=_thing(place),
+            geo_hasGeometry=tuple(map(ox.NamedNode, (place, *metric))),
         )
 
-    @property
-    def _activity(self) -> str:
-        return f"{self.names.plan}/run"
+    def _has_plan(self) -> bool:
+        return self.dataset.has(schema.TRACKS.name)
 
-    def _detections(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> Iterator[Group]:
+    def _plan(self) -> Iterator[Group]:
+        """The plan of tracks, where the dataset has any layer of one."""
+        dataset, names = self.dataset, self.names
+        layers = [each.layer.name for each in layer_maps() if each.in_plan]
+        if not any(map(dataset.has, layers)):
+            return
+        rows = dataset.table(schema.FIELD.name)
+        heading = rows["heading_deg"].iloc[0] if len(rows) and self._has_plan() else np.nan
+        surveyed = len(rows) or dataset.has(schema.OBSTACLES.name)
+        yield single(
+            names.plan,
+            "gf:TrackPlan prov:Entity",
+            rdfs_label=f"Tracks of {dataset.name}",
+            gf_inField=_thing(names.field),
+            gf_basedOn=_thing(names.survey) if surveyed else None,
+            gf_headingInDegrees=None if pd.isna(heading) else float(heading),
+            gf_planner=dataset.provenance.software,
+            prov_wasDerivedFrom=_thing(names.survey if surveyed else names.field),
+            prov_wasGeneratedBy=_thing(names.run),
+        )
+
+    def detections(self, frame: gpd.GeoDataFrame) -> Iterator[Group]:
         """One observation for each obstacle that was not added by a person."""
         found = frame[frame["status"] != "added"]
-        if not len(found):
-            return
-        iris = row_iris(layer, found, self.names)
-        observed = joined(iris, "/detection")
-        confidence = float_texts(found["confidence"].to_numpy(dtype="float64", na_value=np.nan))
-        properties = [
-            Property(SOSA + "hasFeatureOfInterest", IRI, (iris,)),
-            Property(
-                SOSA + "observedProperty", IRI, (constant(GF + "obstaclePresence", len(found)),)
+        iris = row_iris(layer_map(schema.OBSTACLES.name), found, self.names)
+        count, imagery = len(found), _thing(self.names.imagery)
+        confidence = found["confidence"].tolist()
+        columns: list[Column] = [
+            (node("rdf:type"), [(node("gf:Detection"), node("sosa:Observation"))] * count),
+            (node("sosa:hasFeatureOfInterest"), named(iris)),
+            (node("sosa:observedProperty"), [node("gf:obstaclePresence")] * count),
+            (
+                node("sosa:hasSimpleResult"),
+                [None if pd.isna(value) else term(float(value)) for value in confidence],
             ),
+            (node("prov:wasDerivedFrom"), [imagery] * count),
         ]
-        if confidence.null_count < len(confidence):
-            properties.append(
-                Property(
-                    SOSA + "hasSimpleResult",
-                    "http://www.w3.org/2001/XMLSchema#double",
-                    (confidence,),
-                )
-            )
-        if self.imagery:
-            properties.append(
-                Property(PROV + "wasDerivedFrom", IRI, (constant(self.imagery, len(found)),))
-            )
-        yield (Nodes(observed, (GF + "Detection", SOSA + "Observation"), tuple(properties)),)
+        yield (Nodes(named(f"{iri}/detection" for iri in iris), columns),)
 
     def origin(self) -> Iterator[Group]:
         """The dataset, the run, the software and the picture."""
-        dataset, provenance = self.dataset, self.dataset.provenance
-        source, imagery = provenance.source, self.imagery
-        crs = crs_iri(dataset.crs)
-        software = self._software()
-        yield node(
-            f"{self.names.field}/dataset",
-            (DCAT + "Dataset", PROV + "Entity"),
-            one(DCTERMS + "title", dataset.name),
-            one(DCTERMS + "subject", self.names.field, datatype=IRI),
-            one(DCTERMS + "license", licence_iri(source.licence), datatype=IRI),
-            one(DC + "rights", source.licence),
-            one(CC + "attributionName", source.attribution),
-            one(GF + "metricCrs", crs, datatype=IRI),
-            one(GF + "metricCrsWkt", None if crs else dataset.crs.to_wkt()),
-            one(PROV + "wasGeneratedBy", self._activity, datatype=IRI),
-            one(PROV + "wasDerivedFrom", imagery, datatype=IRI),
+        dataset, provenance, names = self.dataset, self.dataset.provenance, self.names
+        source = provenance.source
+        crs, imagery, software = crs_iri(dataset.crs), _thing(names.imagery), names.software
+        licence = _thing(licence_iri(source.licence))
+        yield single(
+            names.dataset,
+            "dcat:Dataset prov:Entity",
+            dcterms_title=dataset.name,
+            dcterms_subject=_thing(names.field),
+            dcterms_license=licence,
+            dc_rights=source.licence,
+            cc_attributionName=source.attribution,
+            gf_metricCrs=_thing(crs),
+            gf_metricCrsWkt=None if crs else dataset.crs.to_wkt(),
+            prov_wasGeneratedBy=_thing(names.run),
+            prov_wasDerivedFrom=imagery,
         )
-        yield node(
-            self._activity,
-            (PROV + "Activity",),
-            one(PROV + "used", imagery, datatype=IRI),
-            one(PROV + "wasAssociatedWith", software, datatype=IRI),
-            one(GF + "settings", _json(provenance.settings)),
-            one(GF + "evidence", _json(provenance.evidence)),
+        yield single(
+            names.run,
+            "prov:Activity",
+            prov_used=imagery,
+            prov_wasAssociatedWith=_thing(software),
+            gf_settings=_json(provenance.settings),
+            gf_evidence=_json(provenance.evidence),
         )
         if software:
-            yield node(software, (PROV + "SoftwareAgent",), one(LABEL, provenance.software))
-        if imagery:
-            yield self._imagery_node()
-
-    def _software(self) -> str:
-        name = self.dataset.provenance.software
-        return f"{self.base}software/{'/'.join(map(path_part, name.split()))}" if name else ""
-
-    def _imagery_node(self) -> Group:
-        dataset, source, grid = self.dataset, self.dataset.provenance.source, self.dataset.grid
-        properties = [
-            one(LABEL, source.name),
-            one(DCTERMS + "created", source.date, datatype=DATE if is_date(source.date) else None),
-            one(DCTERMS + "license", licence_iri(source.licence), datatype=IRI),
-            one(DC + "rights", source.licence),
-            one(CC + "attributionName", source.attribution),
-            one(GF + "mayDerive", source.may_derive),
-            one(GF + "mayCache", source.may_cache),
-            one(GF + "zoom", source.zoom),
-            one(GF + "details", _json(source.details) if source.details else None),
-            one(GF + "fileName", dataset.scene_path.name if dataset.scene_path else None),
-        ]
+            yield single(software, "prov:SoftwareAgent", rdfs_label=provenance.software)
+        if not names.imagery:
+            return
+        grid, facts = dataset.grid, {}
         if grid is not None:
             authority = authority_name(grid.crs)
-            properties += [
-                one(GF + "widthInPixels", grid.width_px),
-                one(GF + "heightInPixels", grid.height_px),
-                one(GF + "geoTransform", " ".join(repr(float(v)) for v in grid.transform[:6])),
-                one(GF + "gridCrs", authority if ":" in authority else grid.crs.to_wkt()),
-            ]
-        return node(self.imagery, (PROV + "Entity",), *properties)
+            facts = {
+                "gf_widthInPixels": int(grid.width_px),
+                "gf_heightInPixels": int(grid.height_px),
+                "gf_geoTransform": " ".join(repr(float(v)) for v in grid.transform[:6]),
+                "gf_gridCrs": authority if ":" in authority else grid.crs.to_wkt(),
+            }
+        date: Any = source.date
+        yield single(
+            names.imagery,
+            "prov:Entity",
+            rdfs_label=source.name,
+            dcterms_created=ox.Literal(date, datatype=node("xsd:date")) if is_date(date) else date,
+            dcterms_license=licence,
+            dc_rights=source.licence,
+            cc_attributionName=source.attribution,
+            gf_mayDerive=source.may_derive,
+            gf_mayCache=source.may_cache,
+            gf_zoom=source.zoom,
+            gf_details=_json(source.details) if source.details else None,
+            gf_fileName=dataset.scene_path.name if dataset.scene_path else None,
+            **facts,
+        )
+
+
+def _thing(iri: str | None) -> ox.NamedNode | None:
+    return ox.NamedNode(iri) if iri else None
 
 
 def keyed(layer: LayerMap, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -346,6 +312,3 @@ def is_date(text: str | None) -> bool:
 def _json(value: Any) -> str:
     plain = dict(value) if hasattr(value, "items") else value
     return json.dumps(plain, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
-
-
-__all__ = ["Description", "keyed", "layer_map", "licence_iri"]

@@ -17,9 +17,10 @@ from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer, utm_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEOF, UNIT, WKT
+from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEO, GEOF, UNIT
 from geofield.formats.rdf.wkt import geometries_of
 
+WKT = GEO + "wktLiteral"
 _GEOD = Geod(ellps="WGS84")
 #: Units of measure that `geof:distance` and `geof:buffer` take.
 METRE_IRIS = (

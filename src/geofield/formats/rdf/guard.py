@@ -14,7 +14,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.iris import NOT_IN_IRI
+from geofield.formats.rdf.names import NOT_IN_IRI
 from geofield.formats.rdf.namespaces import RDF
 
 #: Elements inside elements; an honest file needs about 4, generous nesting 20.

@@ -1,97 +1,77 @@
 """JSON-LD 1.1: one node a line under the context that the package ships.
 
-The context stands inside each file, so that readers need no network.
+pyoxigraph writes JSON-LD without a context; people read this one. The context stands inside
+each file, so that readers need no network.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable
+from typing import IO, Any
 
-from geofield.formats.rdf.layers import all_terms
-from geofield.formats.rdf.namespaces import RDFS, STRING
-from geofield.formats.rdf.nodes import IRI, Group, Nodes, Property, join_values, joined, text_of
-from geofield.formats.rdf.serialise import Serialiser, escaped, pieces
+import pyoxigraph as ox
 
-
-def json_context(prefixes: dict[str, str]) -> dict[str, object]:
-    """The JSON-LD context: prefixes, and a short term with its type for each property."""
-    context: dict[str, object] = dict(prefixes)
-    for term in all_terms().values():
-        entry = {"@id": term.name}
-        # Without a type a JSON string is a plain string already.
-        if term.range != "xsd:string":
-            entry["@type"] = "@id" if term.is_object else term.range
-        context[term.name.partition(":")[2]] = entry
-    return context
+from geofield.formats.rdf.namespaces import GF, STRING, TYPE, compact, expand
+from geofield.formats.rdf.resources import context
+from geofield.formats.rdf.triples import Column, Group
 
 
-def _escape(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)[1:-1]
+def write_jsonld(groups: Iterable[Group], file: IO[bytes], prefixes: dict[str, str]) -> None:
+    """Write groups of nodes as a flat graph, as they come."""
+    terms = {
+        (expand(entry["@id"]), _kind(entry.get("@type", ""))): name
+        for name, entry in context().items()
+        if isinstance(entry, dict)
+    }
+    whole = json.dumps({**context(), **prefixes}, indent=1, ensure_ascii=False)
+    file.write(f'{{\n"@context": {whole},\n"@graph": ['.encode())
+    separator = "\n"
+    for group in groups:
+        written = [[_entries(column, terms) for column in nodes.columns] for nodes in group]
+        for index in range(len(group[0].subjects)):
+            for nodes, columns in zip(group, written, strict=True):
+                node: dict[str, Any] = {"@id": nodes.subjects[index].value}
+                for column in columns:
+                    node |= column[index]
+                file.write((separator + json.dumps(node, ensure_ascii=False)).encode())
+                separator = ",\n"
+    file.write(b"\n]\n}\n")
 
 
-class JsonLd(Serialiser):
-    """JSON-LD 1.1, flattened: a context and a graph."""
+def _kind(text: str) -> str:
+    return text if text in ("", "@id") else expand(text)
 
-    def __init__(self, base: str, prefixes: dict[str, str]) -> None:
-        super().__init__(base, prefixes)
-        self.context = json_context(prefixes)
-        self._terms = {
-            (value["@id"], value.get("@type", "")): term
-            for term, value in self.context.items()
-            if isinstance(value, dict) and "@id" in value
-        }
 
-    def head(self) -> str:
-        """The context."""
-        context = {"@base": self.base, **self.context}
-        text = json.dumps(context, indent=1, ensure_ascii=False)
-        return f'{{\n"@context": {text},\n"@graph": [\n'
+def _entries(column: Column, terms: dict[tuple[str, str], str]) -> list[dict[str, Any]]:
+    """For each row, the predicate's short name with its value or values; empty for none."""
+    predicate, values = column
+    iri = predicate.value
+    result: list[dict[str, Any]] = []
+    for value in values:
+        entry: dict[str, Any] = {}
+        if isinstance(value, tuple) and value:
+            shown = [_shown(iri, each, terms) for each in value]
+            entry[shown[0][0]] = [text for _, text in shown]
+        elif value is not None and value != ():
+            name, text = _shown(iri, value, terms)
+            entry[name] = text
+        result.append(entry)
+    return result
 
-    def tail(self) -> str:
-        """The end of the graph."""
-        return "\n]\n}\n"
 
-    def stream(self, groups: Iterable[Group]) -> Iterator[bytes | memoryview]:
-        """The document; commas stand before all rows but the first."""
-        yield self.head().encode()
-        first = True
-        for piece in pieces(groups):
-            text = text_of(self.group_rows(piece))
-            yield text[2:] if first else text
-            first = False
-        yield self.tail().encode()
-
-    def rows(self, nodes: Nodes) -> list[Any]:
-        """A JSON object per node."""
-        parts: list[Any] = []
-        subject = self.relative(nodes.iris)
-        if nodes.member_of:
-            member = f'"{self.compact(RDFS + "member")}"'
-            parts += [f',\n{{"@id": "{nodes.member_of}", {member}: {{"@id": "', subject, '"}}']
-        parts += [',\n{"@id": "', subject, '"']
-        if nodes.types:
-            names = json.dumps([self.compact(type_) or type_ for type_ in nodes.types])
-            parts.append(f', "@type": {names}')
-        parts += [self._property(prop) for prop in nodes.properties]
-        parts.append("}")
-        return parts
-
-    def _property(self, prop: Property) -> Any:
-        name = self.compact(prop.predicate) or prop.predicate
-        kind = "@id" if prop.datatype == IRI else self.compact(prop.datatype) or prop.datatype
-        term = self._terms.get((name, "" if prop.datatype == STRING else kind))
-        columns = escaped(prop, _escape)
-        if prop.datatype == IRI:
-            columns = tuple(self.relative(column) for column in columns)
-        opening, closing = '"', '"'
-        if term is None and prop.datatype == IRI:
-            opening, closing = '{"@id": "', '"}'
-        elif term is None and prop.datatype != STRING:
-            opening, closing = f'{{"@type": "{kind}", "@value": "', '"}'
-        elif term is None:
-            opening, closing = '{"@value": "', '"}'
-        values = [joined(opening, column, closing) for column in columns]
-        before, after = ("[", "]") if len(values) > 1 else ("", "")
-        return joined(f', "{term or name}": {before}', join_values(values, ", "), after)
+def _shown(iri: str, value: Any, terms: dict[tuple[str, str], str]) -> tuple[str, Any]:
+    """A predicate's short name and the value as it is written under it."""
+    text = value.value
+    if isinstance(value, ox.NamedNode):
+        if iri == TYPE:
+            return "@type", compact(text)
+        text = compact(text) if text.startswith(GF) else text
+        name = terms.get((iri, "@id"))
+        return (name, text) if name else (compact(iri), {"@id": text})
+    kind = value.datatype.value
+    name = terms.get((iri, "" if kind == STRING else kind))
+    if name:
+        return name, text
+    typed = {} if kind == STRING else {"@type": compact(kind)}
+    return compact(iri), {**typed, "@value": text}

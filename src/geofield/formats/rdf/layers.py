@@ -1,17 +1,41 @@
 """Layers as linked data: which class a row is, how it is named, what its columns mean.
 
-The one table to extend. A layer of the schema without an entry here still becomes RDF, by
-the default rules of :func:`layer_map`.
+The one table to extend. A layer or column of the schema without an entry here still becomes
+RDF, by the default rules; tests then ask for its words in ``data/ontology.ttl``,
+``data/shapes.ttl`` and ``data/context.jsonld``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 from geofield import schema
-from geofield.formats.rdf.terms import TERMS
-from geofield.formats.rdf.vocabulary import Term, camel, column_term, term_of_column
+from geofield.formats.rdf.namespaces import expand
+
+#: Columns whose property is not simply their own name in camel case.
+_COLUMN_TERMS: dict[str, str] = {
+    "field_id": "dcterms:identifier",
+    "name": "rdfs:label",
+    "perimeter_m": "geo:hasMetricPerimeterLength",
+    "method": "gf:outlineMethod",
+    "imagery": "gf:imageryName",
+    "licence": "dc:rights",
+    "x_px": "gf:pixelX",
+    "y_px": "gf:pixelY",
+    "radius_px": "gf:pixelRadius",
+    "lat": "wgs84:lat",
+    "lon": "wgs84:long",
+    "length_m": "geo:hasMetricLength",
+}
+#: Endings of column names and the words that tell the unit in a property's name.
+_UNIT_WORDS = {"_m": "InMetres", "_deg": "InDegrees", "_ha": "InHectares", "_px": "InPixels"}
+#: Columns whose values are things of a code list.
+CODE_LISTS = {"gf:kind": "gf:ObstacleKind", "gf:status": "gf:ReviewStatus"}
+#: The values of columns that are truth values.
+YES_NO = ("yes", "no")
+#: Obstacles that are not driven around have a class of their own.
+CANDIDATE = "gf:Candidate"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +75,11 @@ class LayerMap:
     cls : str
         Class, prefixed name.
     path : str
-        The rows' IRIs below the field's (or the plan's), with key columns in braces.
+        The rows' IRIs below the plan's (or the survey's), with key columns in braces.
     product : str
         The RDF/XML file that holds it: ``field``, ``obstacles`` or ``tracks``.
     in_plan : bool
-        Whether it changes with the planner.
+        Whether it belongs to a plan of tracks; to the survey otherwise.
     label : str
         `rdfs:label` of the rows, with columns in braces; empty for none.
     links : tuple of Link
@@ -93,7 +117,7 @@ _ON_TRACK = Link("track_no", "gf:onTrack", "tracks")
 _ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments")
 
 _MAPS: dict[str, dict[str, object]] = {
-    "field": {"cls": "gf:Field", "path": "", "product": "field", "in_plan": False},
+    "field": {"cls": "gf:Survey", "path": "", "product": "field", "in_plan": False},
     "obstacles": {
         "cls": "gf:Obstacle",
         "path": "obstacle/{obstacle_no}",
@@ -169,20 +193,26 @@ def layer_maps() -> list[LayerMap]:
     return [layer_map(layer.name) for layer in schema.LAYERS]
 
 
-@cache
-def all_terms() -> dict[str, Term]:
-    """All properties in use, by prefixed name; each column has one, and its class as domain."""
-    result = {term.name: term for term in TERMS}
-    for each in layer_maps():
-        for column, name in each.properties():
-            known = result.get(name)
-            if name.startswith("rdfs:"):
-                continue
-            if known is None:
-                result[name] = term_of_column(column, name, each.cls)
-            elif each.cls not in known.domain:
-                result[name] = replace(known, domain=(*known.domain, each.cls))
-    return result
+def column_term(column: schema.Column) -> str:
+    """The prefixed name of a column's property."""
+    if column.name in _COLUMN_TERMS:
+        return _COLUMN_TERMS[column.name]
+    for ending, word in _UNIT_WORDS.items():
+        if column.name.endswith(ending):
+            return f"gf:{camel(column.name.removesuffix(ending))}{word}"
+    return f"gf:{camel(column.name)}"
+
+
+def camel(name: str) -> str:
+    """``some_column`` as ``someColumn``."""
+    head, *tail = name.split("_")
+    return head + "".join(part.capitalize() for part in tail)
+
+
+def classes(layer: LayerMap) -> list[str]:
+    """The full IRIs of the classes that a layer's rows have."""
+    further = {"field": ["gf:Field"], "obstacles": [CANDIDATE]}
+    return [expand(name) for name in (layer.cls, *further.get(layer.layer.name, ()))]
 
 
 def value_iri(value: str) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache, lru_cache
 from typing import Final
 
+import pyoxigraph as ox
 from pyproj import CRS
 
 #: The ontology's namespace.
@@ -83,19 +86,33 @@ LABEL: Final = RDFS + "label"
 STRING: Final = XSD + "string"
 DOUBLE: Final = XSD + "double"
 INTEGER: Final = XSD + "integer"
-INT: Final = XSD + "int"
-DATE: Final = XSD + "date"
 BOOLEAN: Final = XSD + "boolean"
-WKT: Final = GEO + "wktLiteral"
 
 CRS84: Final = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
+_LOCAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _EPSG: Final = "http://www.opengis.net/def/crs/EPSG/0/"
 
 
+@cache
 def expand(curie: str) -> str:
-    """The full IRI of a prefixed name such as ``gf:Track``."""
+    """The full IRI of a prefixed name such as ``gf:Track``; a full IRI as it is."""
     prefix, _, name = curie.partition(":")
-    return SCHEMA_PREFIXES[prefix] + name
+    return curie if name.startswith("//") else SCHEMA_PREFIXES[prefix] + name
+
+
+@cache
+def node(curie: str) -> ox.NamedNode:
+    """The term of a prefixed name or a full IRI."""
+    return ox.NamedNode(expand(curie))
+
+
+@lru_cache(maxsize=4096)
+def compact(iri: str) -> str:
+    """An IRI as a prefixed name where it has one."""
+    for prefix, namespace in SCHEMA_PREFIXES.items():
+        if iri.startswith(namespace) and _LOCAL_NAME.fullmatch(iri, len(namespace)):
+            return f"{prefix}:{iri[len(namespace) :]}"
+    return iri
 
 
 def crs_iri(crs: CRS) -> str | None:

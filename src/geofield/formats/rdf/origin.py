@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,44 +11,32 @@ from affine import Affine
 
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import CC, DC, DCAT, DCTERMS, GF, LABEL, PROV
 from geofield.formats.rdf.parse import Graph
+from geofield.formats.rdf.scope import Scope
 from geofield.grid import Grid
 from geofield.model.dataset import Provenance
 from geofield.model.scene import ImagerySource
 
 
-def read_provenance(graph: Graph, plan: str | None) -> Provenance:
-    """Software, picture, settings and evidence of the run behind the data.
-
-    Parameters
-    ----------
-    graph : Graph
-    plan : str or None
-        The track plan whose run is meant, where there are several.
-    """
-    run = _run(graph, plan)
-    software = ""
-    if run is not None:
-        agent = graph.value(run, PROV + "wasAssociatedWith")
-        software = (graph.value(agent, LABEL) if agent else None) or ""
+def read_provenance(graph: Graph, scope: Scope) -> Provenance:
+    """Software, picture, settings and evidence of the run behind the survey and plan meant."""
+    owners = (scope.plan, scope.survey, *graph.of_type("dcat:Dataset", "gf:TrackPlan"))
+    run = _first(graph, owners, "prov:wasGeneratedBy")
     return Provenance(
-        software,
-        _source(graph),
-        _json(graph, run, GF + "settings", {}),
-        _json(graph, run, GF + "evidence", {}),
+        graph.value(run, "prov:wasAssociatedWith", "rdfs:label") or "",
+        _source(graph, _picture(graph, scope)),
+        _json(graph, run, "gf:settings", {}),
+        _json(graph, run, "gf:evidence", {}),
     )
 
 
-def read_grid(graph: Graph) -> Grid | None:
+def read_grid(graph: Graph, scope: Scope) -> Grid | None:
     """The grid of the picture, None where the file does not tell it."""
-    picture = _picture(graph)
-    if picture is None:
-        return None
-    width = graph.value(picture, GF + "widthInPixels")
-    height = graph.value(picture, GF + "heightInPixels")
-    transform = graph.value(picture, GF + "geoTransform")
-    crs = graph.value(picture, GF + "gridCrs")
+    picture = _picture(graph, scope)
+    width = graph.value(picture, "gf:widthInPixels")
+    height = graph.value(picture, "gf:heightInPixels")
+    transform = graph.value(picture, "gf:geoTransform")
+    crs = graph.value(picture, "gf:gridCrs")
     if width is None or height is None or transform is None or crs is None:
         return None
     try:
@@ -56,10 +45,9 @@ def read_grid(graph: Graph) -> Grid | None:
         raise FormatError(f"<{picture}>: its grid cannot be understood ({error}).") from error
 
 
-def read_scene_path(graph: Graph, folder: Path) -> Path | None:
+def read_scene_path(graph: Graph, scope: Scope, folder: Path) -> Path | None:
     """The picture's file beside the data, where it is there."""
-    picture = _picture(graph)
-    name = graph.value(picture, GF + "fileName") if picture else None
+    name = graph.value(_picture(graph, scope), "gf:fileName")
     # Only a name: a path in somebody else's file must not lead anywhere.
     if name is None or Path(name).name != name:
         return None
@@ -67,38 +55,27 @@ def read_scene_path(graph: Graph, folder: Path) -> Path | None:
     return path if path.is_file() else None
 
 
-def _run(graph: Graph, plan: str | None) -> str | None:
-    generated = graph.value(plan, PROV + "wasGeneratedBy") if plan else None
-    if generated is not None:
-        return generated
-    for owner in (*graph.of_type(DCAT + "Dataset"), *graph.of_type(GF + "TrackPlan")):
-        run = graph.value(owner, PROV + "wasGeneratedBy")
-        if run is not None:
-            return run
-    return None
+def _picture(graph: Graph, scope: Scope) -> str | None:
+    owners = (scope.survey, *graph.of_type("dcat:Dataset"), *graph.of_type("gf:Field"))
+    return _first(graph, owners, "prov:wasDerivedFrom")
 
 
-def _picture(graph: Graph) -> str | None:
-    for owner in (*graph.of_type(DCAT + "Dataset"), *graph.of_type(GF + "Field")):
-        picture = graph.value(owner, PROV + "wasDerivedFrom")
-        if picture is not None:
-            return picture
-    return None
+def _first(graph: Graph, owners: Iterable[str | None], predicate: str) -> str | None:
+    return next((v for v in (graph.value(owner, predicate) for owner in owners) if v), None)
 
 
-def _source(graph: Graph) -> ImagerySource:
-    picture = _picture(graph)
+def _source(graph: Graph, picture: str | None) -> ImagerySource:
     if picture is None:
         return ImagerySource()
-    zoom = graph.value(picture, GF + "zoom")
-    details = _json(graph, picture, GF + "details", [])
+    zoom = graph.value(picture, "gf:zoom")
+    details = _json(graph, picture, "gf:details", [])
     return ImagerySource(
-        graph.value(picture, LABEL) or "",
-        graph.value(picture, DCTERMS + "created"),
-        graph.value(picture, CC + "attributionName") or "",
-        graph.value(picture, DC + "rights") or "",
-        graph.value(picture, GF + "mayDerive") != "false",
-        graph.value(picture, GF + "mayCache") != "false",
+        graph.value(picture, "rdfs:label") or "",
+        graph.value(picture, "dcterms:created"),
+        graph.value(picture, "cc:attributionName") or "",
+        graph.value(picture, "dc:rights") or "",
+        graph.value(picture, "gf:mayDerive") != "false",
+        graph.value(picture, "gf:mayCache") != "false",
         int(zoom) if zoom and zoom.isdecimal() else None,
         tuple((str(key), str(value)) for key, value in details),
     )

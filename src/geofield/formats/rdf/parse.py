@@ -10,7 +10,7 @@ import pyoxigraph as ox
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.guard import check_json, check_xml
-from geofield.formats.rdf.namespaces import TYPE
+from geofield.formats.rdf.namespaces import TYPE, expand
 
 #: File endings and their syntax; XML and JSON only where the ending says RDF.
 SYNTAXES: dict[str, ox.RdfFormat] = {
@@ -63,6 +63,8 @@ def parse(path: Path) -> Iterator[ox.Quad]:
 class Graph:
     """Triples by subject and predicate, as plain texts: what the readers look things up in.
 
+    Classes and predicates are asked for by prefixed name or full IRI.
+
     Attributes
     ----------
     nodes : dict
@@ -74,22 +76,27 @@ class Graph:
     def add(self, quads: Iterable[ox.Quad]) -> None:
         """Take in triples."""
         nodes = self.nodes
-        for quad in quads:
-            node = nodes.setdefault(quad.subject.value, {})  # type: ignore[union-attr]
-            values = node.setdefault(quad.predicate.value, [])
-            values.append(quad.object.value)  # type: ignore[union-attr]
+        name, node = "", nodes.get("", {})
+        for subject, predicate, value, _ in quads:
+            if subject.value != name:
+                name = subject.value
+                node = nodes.setdefault(name, {})
+            node.setdefault(predicate.value, []).append(value.value)
 
     def of_type(self, *types: str) -> list[str]:
         """The subjects of any of some classes, in the order of the file."""
-        wanted = set(types)
+        wanted = set(map(expand, types))
         return [iri for iri, node in self.nodes.items() if wanted.intersection(node.get(TYPE, ()))]
 
-    def values(self, subject: str, predicate: str) -> list[str]:
+    def values(self, subject: str | None, predicate: str) -> list[str]:
         """All distinct values; none where there is nothing."""
-        return list(dict.fromkeys(self.nodes.get(subject, {}).get(predicate, ())))
+        node = self.nodes.get(subject or "", {})
+        return list(dict.fromkeys(node.get(expand(predicate), ())))
 
-    def value(self, subject: str, predicate: str) -> str | None:
-        """The first value, None where there is none."""
-        node = self.nodes.get(subject)
-        values = node.get(predicate) if node else None
-        return values[0] if values else None
+    def value(self, subject: str | None, *predicates: str) -> str | None:
+        """The first value along a path of predicates, None where there is none."""
+        for predicate in predicates:
+            node = self.nodes.get(subject) if subject is not None else None
+            values = node.get(expand(predicate)) if node else None
+            subject = values[0] if values else None
+        return subject

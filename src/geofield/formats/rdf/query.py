@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -14,7 +15,6 @@ import pyoxigraph as ox
 from geofield.errors import FormatError
 from geofield.formats.rdf.geosparql import oxigraph_functions
 from geofield.formats.rdf.namespaces import BOOLEAN, DOUBLE, INTEGER, SCHEMA_PREFIXES, XSD
-from geofield.formats.rdf.ntriples import escape_literal
 from geofield.formats.rdf.parse import parse
 
 #: A parameter is a variable with one value, which stands in the query and can be replaced.
@@ -57,10 +57,25 @@ class Query:
     parameters: Mapping[str, str]
 
     @property
+    def needs(self) -> str:
+        """What a store must have for it beyond SPARQL 1.1, in words; empty for nothing."""
+        functions = sorted(set(re.findall(r"\bgeof:\w+", self.text)))
+        if not functions:
+            return ""
+        return (
+            f"Needs a store with {', '.join(functions)} of GeoSPARQL, answering in metres on the "
+            "ellipsoid. `geofield query` has them; for rdflib `register_in_rdflib()` and for "
+            "pyoxigraph `custom_functions=oxigraph_functions()`, both of "
+            "`geofield.formats.rdf.geosparql`, bring them."
+        )
+
+    @property
     def sparql(self) -> str:
-        """The text with its prefixes: to paste into any store."""
-        lines = (f"PREFIX {prefix}: <{iri}>" for prefix, iri in SCHEMA_PREFIXES.items())
-        return "\n".join(lines) + "\n" + self.text
+        """The text with its prefixes, and what it needs: to paste into any store."""
+        words = [f"# {line}" for line in textwrap.wrap(self.needs, 96)]
+        used = {prefix: iri for prefix, iri in SCHEMA_PREFIXES.items() if f"{prefix}:" in self.text}
+        prefixes = [f"PREFIX {prefix}: <{iri}>" for prefix, iri in used.items()]
+        return "\n".join([*words, *prefixes, self.text])
 
     def with_values(self, values: Mapping[str, str]) -> str:
         """The text with other values of its parameters.
@@ -197,7 +212,8 @@ def _literal(match: re.Match[str], value: str) -> str:
             return f'"{float(value)!r}"^^xsd:double'
     except ValueError as error:
         raise FormatError(f"{match['name']} is {value!r}, not a number.") from error
-    return f'"{escape_literal(value)}"'
+    # The engine's own writing of the text: no value breaks out of its literal.
+    return str(ox.Literal(value))
 
 
 def _python(term: Any) -> Any:

@@ -44,7 +44,8 @@ class QuickCheck:
     def __init__(self, shapes: rdflib.Graph) -> None:
         self._rules: dict[str, list[tuple[tuple[str, ...], list[Test]]] | None] = {}
         for shape, cls in shapes.subject_objects(SH.targetClass):
-            self._rules[str(cls)] = _compiled(shapes, shape)
+            rules, more = self._rules.get(str(cls), []), _compiled(shapes, shape)
+            self._rules[str(cls)] = None if rules is None or more is None else rules + more
 
     def unsure(self, nodes: dict[Any, Node]) -> set[Any]:
         """The subjects that pySHACL has to look at.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +15,16 @@ from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf.complete import complete
-from geofield.formats.rdf.features import YES_NO
-from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps, value_iri
+from geofield.formats.rdf.describe import PRODUCTS
+from geofield.formats.rdf.layers import (
+    YES_NO,
+    LayerMap,
+    classes,
+    layer_map,
+    layer_maps,
+    value_iri,
+)
 from geofield.formats.rdf.namespaces import (
-    GEO,
-    GF,
     GML,
     STUDY_OBSTACLE,
     STUDY_TREE,
@@ -29,9 +33,10 @@ from geofield.formats.rdf.namespaces import (
 )
 from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
 from geofield.formats.rdf.parse import Graph, parse
+from geofield.formats.rdf.scope import Scope, choose, fields_of, track_of
 from geofield.formats.rdf.study import STUDY_OBSTACLE_TERMS, STUDY_POINT_TERMS
 from geofield.formats.rdf.wkt import geometries_of, known_crs, split_literal
-from geofield.formats.rdf.write import PRODUCTS
+from geofield.grid import Grid
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import circle_polygons
 
@@ -78,27 +83,23 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
 
 def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = None) -> Dataset:
     """A dataset from triples, for instance of several files merged."""
-    field = _field_of(graph)
-    scope = _scope(graph, field, plan)
-    crs = _metric_crs(graph)
+    scope, crs = choose(graph, plan), _metric_crs(graph)
+    grid = read_grid(graph, scope)
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in layer_maps():
         subjects = [iri for iri in _subjects(graph, layer) if scope.holds(graph, layer, iri)]
         if subjects or not layer.layer.optional:
-            tables[layer.layer.name] = _table(graph, layer, subjects, crs)
-    complete(tables, crs)
+            tables[layer.layer.name] = _table(graph, layer, subjects, crs, scope, grid)
+    complete(tables, crs, grid)
     names = tables["field"]["name"].dropna().tolist()
     return Dataset(
         tables,
         crs,
         str(names[0]) if names else "field",
-        read_provenance(graph, scope.plan),
-        read_grid(graph),
-        None if folder is None else read_scene_path(graph, folder),
+        read_provenance(graph, scope),
+        grid,
+        None if folder is None else read_scene_path(graph, scope, folder),
     )
-
-
-# -- what belongs together --------------------------------------------------------------------
 
 
 def _add_siblings(graph: Graph, path: Path) -> None:
@@ -107,14 +108,14 @@ def _add_siblings(graph: Graph, path: Path) -> None:
         if path.suffix != ".rdf" or not path.stem.endswith(product):
             continue
         stem = path.stem.removesuffix(product)
-        fields = _fields(graph)
+        fields = fields_of(graph)
         for other in PRODUCTS:
             sibling = path.with_name(f"{stem}{other}.rdf")
             if other == product or not sibling.is_file():
                 continue
             more = Graph()
             more.add(parse(sibling))
-            theirs = _fields(more)
+            theirs = fields_of(more)
             if fields and theirs and not fields & theirs:
                 warnings.warn(
                     f"{sibling.name} is of another field than {path.name}: not read.",
@@ -128,80 +129,25 @@ def _add_siblings(graph: Graph, path: Path) -> None:
                     mine.setdefault(predicate, []).extend(values)
 
 
-def _fields(graph: Graph) -> set[str]:
-    named = {v for node in graph.nodes.values() for v in node.get(GF + "inField", ())}
-    return named | set(graph.of_type(GF + "Field"))
-
-
-def _field_of(graph: Graph) -> str | None:
-    fields = sorted(_fields(graph))
-    if len(fields) > 1:
-        raise FormatError(
-            f"There are {len(fields)} fields: {', '.join(f'<{iri}>' for iri in fields[:5])}.",
-            hint="geofield reads one field at a time: split the file by gf:inField.",
-        )
-    return fields[0] if fields else None
-
-
-@dataclass(frozen=True, slots=True)
-class _Scope:
-    """Which tracks are meant where there are several plans."""
-
-    plan: str | None
-    tracks: frozenset[str]
-
-    def holds(self, graph: Graph, layer: LayerMap, iri: str) -> bool:
-        if not layer.in_plan or self.plan is None:
-            return True
-        track = iri if layer.layer.name == "tracks" else graph.value(iri, GF + "onTrack")
-        if track is not None:
-            return track in self.tracks
-        return graph.value(iri, GF + "inPlan") in (None, self.plan)
-
-
-def _scope(graph: Graph, field: str | None, plan: str | None) -> _Scope:
-    tracks: dict[str | None, set[str]] = {}
-    for iri in graph.of_type(GF + "Track"):
-        tracks.setdefault(graph.value(iri, GF + "inPlan"), set()).add(iri)
-    plans = sorted({p for p in tracks if p} | set(graph.of_type(GF + "TrackPlan")))
-    if plan is not None:
-        chosen = [p for p in plans if p == plan or p.rsplit("/", 1)[-1] == plan]
-        if len(chosen) != 1:
-            raise FormatError(
-                f"There is no one track plan {plan!r}.",
-                hint=f"Plans: {', '.join(plans) or 'none'}.",
-            )
-        return _Scope(chosen[0], frozenset(tracks.get(chosen[0], ())))
-    if len(plans) <= 1:
-        return _Scope(None, frozenset())
-    own = f"{field}/plan"
-    choice = own if own in plans else plans[0]
-    warnings.warn(
-        f"There are {len(plans)} track plans ({', '.join(plans)}): reading <{choice}>. Name "
-        "another by its plan.",
-        FormatWarning,
-        stacklevel=4,
-    )
-    return _Scope(choice, frozenset(tracks.get(choice, set()) | tracks.get(None, set())))
-
-
 def _subjects(graph: Graph, layer: LayerMap) -> list[str]:
-    return graph.of_type(expand(layer.cls), *_STUDY_TYPES.get(layer.layer.name, ()))
+    if layer.layer.name == "field":
+        return graph.of_type("gf:Field") or graph.of_type("gf:Survey")[:1]
+    return graph.of_type(*classes(layer), *_STUDY_TYPES.get(layer.layer.name, ()))
 
 
 def _metric_crs(graph: Graph) -> CRS:
     """As the dataset says, else of a geometry, else the UTM zone of the first position."""
     first: tuple[str, str] | None = None
     for iri, node in graph.nodes.items():
-        for name in node.get(GF + "metricCrs", ()):
+        for name in node.get(expand("gf:metricCrs"), ()):
             return known_crs(name)
-        for wkt in node.get(GF + "metricCrsWkt", ()):
+        for wkt in node.get(expand("gf:metricCrsWkt"), ()):
             return CRS.from_wkt(wkt)
-        for text in node.get(GEO + "asWKT", ()):
+        for text in node.get(expand("geo:asWKT"), ()):
             if first is None:
                 first = (text, iri)
-    for iri in graph.of_type(GEO + "Geometry"):
-        name = split_literal(graph.value(iri, GEO + "asWKT") or "")[0]
+    for iri in graph.of_type("geo:Geometry"):
+        name = split_literal(graph.value(iri, "geo:asWKT") or "")[0]
         if "/EPSG/" in name and known_crs(name).is_projected:
             return known_crs(name)
     if first is not None:
@@ -223,49 +169,56 @@ def _crs_of_positions(graph: Graph) -> CRS:
 # -- tables -------------------------------------------------------------------------------------
 
 
-def _table(graph: Graph, layer: LayerMap, subjects: list[str], crs: CRS) -> gpd.GeoDataFrame:
+def _table(
+    graph: Graph,
+    layer: LayerMap,
+    subjects: list[str],
+    crs: CRS,
+    scope: Scope,
+    grid: Grid | None,
+) -> gpd.GeoDataFrame:
     if not subjects:
         return schema.empty(layer.layer, crs)
     data: dict[str, Any] = {}
     study = _STUDY_TERMS.get(layer.layer.name, {})
+    told = [scope.sources(layer, iri) for iri in subjects]
     for column, name in layer.properties():
-        predicates = [expand(name)] if ":" in name else [name]
-        if column.name in study:
-            predicates.append(study[column.name][0])
-        texts = [_first(graph, iri, predicates) for iri in subjects]
-        data[column.name] = _typed(column, texts, subjects)
+        predicates = [name, *study.get(column.name, ())[:1]]
+        if column.name == "heading_deg":
+            told = [(*each, scope.plan) for each in told]
+        data[column.name] = _typed(column, [_first(graph, s, predicates) for s in told], subjects)
     for link in layer.links:
-        own = [
-            expand(n) for c, n in layer_map(link.target).properties() if c.name == link.target_key
-        ]
-        own += [study[link.column][0]] if link.column in study else []
-        texts = [_linked(graph, iri, expand(link.predicate), own) for iri in subjects]
+        target = layer_map(link.target)
+        own = [name for column, name in target.properties() if column.name == link.target_key]
+        own += study.get(link.column, ())[:1]
+        texts = [_linked(graph, iri, link.predicate, own) for iri in subjects]
         data[link.column] = _typed(layer.layer.column(link.column), texts, subjects)
-    geometry = _geometry(graph, layer, subjects, data, crs)
-    frame = schema.table(layer.layer, data, geometry, crs)
-    return schema.conform(layer.layer, frame)
+    shapes = [scope.survey or iri for iri in subjects] if layer.layer.name == "field" else subjects
+    geometry = _geometry(graph, layer, shapes, data, crs, grid)
+    return schema.conform(layer.layer, schema.table(layer.layer, data, geometry, crs))
 
 
-def _first(graph: Graph, iri: str, predicates: Iterable[str]) -> str | None:
+def _first(graph: Graph, sources: Iterable[str | None], predicates: Iterable[str]) -> str | None:
     for predicate in predicates:
-        value = graph.value(iri, predicate)
-        if value is not None:
-            return value
+        for iri in sources:
+            value = graph.value(iri, predicate)
+            if value is not None:
+                return value
     return None
 
 
 def _linked(graph: Graph, iri: str, predicate: str, own: list[str]) -> str | None:
     """The number of the thing a link points to, or the number told directly."""
-    target = graph.value(iri, predicate)
+    target = track_of(graph, iri) if predicate == "gf:onTrack" else graph.value(iri, predicate)
     if target is not None:
-        number = _first(graph, target, own)
+        number = _first(graph, [target], own)
         if number is not None:
             return number
         # A file of points alone: the number is the last part of the thing's name.
         tail = target.rstrip("/").rsplit("/", 1)[-1]
         if tail.isdecimal():
             return tail
-    return _first(graph, iri, own)
+    return _first(graph, [iri], own)
 
 
 def _typed(column: schema.Column, texts: list[str | None], subjects: list[str]) -> list[Any]:
@@ -299,7 +252,12 @@ def _number(text: str, kind: type, column: schema.Column, subject: str) -> Any:
 
 
 def _geometry(
-    graph: Graph, layer: LayerMap, subjects: list[str], data: dict[str, Any], crs: CRS
+    graph: Graph,
+    layer: LayerMap,
+    subjects: list[str],
+    data: dict[str, Any],
+    crs: CRS,
+    grid: Grid | None,
 ) -> Any:
     if layer.layer.geometry == "Point":
         exact = _grid_points(graph, subjects)
@@ -309,7 +267,7 @@ def _geometry(
     geometry = geometries_of(texts, subjects, crs)
     missing = np.array([text is None for text in texts])
     if missing.any() and "lat" in data:
-        _from_positions(layer, geometry, missing, data, graph, crs)
+        _from_positions(layer, geometry, missing, data, crs, grid)
     for index in np.flatnonzero([g is None for g in geometry])[:1]:
         raise FormatError(
             f"<{subjects[index]}> has no geometry.",
@@ -319,8 +277,8 @@ def _geometry(
 
 
 def _grid_points(graph: Graph, subjects: list[str]) -> Any:
-    xs = [graph.value(iri, GF + "easting") for iri in subjects]
-    ys = [graph.value(iri, GF + "northing") for iri in subjects]
+    xs = [graph.value(iri, "gf:easting") for iri in subjects]
+    ys = [graph.value(iri, "gf:northing") for iri in subjects]
     if any(v is None for v in xs) or any(v is None for v in ys):
         return None
     column = schema.Column("easting, northing", "float", "", "")
@@ -331,9 +289,9 @@ def _grid_points(graph: Graph, subjects: list[str]) -> Any:
 
 def _best_wkt(graph: Graph, iri: str, crs: CRS) -> str | None:
     """The literal in the metric CRS, else that of the default geometry, else any."""
-    nodes = graph.values(iri, GEO + "hasDefaultGeometry") + graph.values(iri, GEO + "hasGeometry")
-    texts = [text for node in nodes for text in graph.values(node, GEO + "asWKT")]
-    texts += graph.values(iri, GEO + "asWKT")
+    nodes = graph.values(iri, "geo:hasDefaultGeometry") + graph.values(iri, "geo:hasGeometry")
+    texts = [text for node in nodes for text in graph.values(node, "geo:asWKT")]
+    texts += graph.values(iri, "geo:asWKT")
     for text in texts:
         name = split_literal(text)[0]
         if "/EPSG/" in name and known_crs(name) == crs:
@@ -346,8 +304,8 @@ def _from_positions(
     geometry: Any,
     missing: Any,
     data: dict[str, Any],
-    graph: Graph,
     crs: CRS,
+    grid: Grid | None,
 ) -> None:
     """Rows without a geometry: the circle of an obstacle, the position of a point."""
     lon, lat = np.asarray(data["lon"], float), np.asarray(data["lat"], float)
@@ -356,7 +314,6 @@ def _from_positions(
     if layer.layer.name == schema.OBSTACLES.name:
         radius = np.asarray(data["radius_m"], float)[usable]
         margin = np.nan_to_num(np.asarray(data["buffer_m"], float)[usable])
-        grid = read_grid(graph)
         if np.isnan(radius).any() and grid is not None:
             pixels = np.asarray(data["radius_px"], float)[usable]
             radius = np.where(np.isnan(radius), pixels * grid.ground_resolution_m, radius)

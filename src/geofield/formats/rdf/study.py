@@ -10,7 +10,8 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
   ``.../Trajectory#``. Both are kept as they are: IRIs are compared letter by letter.
 - Untyped numbers get the datatypes the study's table names: `xsd:int` for numbers,
   `xsd:double` for positions and pixels. `gml:pos` stays a text, "lat, long".
-- The class *tree* is for trees; an obstacle of another kind has geofield's class alone.
+- The class *tree* and the root's members are what is driven around; an obstacle of another kind,
+  or one that is merely possible or rejected, has geofield's class alone.
 - What the study's vocabulary has no word for (status, safety margin, outlines, tracks) is
   said in geofield's, so that the plan reads back whole. Obstacles are complete in both: a
   reader of either vocabulary understands them.
@@ -18,64 +19,50 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
+import pandas as pd
 
 from geofield import schema
-from geofield.formats.rdf.describe import Description, keyed
-from geofield.formats.rdf.features import feature_group, row_iris
-from geofield.formats.rdf.layers import layer_map, layer_maps
+from geofield.formats.rdf.describe import Description
+from geofield.formats.rdf.features import (
+    POINT_DECIMALS,
+    column_properties,
+    feature_group,
+    row_iris,
+    row_types,
+)
+from geofield.formats.rdf.layers import layer_map
 from geofield.formats.rdf.namespaces import (
-    DC,
     DCMI_IMAGE,
-    DOUBLE,
-    GEO,
-    GF,
     GML,
-    INT,
-    SOSA,
-    STRING,
     STUDY_OBSTACLE,
     STUDY_POINT,
     STUDY_TRAJECTORY,
     STUDY_TREE,
     SVG_CIRCLE,
     WGS,
-    expand,
+    node,
 )
-from geofield.formats.rdf.nodes import (
-    IRI,
-    Group,
-    Nodes,
-    Property,
-    constant,
-    float_texts,
-    joined,
-)
-
-if TYPE_CHECKING:
-    import geopandas as gpd
+from geofield.formats.rdf.triples import Column, Group, Nodes, named, text_term, typed
 
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
-    "obstacle_no": (STUDY_OBSTACLE + "no", INT),
-    "lat": (WGS + "lat", DOUBLE),
-    "lon": (WGS + "long", DOUBLE),
-    "x_px": (SVG_CIRCLE + "cx", DOUBLE),
-    "y_px": (SVG_CIRCLE + "cy", DOUBLE),
-    "radius_px": (SVG_CIRCLE + "r", DOUBLE),
+    "obstacle_no": (STUDY_OBSTACLE + "no", "xsd:int"),
+    "lat": (WGS + "lat", "xsd:double"),
+    "lon": (WGS + "long", "xsd:double"),
+    "x_px": (SVG_CIRCLE + "cx", "xsd:double"),
+    "y_px": (SVG_CIRCLE + "cy", "xsd:double"),
+    "radius_px": (SVG_CIRCLE + "r", "xsd:double"),
 }
 STUDY_POINT_TERMS: dict[str, tuple[str, str]] = {
-    "point_no": (STUDY_POINT + "no", INT),
-    "track_no": (STUDY_POINT + "track", INT),
-    "lat": (GML + "lat", DOUBLE),
-    "lon": (GML + "long", DOUBLE),
-    "x_px": (SVG_CIRCLE + "cx", DOUBLE),
-    "y_px": (SVG_CIRCLE + "cy", DOUBLE),
+    "point_no": (STUDY_POINT + "no", "xsd:int"),
+    "track_no": (STUDY_POINT + "track", "xsd:int"),
+    "lat": (GML + "lat", "xsd:double"),
+    "lon": (GML + "long", "xsd:double"),
+    "x_px": (SVG_CIRCLE + "cx", "xsd:double"),
+    "y_px": (SVG_CIRCLE + "cy", "xsd:double"),
 }
 
 
@@ -86,69 +73,75 @@ class StudyDescription(Description):
 
     def product(self, product: str) -> Iterator[Group]:
         """Obstacles and points as the study has them; all else stands with the field."""
-        if product == "obstacles":
-            yield from self._study_obstacles()
-        elif product == "tracks":
-            yield from self._study_points()
-        else:
-            yield from self.origin()
-            for layer in layer_maps():
-                if layer.layer.name not in (schema.OBSTACLES.name, schema.TRACK_POINTS.name):
-                    yield from self.layer(layer)
+        if product == "field":
+            yield from super().product("field")
+            yield from super().product("tracks")
+        elif product == "obstacles":
+            yield from super().product("obstacles")
+        elif self.points:
+            for chunk in self.dataset.point_chunks():
+                yield from self._points(chunk)
 
-    def _study_obstacles(self) -> Iterator[Group]:
-        if not self.dataset.has(schema.OBSTACLES.name):
-            return
+    def layer(self, layer: Any) -> Iterator[Group]:
+        """Obstacles in both vocabularies; points stand in a file of their own."""
+        name = layer.layer.name
+        if name == schema.OBSTACLES.name and self.dataset.has(name):
+            yield from self._obstacles()
+        elif name not in (schema.OBSTACLES.name, schema.TRACK_POINTS.name):
+            yield from super().layer(layer)
+
+    def _obstacles(self) -> Iterator[Group]:
         layer = layer_map(schema.OBSTACLES.name)
-        frame = keyed(layer, self.dataset.table(schema.OBSTACLES.name))
-        own = (expand(layer.cls), SOSA + "FeatureOfInterest", GEO + "Feature")
-        trees = (frame["kind"] == "tree").to_numpy()
-        for rows, types in (
-            (trees, (STUDY_TREE + "tree", *own)),
-            (~trees, own),
-        ):
-            part = frame[rows]
-            if len(part):
-                yield from self._obstacle_groups(part, types)
+        frame = self.table(layer)
+        kinds = frame["kind"].tolist()
+        types = [
+            (node(STUDY_TREE + "tree"), *own)
+            if own[0] == node(layer.cls) and kind == "tree"
+            else own
+            for own, kind in zip(row_types(layer, frame), kinds, strict=True)
+        ]
+        iris = row_iris(layer, frame, self.names)
+        avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
+        yield _members(STUDY_OBSTACLE, avoided)
+        study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
+        taken = {predicate for predicate, _ in study}
+        own = [each for each in column_properties(layer, frame) if each[0] not in taken]
+        image: Column = (node("dc:type"), [node(DCMI_IMAGE)] * len(frame))
+        yield feature_group(
+            layer,
+            frame,
+            self.names,
+            types=types,
+            columns=[image, *study, *own],
+            extra=self.belonging(schema.OBSTACLES.name, frame),
+            accuracy_m=self.accuracy_m,
+        )
 
-    def _obstacle_groups(self, frame: gpd.GeoDataFrame, types: tuple[str, ...]) -> Iterator[Group]:
-        layer = layer_map(schema.OBSTACLES.name)
-        inside = Property(GF + "inField", IRI, (constant(self.names.field, len(frame)),))
-        whole = feature_group(layer, frame, self.names, extra=[inside], accuracy_m=self.accuracy_m)
-        study = {predicate for predicate, _ in STUDY_OBSTACLE_TERMS.values()}
-        own = [prop for prop in whole[0].properties if prop.predicate not in study]
-        image = Property(DC + "type", IRI, (constant(DCMI_IMAGE, len(frame)),))
-        numbers = _study_properties(frame, STUDY_OBSTACLE_TERMS)
-        yield (Nodes(whole[0].iris, types, (image, *numbers, *own), STUDY_OBSTACLE),)
-        # Geometries are not members of the root.
-        yield whole[1:]
-
-    def _study_points(self) -> Iterator[Group]:
-        layer = layer_map(schema.TRACK_POINTS.name)
-        for chunk in self.dataset.point_chunks():
-            lat, lon = _texts(chunk, "lat"), _texts(chunk, "lon")
-            properties = [
-                *_study_properties(chunk, STUDY_POINT_TERMS),
-                Property(GML + "pos", STRING, (joined(lat, ", ", lon),)),
-                Property(GF + "segmentNo", INT, (_texts(chunk, "segment_no"),)),
-                Property(GF + "easting", DOUBLE, (float_texts(chunk.geometry.x.to_numpy()),)),
-                Property(GF + "northing", DOUBLE, (float_texts(chunk.geometry.y.to_numpy()),)),
-            ]
-            iris = row_iris(layer, chunk, self.names)
-            yield (Nodes(iris, (GML + "point",), tuple(properties), STUDY_TRAJECTORY),)
+    def _points(self, frame: Any) -> Iterator[Group]:
+        iris = row_iris(layer_map(schema.TRACK_POINTS.name), frame, self.names)
+        rounded = frame.assign(
+            **{name: frame[name].astype(float).round(POINT_DECIMALS) for name in ("lat", "lon")}
+        )
+        places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
+        columns: list[Column] = [
+            (node("rdf:type"), [node(GML + "point")] * len(frame)),
+            *_study_columns(rounded, STUDY_POINT_TERMS),
+            (node(GML + "pos"), [text_term(f"{lat!r}, {lon!r}") for lat, lon in places]),
+            (node("gf:segmentNo"), typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
+        ]
+        yield _members(STUDY_TRAJECTORY, iris)
+        yield (Nodes(named(iris), columns),)
 
 
-def _study_properties(frame: gpd.GeoDataFrame, terms: dict[str, tuple[str, str]]) -> list[Property]:
-    result = []
+def _members(root: str, iris: Iterable[str | None]) -> Group:
+    """The study's root description holds its nodes."""
+    return (Nodes([node(root)], [(node("rdfs:member"), [tuple(named(iris))])]),)
+
+
+def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
+    result: list[Column] = []
     for column, (predicate, datatype) in terms.items():
-        texts = _texts(frame, column)
-        if texts.null_count < len(texts):
-            result.append(Property(predicate, datatype, (texts,)))
+        values = [None if pd.isna(value) else value for value in frame[column].tolist()]
+        texts = [None if value is None else repr(value) for value in values]
+        result.append((node(predicate), typed(texts, datatype)))
     return result
-
-
-def _texts(frame: gpd.GeoDataFrame, column: str) -> Any:
-    series = frame[column]
-    if series.dtype == np.float64:
-        return float_texts(series.to_numpy())
-    return pc.cast(pa.array(series.astype("Int64"), pa.int64(), from_pandas=True), pa.string())

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geofield import schema
-from geofield.formats.rdf.rdfxml import escape_text
+from geofield.formats.rdf.triples import xml_text
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import active
 
@@ -55,7 +55,7 @@ def write_study_xml(
 def _obstacles(dataset: Dataset) -> Iterator[str]:
     yield _HEAD + "<Obstacles>\n"
     frame = active(dataset.table(schema.OBSTACLES.name))
-    region = escape_text(dataset.name)
+    region = xml_text(dataset.name)
     for kind, element in _ELEMENTS.items():
         rows = frame[frame["kind"] == kind]
         if not len(rows):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,20 +14,19 @@ from rdflib.namespace import RDF, SH
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
-from geofield.formats.rdf.layers import all_terms, layer_maps
+from geofield.formats.rdf.graph import as_rdflib
+from geofield.formats.rdf.layers import classes, layer_maps
 from geofield.formats.rdf.namespaces import (
     GEO,
     GML,
     RDFS,
-    SCHEMA_PREFIXES,
-    STRING,
     STUDY_TREE,
-    expand,
+    compact,
 )
 from geofield.formats.rdf.parse import Graph, parse
 from geofield.formats.rdf.problem import Problem
-from geofield.formats.rdf.publish import SHAPES, resource
 from geofield.formats.rdf.quick import QuickCheck
+from geofield.formats.rdf.resources import SHAPES, label, resource
 from geofield.formats.validation import Finding
 
 _BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
@@ -70,7 +67,8 @@ def validate(path: Path) -> list[Problem]:
         ]
     graph = Graph()
     graph.add(quads)
-    known = [expand(layer.cls) for layer in layer_maps()] + [STUDY_TREE + "tree", GML + "point"]
+    known = [iri for layer in layer_maps() for iri in classes(layer)]
+    known += [STUDY_TREE + "tree", GML + "point"]
     if not graph.of_type(*known):
         return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
     problems = [*_shape_problems(quads), *check_graph(graph)]
@@ -92,22 +90,7 @@ def _distinct(problems: list[Problem]) -> list[Problem]:
 
 def _shape_problems(quads: list[ox.Quad]) -> Iterator[Problem]:
     for batch in _batches(quads):
-        data = rdflib.Graph()
-        with _quiet_rdflib():
-            for quad in batch:
-                data.add((_term(quad.subject), _term(quad.predicate), _term(quad.object)))
-        yield from _run_shapes(data)
-
-
-@contextmanager
-def _quiet_rdflib() -> Iterator[None]:
-    """Rdflib logs a traceback for each ill-typed literal; the shapes tell it in words."""
-    logger = logging.getLogger("rdflib.term")
-    before, logger.disabled = logger.disabled, True
-    try:
-        yield
-    finally:
-        logger.disabled = before
+        yield from _run_shapes(as_rdflib(batch))
 
 
 def _batches(quads: list[ox.Quad]) -> Iterator[list[ox.Quad]]:
@@ -168,35 +151,21 @@ def _shapes() -> rdflib.Graph:
     return rdflib.Graph().parse(data=resource(SHAPES), format="turtle")
 
 
-def _term(term: Any) -> Any:
-    if isinstance(term, ox.NamedNode):
-        return rdflib.URIRef(term.value)
-    if isinstance(term, ox.BlankNode):
-        return rdflib.BNode(term.value)
-    if term.language:
-        return rdflib.Literal(term.value, lang=term.language)
-    if term.datatype.value == STRING:
-        return rdflib.Literal(term.value)
-    # rdflib must not tidy the text: "01" and "1" are to be told apart.
-    return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
-
-
 def _problem(report: rdflib.Graph, result: Any) -> Problem:
     focus = report.value(result, SH.focusNode)
     path = report.value(result, SH.resultPath)
     value = report.value(result, SH.value)
     component = str(report.value(result, SH.sourceConstraintComponent)).rpartition("#")[2]
     rule = str(report.value(result, SH.resultMessage) or "")
-    name = _short(path) if isinstance(path, rdflib.URIRef) else "its default geometry"
-    term = all_terms().get(name)
-    what = f"{term.label.lower()} ({name})" if term else name
+    name = compact(str(path)) if isinstance(path, rdflib.URIRef) else "its default geometry"
+    what = f"{label(name).lower()} ({name})" if label(name) else name
     found = "" if value is None else str(value)[:80]
     words = {
         "MinCountConstraintComponent": f"Has no {what}.",
         "MaxCountConstraintComponent": f"Has more than one {what}.",
         "DatatypeConstraintComponent": f"Its {what} is {_typed(value)}.",
         "NodeKindConstraintComponent": f"Its {what} is {found!r}, which is no IRI.",
-        "InConstraintComponent": f"Its {what} is {_short(value)!r}, which is not allowed.",
+        "InConstraintComponent": f"Its {what} is {compact(str(value))!r}, which is not allowed.",
         "MinInclusiveConstraintComponent": f"Its {what} is {found}, out of bounds.",
         "MaxInclusiveConstraintComponent": f"Its {what} is {found}, out of bounds.",
         "PatternConstraintComponent": f"Its {what} reads {found!r}.",
@@ -213,19 +182,11 @@ def _problem(report: rdflib.Graph, result: Any) -> Problem:
 
 def _typed(value: Any) -> str:
     if isinstance(value, rdflib.Literal):
-        kind = "untyped" if value.datatype is None else _short(value.datatype)
+        kind = "untyped" if value.datatype is None else compact(str(value.datatype))
         if value.ill_typed:
             return f"{str(value)[:80]!r}, which is no {kind}"
         return f"{str(value)[:80]!r}, typed {kind}"
     return f"the thing {value}"
-
-
-def _short(iri: Any) -> str:
-    text = str(iri)
-    for prefix, namespace in SCHEMA_PREFIXES.items():
-        if text.startswith(namespace):
-            return f"{prefix}:{text[len(namespace) :]}"
-    return text
 
 
 # -- where in the file ------------------------------------------------------------------------

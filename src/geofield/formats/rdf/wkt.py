@@ -79,16 +79,25 @@ def geometries_of(
     result = np.full(len(texts), None, dtype=object)
     by_crs: dict[str, list[int]] = {}
     for index, text in enumerate(texts):
-        if text is None:
-            continue
-        geometry, crs = geometry_of(text, subjects[index])
-        result[index] = geometry
-        if crs != target:
-            by_crs.setdefault(crs.to_wkt(), []).append(index)
-    for wkt, rows in by_crs.items():
-        project = transformer(CRS.from_wkt(wkt), target)
-        result[rows] = shapely.transform(result[rows], _with(project))
-    for index, text in enumerate(texts):
-        if text is not None and not np.isfinite(shapely.get_coordinates(result[index])).all():
-            raise FormatError(f"<{subjects[index]}>: its coordinates are not a place on earth.")
+        if text is not None:
+            by_crs.setdefault(split_literal(text)[0], []).append(index)
+    for iri, rows in by_crs.items():
+        try:
+            crs = known_crs(iri)
+            shapes = shapely.from_wkt([split_literal(texts[row] or "")[1] for row in rows])
+            finite = bool(np.isfinite(shapely.get_coordinates(shapes)).all())
+        except (ShapelyError, FormatError):
+            finite = False
+        if not finite:
+            # One by one, to name the one that is at fault.
+            shapes = np.array([geometry_of(texts[row] or "", subjects[row])[0] for row in rows])
+            crs = known_crs(iri)
+        elif northing_first(crs):
+            shapes = shapely.transform(shapes, lambda c: c[:, ::-1])
+        result[rows] = (
+            shapes if crs == target else shapely.transform(shapes, _with(transformer(crs, target)))
+        )
+    lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
+    for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
+        raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")
     return result

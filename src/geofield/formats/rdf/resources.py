@@ -1,0 +1,44 @@
+"""Resources: the ontology, the shapes and the context that the package ships.
+
+The files in ``data/`` are written by hand and are the source; tests hold the schema's columns
+and everything that is written against them.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import pyoxigraph as ox
+
+from geofield.formats.rdf.namespaces import LABEL, expand
+from geofield.formats.rdf.parse import Graph
+
+#: File names in the package's folder ``data``.
+ONTOLOGY, SHAPES, CONTEXT = "ontology.ttl", "shapes.ttl", "context.jsonld"
+
+
+def resource(name: str) -> str:
+    """The text of one of the package's files."""
+    return (files(__package__) / "data" / name).read_text(encoding="utf-8")
+
+
+@cache
+def ontology() -> Graph:
+    """The ontology's triples, in the order of the file."""
+    graph = Graph()
+    graph.add(ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE))
+    return graph
+
+
+@cache
+def context() -> dict[str, Any]:
+    """The JSON-LD context: prefixes, and a short term with its type for each property."""
+    return dict(json.loads(resource(CONTEXT))["@context"])
+
+
+def label(name: str) -> str:
+    """What a property is called; empty for one that the ontology does not explain."""
+    return (ontology().value(expand(name), LABEL) or "") if ":" in name else ""

@@ -1,0 +1,121 @@
+"""Scope: which survey and which plan of tracks are meant where a graph holds several."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats.rdf.layers import LayerMap
+from geofield.formats.rdf.namespaces import expand
+from geofield.formats.rdf.parse import Graph
+
+#: The end of a plan's IRI that its content named, not a person.
+_OWN_PLAN = re.compile(r"/plan(?:/[0-9a-f]{12})?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What is read of a graph; None where there is nothing to choose.
+
+    Attributes
+    ----------
+    field, survey, plan : str or None
+        IRIs.
+    tracks : frozenset of str
+        The tracks of the plan.
+    """
+
+    field: str | None
+    survey: str | None
+    plan: str | None
+    tracks: frozenset[str]
+
+    def holds(self, graph: Graph, layer: LayerMap, iri: str) -> bool:
+        """Whether a row belongs to the survey and plan that are meant."""
+        if not layer.in_plan:
+            return self.survey is None or graph.value(iri, "gf:inSurvey") in (None, self.survey)
+        if self.plan is None:
+            return True
+        track = iri if layer.layer.name == "tracks" else track_of(graph, iri)
+        if track is not None:
+            return track in self.tracks
+        return graph.value(iri, "gf:inPlan") in (None, self.plan)
+
+    def sources(self, layer: LayerMap, iri: str) -> tuple[str | None, ...]:
+        """The nodes that tell a row's columns: a field's are told by its survey, too."""
+        return (iri, self.survey) if layer.layer.name == "field" else (iri,)
+
+
+def fields_of(graph: Graph) -> set[str]:
+    """The fields that anything in a graph is of."""
+    in_field = expand("gf:inField")
+    named = {value for node in graph.nodes.values() for value in node.get(in_field, ())}
+    return named | set(graph.of_type("gf:Field"))
+
+
+def track_of(graph: Graph, iri: str) -> str | None:
+    """The track that a part is of: told directly, or by its segment."""
+    track = graph.value(iri, "gf:onTrack")
+    if track is not None:
+        return track
+    segment = graph.value(iri, "gf:onSegment")
+    if segment is None:
+        return None
+    head, found, _ = segment.partition("/segment/")
+    return graph.value(segment, "gf:onTrack") or (head if found else None)
+
+
+def choose(graph: Graph, plan: str | None = None) -> Scope:
+    """The field, survey and plan that are meant.
+
+    Parameters
+    ----------
+    graph : Graph
+    plan : str, optional
+        The plan's IRI or the end of it; the field's own, with a warning, where there are
+        several and none is named.
+
+    Raises
+    ------
+    FormatError
+        When there are several fields, or no such plan.
+    """
+    fields = sorted(fields_of(graph))
+    if len(fields) > 1:
+        raise FormatError(
+            f"There are {len(fields)} fields: {', '.join(f'<{iri}>' for iri in fields[:5])}.",
+            hint="geofield reads one field at a time: split the file by gf:inField.",
+        )
+    tracks: dict[str | None, set[str]] = {}
+    for iri in graph.of_type("gf:Track"):
+        tracks.setdefault(graph.value(iri, "gf:inPlan"), set()).add(iri)
+    plans = {p for p in tracks if p} | set(graph.of_type("gf:TrackPlan"))
+    chosen = _one("track plan", sorted(plans, key=_own_first), plan)
+    surveys = sorted(graph.of_type("gf:Survey"))
+    survey = graph.value(chosen, "gf:basedOn") or _one("survey", surveys)
+    mine = tracks.get(chosen, set()) | (set() if plan else tracks.get(None, set()))
+    return Scope(fields[0] if fields else None, survey, chosen, frozenset(mine))
+
+
+def _own_first(plan: str) -> tuple[bool, str]:
+    return (_OWN_PLAN.search(plan) is None, plan)
+
+
+def _one(kind: str, found: list[str], wanted: str | None = None) -> str | None:
+    if wanted is not None:
+        chosen = [iri for iri in found if iri == wanted or iri.rsplit("/", 1)[-1] == wanted]
+        if len(chosen) != 1:
+            raise FormatError(
+                f"There is no one {kind} {wanted!r}.", hint=f"Plans: {', '.join(found) or 'none'}."
+            )
+        return chosen[0]
+    if len(found) > 1:
+        warnings.warn(
+            f"There are {len(found)} {kind}s ({', '.join(found)}): reading <{found[0]}>. Name "
+            "another by its plan.",
+            FormatWarning,
+            stacklevel=5,
+        )
+    return found[0] if found else None

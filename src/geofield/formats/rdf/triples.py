@@ -1,0 +1,101 @@
+"""Triples: columns of terms as RDF, row by row, so that a million rows stream.
+
+All nodes of one kind have the same predicates in one order; only their values differ. A value
+is a term, a tuple of terms, or None where a row has none.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.sax.saxutils import escape
+
+import pyoxigraph as ox
+
+from geofield.formats.rdf.namespaces import BOOLEAN, DOUBLE, INTEGER, node
+
+#: Nodes of equal length that belong together row by row: a feature and its geometries.
+Group = tuple["Nodes", ...]
+#: A value of one row: a term, several, or none.
+Value = Any
+#: A predicate with a value for each row.
+Column = tuple[ox.NamedNode, Sequence[Value]]
+#: Control characters cannot stand in XML 1.0, not even escaped: they are none in any syntax.
+_NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+_DATATYPES = {bool: BOOLEAN, int: INTEGER, float: DOUBLE}
+
+
+@dataclass(frozen=True, slots=True)
+class Nodes:
+    """Descriptions of one shape: their subjects, and a column for each predicate."""
+
+    subjects: Sequence[ox.NamedNode]
+    columns: Sequence[Column]
+
+
+def triples(groups: Iterable[Group]) -> Iterator[ox.Triple]:
+    """The triples of groups, row by row: a feature, then its geometries, then the next."""
+    triple = ox.Triple
+    for group in groups:
+        for index in range(len(group[0].subjects)):
+            for nodes in group:
+                subject = nodes.subjects[index]
+                for predicate, values in nodes.columns:
+                    value = values[index]
+                    if value is None:
+                        continue
+                    if type(value) is tuple:
+                        for each in value:
+                            yield triple(subject, predicate, each)
+                    else:
+                        yield triple(subject, predicate, value)
+
+
+def single(iri: str, types: str, **properties: Any) -> Group:
+    """One node from Python values; those that are None or empty are left out.
+
+    Parameters
+    ----------
+    iri : str
+    types : str
+        Prefixed names, the most specific first, separated by spaces.
+    **properties
+        Prefixed names with an underscore for the colon: ``gf_inField``.
+    """
+    columns = [(node("rdf:type"), [tuple(map(node, types.split()))])]
+    for name, value in properties.items():
+        if value is not None and value != "":
+            columns.append((node(name.replace("_", ":", 1)), [term(value)]))
+    return (Nodes([ox.NamedNode(iri)], columns),)
+
+
+def term(value: Any) -> Any:
+    """A Python value as a term; terms as they are."""
+    kind = _DATATYPES.get(type(value))
+    if kind is not None:
+        text = str(value).lower() if kind == BOOLEAN else repr(value)
+        return ox.Literal(text, datatype=node(kind))
+    return text_term(value) if isinstance(value, str) else value
+
+
+def text_term(text: str) -> ox.Literal:
+    """A plain text as a literal."""
+    return ox.Literal(_NOT_IN_XML.sub("\ufffd", text))
+
+
+def xml_text(text: str) -> str:
+    """A text for an XML element, without the characters that XML cannot hold."""
+    return escape(_NOT_IN_XML.sub("\ufffd", text), {"\r": "&#13;"})
+
+
+def typed(texts: Iterable[str | None], datatype: str) -> list[ox.Literal | None]:
+    """Texts as literals of a datatype (a prefixed name or IRI)."""
+    kind = node(datatype)
+    return [None if text is None else ox.Literal(text, datatype=kind) for text in texts]
+
+
+def named(iris: Iterable[str | None]) -> list[Any]:
+    """IRIs as terms; None stays none."""
+    return [None if iri is None else ox.NamedNode(iri) for iri in iris]
