@@ -1,9 +1,18 @@
-"""What commands show a person: progress and tables on stderr, data on stdout."""
+"""What commands show: a person gets bars and tables on stderr, a program lines of JSON there.
+
+Data goes to stdout. With ``--progress json`` each line of stderr that is a JSON object tells a
+program one thing: ``{"progress": {"done": 1, "total": 4, "what": "field"}}``, ``{"note": "..."}``
+or, at the end, ``{"error": {"message": "...", "hint": "..."}}``. Other lines are for a person.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+import signal
+import stat
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -12,6 +21,8 @@ import click
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
+
+_PROGRAM_WATCHES = False
 
 
 def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
@@ -24,9 +35,83 @@ def say(message: str) -> None:
     click.echo(message, err=True)
 
 
+def say_note(message: str) -> None:
+    """Something that the person should know, though the work went on."""
+    if _PROGRAM_WATCHES:
+        _tell({"note": message})
+    else:
+        click.secho(f"Note: {message}", fg="yellow", err=True)
+
+
+def say_error(message: str, hint: str | None) -> None:
+    """Why the work failed, and what can be done."""
+    if _PROGRAM_WATCHES:
+        _tell({"error": {"message": message, "hint": hint or ""}})
+        return
+    click.secho(f"Error: {message}", fg="red", err=True)
+    if hint:
+        click.echo(hint, err=True)
+
+
+def progress_option() -> click.Option:
+    """``--progress bar|json``, the same for every command."""
+    return click.Option(
+        ["--progress"],
+        type=click.Choice(["bar", "json"]),
+        default="bar",
+        expose_value=False,
+        is_eager=True,
+        callback=_choose_progress,
+        help="json: lines of JSON on stderr for a program, which stops the work by closing stdin.",
+    )
+
+
+def stop_cleanly() -> None:
+    """Let SIGTERM end the work as Ctrl+C does: files half written are taken away first."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def _choose_progress(context: click.Context, _: click.Parameter, value: str) -> None:
+    global _PROGRAM_WATCHES  # noqa: PLW0603 - one process runs one command
+    _PROGRAM_WATCHES = value == "json"
+    if _PROGRAM_WATCHES and not context.resilient_parsing and context.info_name != "live":
+        _watch_stdin()
+
+
+def _watch_stdin() -> None:
+    """Stop when the pipe from the program that started us ends: Windows sends no signals."""
+    try:
+        watched = stat.S_ISFIFO(os.fstat(0).st_mode)
+    except OSError:
+        return  # no stdin at all
+    if not watched:
+        return
+
+    def wait() -> None:
+        while os.read(0, 4096):
+            pass
+        if hasattr(signal, "pthread_kill"):
+            # To the main thread itself, so that it also wakes from waiting for a server.
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        else:
+            signal.raise_signal(signal.SIGINT)
+
+    threading.Thread(target=wait, name="stdin", daemon=True).start()
+
+
+def _tell(value: Mapping[str, Any]) -> None:
+    print(json.dumps(value, ensure_ascii=False, default=str), file=sys.stderr, flush=True)  # noqa: T201
+
+
 @contextmanager
 def progress_bar(*, quiet: bool = False) -> Iterator[Progress]:
-    """A callback that draws a progress bar on stderr, when that is a terminal."""
+    """A callback that draws a progress bar on stderr, or tells a program how far the work is."""
+    if _PROGRAM_WATCHES:
+        yield lambda done, total, what: _tell(
+            {"progress": {"done": done, "total": total, "what": what}}
+        )
+        return
     if quiet or not sys.stderr.isatty():
         yield lambda done, total, what: None
         return

@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from geofield import __version__
+from geofield.cli.console import progress_option, say_error, say_note, stop_cleanly
 from geofield.errors import GeofieldError, GeofieldWarning
 
 #: Name, "module:function" and the one line of help, in the order of the work.
@@ -28,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("geofield.cli.validate:validate", "Check products against their formats."),
     "query": ("geofield.cli.query:query", "Ask linked data."),
     "info": ("geofield.cli.info:info", "Show what a file holds."),
+    "settings": ("geofield.cli.settings:settings", "List the settings and what they mean."),
     "formats": ("geofield.cli.formats:formats", "List the formats and what each carries."),
     "sources": ("geofield.cli.sources:sources", "List imagery sources and their terms."),
     "cache": ("geofield.cli.cache:cache", "Look at the tile cache, or clear it."),
@@ -50,6 +52,9 @@ class LazyGroup(click.Group):
             return None
         module, _, function = COMMANDS[cmd_name][0].partition(":")
         command: click.Command = getattr(importlib.import_module(module), function)
+        if all(each.name != "progress" for each in command.params):
+            # After the command's own options, before --help, which click adds.
+            command.params.append(progress_option())
         return command
 
     def resolve_command(
@@ -90,7 +95,7 @@ def cli() -> None:
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     if issubclass(category, GeofieldWarning):
-        click.secho(f"Note: {message}", fg="yellow", err=True)
+        say_note(str(message))
 
 
 def main(args: list[str] | None = None) -> None:
@@ -99,6 +104,7 @@ def main(args: list[str] | None = None) -> None:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", GeofieldWarning)
         warnings.showwarning = _show_warning
+        stop_cleanly()
         try:
             # Not standalone, click hands the code of `context.exit` back instead of leaving.
             code = cli.main(args=args, prog_name="geofield", standalone_mode=False)
@@ -112,9 +118,7 @@ def main(args: list[str] | None = None) -> None:
             click.echo("Stopped; nothing half-written is left.", err=True)
             sys.exit(1)
         except GeofieldError as error:
-            click.secho(f"Error: {error.message}", fg="red", err=True)
-            if error.hint:
-                click.echo(error.hint, err=True)
+            say_error(error.message, error.hint)
             sys.exit(1)
         except BrokenPipeError:
             # The reader of our output (head, less) has gone: not our failure.

@@ -20,7 +20,7 @@ from geofield.settings import Settings, Stage
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 _UNITS = ("_m", "_deg", "_px", "_ha")
-_SEPARATOR = "__"
+SEPARATOR = "__"
 
 
 class Degrees(click.FloatRange):
@@ -71,7 +71,8 @@ def section_options(section: Stage, *, only: tuple[str, ...] = ()) -> Callable[[
         model = Settings.model_fields[section].annotation
         for name, field in reversed(model.model_fields.items()):  # type: ignore[union-attr]
             if not only or name in only:
-                command = _option(section, name, field)(command)
+                names, arguments = option_of(section, name, field)
+                command = click.option(*names, **arguments)(command)
         return command
 
     return add
@@ -81,13 +82,14 @@ def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The values of :func:`section_options`, by section; those not given are left out."""
     sections: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
-        section, separator, name = key.partition(_SEPARATOR)
+        section, separator, name = key.partition(SEPARATOR)
         if separator and value is not None and value != ():
             sections.setdefault(section, {})[name] = value
     return sections
 
 
-def _option(section: str, name: str, field: FieldInfo) -> Callable[[Command], Command]:
+def option_of(section: str, name: str, field: FieldInfo) -> tuple[list[str], dict[str, Any]]:
+    """Names and arguments of the option that stands for a setting, as click takes them."""
     extra = field.json_schema_extra
     flag = extra.get("option") if isinstance(extra, dict) else None
     if not isinstance(flag, str):
@@ -95,10 +97,8 @@ def _option(section: str, name: str, field: FieldInfo) -> Callable[[Command], Co
         flag = flag.replace("_", "-")
     arguments: dict[str, Any] = {"help": _help(field), **_click_type(field.annotation)}
     if arguments.pop("is_flag", False):
-        return click.option(
-            f"{flag}/--no-{flag[2:]}", f"{section}{_SEPARATOR}{name}", default=None, **arguments
-        )
-    return click.option(flag, f"{section}{_SEPARATOR}{name}", default=None, **arguments)
+        flag = f"{flag}/--no-{flag[2:]}"
+    return [flag, f"{section}{SEPARATOR}{name}"], {"default": None, **arguments}
 
 
 def _help(field: FieldInfo) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, say
+from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.options import section_options, section_values, settings_option
 
 if TYPE_CHECKING:
@@ -75,21 +75,23 @@ def tracks(
         )
     rows: list[dict[str, Any]] = []
     failed: list[str] = []
-    for stem, begun in plans:
-        target = output / f"{stem}.gpkg" if several or not output.suffix else output
-        try:
-            plan = begun if standing is None else with_obstacles(begun, standing)
-            plan = run_tracks(plan, settings=settings)
-        except GeofieldError as error:
-            if not several:
-                raise
-            failed.append(stem)
-            say(f"{stem}: {error}")
-            continue
-        save_plan(plan, target, read_from=file if is_plan else None, overwrite=overwrite)
-        rows.append(_row(plan, target))
-        if not as_json:
-            say(_line(rows[-1]))
+    with progress_bar(quiet=as_json) as progress:
+        for done, (stem, begun) in enumerate(plans):
+            progress(done, len(plans), stem)
+            target = output / f"{stem}.gpkg" if several or not output.suffix else output
+            try:
+                plan = begun if standing is None else with_obstacles(begun, standing)
+                plan = run_tracks(plan, settings=settings)
+            except GeofieldError as error:
+                if not several:
+                    raise
+                failed.append(stem)
+                say(f"{stem}: {error}")
+                continue
+            save_plan(plan, target, read_from=file if is_plan else None, overwrite=overwrite)
+            rows.append(_row(plan, target))
+            if not as_json:
+                say(_line(rows[-1]))
     if as_json:
         echo_json({"fields": rows, "failed": failed})
     if failed:

@@ -1,0 +1,120 @@
+"""``geofield settings``: every setting and every command's parameters, as data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from geofield.cli.console import echo_json
+from geofield.cli.options import SEPARATOR
+
+
+@click.command(
+    epilog="""\b
+Example:
+  geofield settings --json
+"""
+)
+@click.option("--json", "as_json", is_flag=True, help="Print all as JSON on stdout.")
+@click.pass_context
+def settings(context: click.Context, as_json: bool) -> None:
+    """List the settings: their names in a settings file, what they mean, their defaults.
+
+    With --json a program gets all it needs to ask a person: type, choices, limits, defaults
+    and options of every setting, and the parameters of every command.
+    """
+    rows = all_settings()
+    if as_json:
+        echo_json({"settings": rows, "commands": all_commands(context)})
+        return
+    for row in rows:
+        default = "" if row["default"] in (None, [], {}) else f"  [default: {row['default']}]"
+        click.echo(f"{row['section']}.{row['name']}: {row['description']}{default}")
+
+
+def all_settings() -> list[dict[str, Any]]:
+    """Each setting of `geofield.settings`, plain JSON values."""
+    from geofield.cli.options import option_of
+    from geofield.settings import SECTIONS, Settings
+
+    rows = []
+    for section in SECTIONS:
+        model = Settings.model_fields[section].annotation
+        fields = model.model_fields  # type: ignore[union-attr]
+        schema = model.model_json_schema()["properties"]  # type: ignore[union-attr]
+        for name, field in fields.items():
+            names, arguments = option_of(section, name, field)
+            option = click.Option(names, **arguments)
+            value = field.get_default()
+            rows.append(
+                {
+                    "section": section,
+                    "name": name,
+                    "description": field.description or "",
+                    "default": list(value) if isinstance(value, tuple) else value,
+                    "option": option.opts[0],
+                    **_kind(option),
+                    **_limits(schema[name]),
+                }
+            )
+    return rows
+
+
+def all_commands(context: click.Context) -> dict[str, Any]:
+    """Each command with its parameters; a setting's own name is in its parameter's name."""
+    group = context.find_root().command
+    if not isinstance(group, click.Group):
+        return {}
+    found = {}
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if command is not None:
+            found[name] = {
+                "help": (command.help or "").strip(),
+                "parameters": [
+                    _parameter(each)
+                    for each in command.params
+                    if each.name not in ("help", "progress")
+                ],
+            }
+    return found
+
+
+def _parameter(parameter: click.Parameter) -> dict[str, Any]:
+    section, separator, name = (parameter.name or "").partition(SEPARATOR)
+    if separator:
+        return {"setting": f"{section}.{name}"}
+    default = parameter.default
+    plain = default if isinstance(default, str | int | float | bool) else None
+    return {
+        "name": parameter.name,
+        "option": parameter.opts[0] if isinstance(parameter, click.Option) else "",
+        "description": (parameter.help or "") if isinstance(parameter, click.Option) else "",
+        "required": parameter.required,
+        "default": plain,
+        **_kind(parameter),
+    }
+
+
+def _kind(parameter: click.Parameter) -> dict[str, Any]:
+    """What a value looks like: type, choices, how many."""
+    kind = parameter.type
+    is_flag = isinstance(parameter, click.Option) and parameter.is_flag
+    row: dict[str, Any] = {"type": "flag" if is_flag else kind.name, "multiple": False}
+    if isinstance(kind, click.Choice):
+        row |= {"type": "choice", "choices": [str(each) for each in kind.choices]}
+    if isinstance(kind, click.types.CompositeParamType):
+        row |= {"type": "numbers", "count": kind.arity}
+    if is_flag and isinstance(parameter, click.Option) and parameter.secondary_opts:
+        row["off"] = parameter.secondary_opts[0]
+    if getattr(parameter, "multiple", False) or parameter.nargs == -1:
+        row["multiple"] = True
+    return row
+
+
+def _limits(schema: dict[str, Any]) -> dict[str, Any]:
+    """Smallest and largest value of a number, where it has any."""
+    number = next((each for each in schema.get("anyOf", ()) if each.get("type") != "null"), schema)
+    words = {"minimum": "minimum", "exclusiveMinimum": "above", "maximum": "maximum"}
+    return {ours: number[theirs] for theirs, ours in words.items() if theirs in number}
