@@ -13,7 +13,8 @@ import shapely
 
 import geofield as gf
 from geofield.errors import FieldError, OutputExistsError, TrackError
-from geofield.model.review import complete_review
+from geofield.model.evidence import Evidence
+from geofield.model.review import reconcile
 from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.settings import Settings, load_settings
@@ -156,7 +157,7 @@ def test_another_fields_plan_is_not_mixed_in(
     from shapely.affinity import translate
 
     elsewhere = replace(plan.field, polygon=translate(plan.field.polygon, 5000, 0))
-    other = replace(plan, field=elsewhere, evidence={}, tracks=None)
+    other = replace(plan, field=elsewhere, evidence=Evidence(), tracks=None)
     where = {"lat": simulated.lat, "lon": simulated.lon}
     again = run_field(simulated.scene, **where, settings=SETTINGS, previous=other)
     assert again.obstacles is None
@@ -178,7 +179,7 @@ def test_incomplete_rows_become_added_obstacles(plan: Plan) -> None:
     table.loc[0, "obstacle_no"] = None
     table.loc[1, "status"] = None
     table.loc[2, "obstacle_no"] = table.loc[3, "obstacle_no"]
-    done = complete_review(table)
+    done, _ = reconcile(table)
     assert len(done) == len(table)
     assert done["obstacle_no"].is_unique
     assert done["obstacle_no"].notna().all()

@@ -38,7 +38,7 @@ def plan() -> Plan:
             "status": "added",
             "radius_m": [None, 4],
         },
-        geometry=[wall, *circle_polygons([X + 60], [Y + 45], [4.0])],
+        geometry=[wall, *circle_polygons([X + 60], [Y + 45], [4.0], UTM)],
         crs=UTM,
     ).assign(status="added", buffer_m=0.0)
     field = gf.Field(shapely.box(X, Y, X + 120, Y + 60), crs=UTM)

@@ -40,8 +40,6 @@ def demo_map() -> None:
 
 def review() -> None:
     """The same field after a person's review."""
-    from geofield.model.review import complete_review
-
     settings = gf.Settings(tracks={"spacing_m": 8.0})
     plan = gf.plan_field(SAMPLE, **POINT, settings=settings)
     obstacles = plan.obstacles
@@ -54,7 +52,7 @@ def review() -> None:
     obstacles = pd.concat([obstacles, added], ignore_index=True)
     from dataclasses import replace
 
-    edited = replace(plan, obstacles=complete_review(obstacles, plan.grid))
+    edited = replace(plan, obstacles=obstacles)
     again = gf.plan_field(SAMPLE, **POINT, settings=settings, previous=edited)
     with tempfile.TemporaryDirectory() as folder:
         again.write(Path(folder) / "out", formats=["gpkg"])

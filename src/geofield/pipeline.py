@@ -9,19 +9,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 
-from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FieldError, GeofieldError, TrackError
+from geofield.model.evidence import Evidence
 from geofield.model.field import Field
-from geofield.model.review import complete_review, merge_reviewed
+from geofield.model.merge import merge
+from geofield.model.review import reconcile
 from geofield.model.scene import Scene
+from geofield.model.written import Written
 from geofield.plan import Plan, outline_digest
 from geofield.settings import Settings
 
@@ -97,14 +98,12 @@ def open_scene(path: str | Path, lat: float, lon: float, settings: Settings) -> 
 
 def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
     """Read the picture that a plan was made from, at the point it was made for."""
-    point = plan.evidence.get("point")
+    point = plan.evidence.point
     if point is None:
         inside = plan.field.polygon_lonlat.representative_point()
-        point = {"lat": inside.y, "lon": inside.x}
+        point = (inside.y, inside.x)
     imagery = (plan.settings or settings).imagery
-    return open_scene(
-        path, point["lat"], point["lon"], settings.model_copy(update={"imagery": imagery})
-    )
+    return open_scene(path, *point, settings.model_copy(update={"imagery": imagery}))
 
 
 def run_field(
@@ -153,18 +152,20 @@ def run_field(
         )
         if previous is not None and boundary is None:
             # The same field, found again: its names are the user's to keep.
-            field = replace(field, field_id=previous.field.field_id, name=previous.field.name)
-    evidence: dict[str, Any] = {"point": {"lat": lat, "lon": lon}, "field": _field_evidence(field)}
-    obstacles = None
+            known = previous.field
+            field = replace(field, field_id=known.field_id, name=known.name, own=known.own)
+    obstacles = written = None
     if previous is not None and previous.obstacles is not None:
-        obstacles = complete_review(previous.obstacles, scene.grid)
+        obstacles, written = reconcile(previous.obstacles, previous.evidence.written, scene.grid)
+        obstacles = obstacles.to_crs(field.crs)
+        written = written.reprojected(previous.field.crs, field.crs)
     return Plan(
         field=field,
         obstacles=obstacles,
         settings=settings,
         source=scene.source,
         grid=scene.grid,
-        evidence=evidence,
+        evidence=Evidence((lat, lon), outline_digest(field), written=written),
         scene=scene,
     )
 
@@ -205,9 +206,12 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
 
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
-    if plan.obstacles is not None and len(plan.obstacles):
-        detected = merge_reviewed(detected, complete_review(plan.obstacles, scene.grid))
     detected.attrs.clear()
+    if plan.obstacles is None:
+        written = Written.of(detected, np.zeros(len(detected), bool))
+    else:
+        earlier, written = reconcile(plan.obstacles, plan.evidence.written, scene.grid)
+        detected, written, _ = merge(detected, earlier, written)
     return replace(
         plan,
         obstacles=detected,
@@ -215,7 +219,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
         settings=_with_section(plan.settings, settings, "obstacles"),
         source=scene.source,
         grid=scene.grid,
-        evidence={**_without(plan.evidence, "tracks"), "obstacles": found},
+        evidence=replace(plan.evidence, detection=found, written=written),
         scene=scene,
     )
 
@@ -225,7 +229,10 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     from geofield.tracks import plan_with_settings
 
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
-    obstacles = None if plan.obstacles is None else complete_review(plan.obstacles, plan.grid)
+    obstacles, evidence = None, plan.evidence
+    if plan.obstacles is not None:
+        obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
+        evidence = replace(evidence, written=written)
     _refuse_too_wide(field, settings.tracks.spacing_m)
     tracks = plan_with_settings(
         field.polygon, obstacles, settings.tracks, crs=field.crs, grid=plan.grid
@@ -235,16 +242,15 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
             f"The field of {field.area_ha:.4f} ha is smaller than one track.",
             hint="Choose a smaller spacing or headland, or check the outline.",
         )
-    evidence = dict(plan.evidence)
     if field is not plan.field:
-        evidence["field"] = _field_evidence(field)
+        evidence = replace(evidence, outline=outline_digest(field))
     return replace(
         plan,
         field=field,
         obstacles=obstacles,
         tracks=tracks,
         settings=_with_section(plan.settings, settings, "tracks"),
-        evidence={**evidence, "tracks": tracks.evidence()},
+        evidence=evidence,
     )
 
 
@@ -274,8 +280,8 @@ def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
     """Another field's plan may be replaced, but not a person's work on it."""
     reviewed = 0
     if previous.obstacles is not None:
-        status = complete_review(previous.obstacles)["status"]
-        reviewed = int(status.isin(schema.REVIEWED).sum())
+        _, written = reconcile(previous.obstacles, previous.evidence.written)
+        reviewed = sum(row.kept for row in written.rows) + len(written.removed)
     if reviewed or keeps_outline(previous):
         work = [f"{reviewed} reviewed obstacles"] if reviewed else []
         work += ["an outline drawn by hand"] if keeps_outline(previous) else []
@@ -286,27 +292,11 @@ def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
         )
 
 
-def _field_evidence(field: Field) -> dict[str, Any]:
-    evidence: dict[str, Any] = {"method": field.method, "outline_sha256": outline_digest(field)}
-    if field.quality is not None:
-        quality = asdict(field.quality)
-        evidence["quality"] = {
-            **quality,
-            "reasons": list(quality["reasons"]),
-            "figures": [[name, float(value)] for name, value in quality["figures"]],
-        }
-    return evidence
-
-
 def _with_section(old: Settings | None, new: Settings, section: str) -> Settings:
     """The settings that led to the plan: each stage's own, from the run that did it."""
     if old is None:
         return new
     return old.model_copy(update={section: getattr(new, section)})
-
-
-def _without(values: Any, *names: str) -> dict[str, Any]:
-    return {name: value for name, value in dict(values).items() if name not in names}
 
 
 @contextmanager

@@ -16,7 +16,8 @@ from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset, Provenance
-from geofield.model.field import Field, FieldQuality
+from geofield.model.evidence import Evidence, quality_from_json
+from geofield.model.field import Field
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
 
@@ -44,8 +45,8 @@ class Plan:
     source : ImagerySource
     grid : Grid or None
         Of the picture: gives pixel columns their meaning.
-    evidence : mapping
-        What the stages measured, by stage; plain JSON values.
+    evidence : Evidence
+        What the stages recorded.
     scene : Scene or None
         The picture itself, where it is at hand; no part of equality.
     """
@@ -56,7 +57,7 @@ class Plan:
     settings: Settings | None = None
     source: ImagerySource = dataclasses.field(default_factory=ImagerySource)
     grid: Grid | None = None
-    evidence: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    evidence: Evidence = dataclasses.field(default_factory=Evidence)
     scene: Scene | None = None
 
     __hash__ = None  # type: ignore[assignment]
@@ -77,7 +78,7 @@ class Plan:
         one = self.field
         words = (one.name, one.field_id, one.method, one.imagery, one.imagery_date, one.licence)
         outline = None if self.tracks is None else self.tracks.outline
-        return (one.crs, one.polygon, words, outline, self._provenance(), self.grid)
+        return (one.crs, one.polygon, words, one.own, outline, self._provenance(), self.grid)
 
     def _tables(self) -> dict[str, gpd.GeoDataFrame]:
         """All tables but the field's own."""
@@ -85,16 +86,15 @@ class Plan:
         return tables if self.tracks is None else tables | self.tracks.tables()
 
     def _provenance(self) -> Provenance:
-        evidence = dict(self.evidence)
-        if self.tracks is not None:
-            evidence["tracks"] = self.tracks.evidence()
+        tracks = None if self.tracks is None else self.tracks.evidence()
+        evidence = self.evidence.to_json(self.field, tracks)
         settings = self.settings.model_dump(mode="json") if self.settings else {}
         return Provenance(SOFTWARE, self.source, settings, evidence)
 
     @property
     def outline_edited(self) -> bool:
         """Whether a person moved the outline since a stage wrote it."""
-        recorded = self.evidence.get("field", {}).get("outline_sha256")
+        recorded = self.evidence.outline
         return recorded is not None and recorded != outline_digest(self.field)
 
     def to_dataset(self) -> Dataset:
@@ -125,7 +125,7 @@ class Plan:
                 f"A plan has one field; this file has {len(rows)}.",
                 hint="For many fields at once use `geofield tracks`.",
             )
-        evidence = dict(dataset.provenance.evidence)
+        evidence = dataset.provenance.evidence
         settings = (
             from_mapping(dataset.provenance.settings) if dataset.provenance.settings else None
         )
@@ -143,7 +143,7 @@ class Plan:
             settings=settings,
             source=dataset.provenance.source,
             grid=dataset.grid,
-            evidence=evidence,
+            evidence=Evidence.from_json(evidence),
         )
 
     def write(
@@ -225,7 +225,7 @@ class Plan:
         edge = baseline.edge
         edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)
         heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
-        return schema.table(
+        table = schema.table(
             schema.FIELD,
             {
                 "field_id": [one.field_id],
@@ -244,6 +244,7 @@ class Plan:
             [one.polygon],
             one.crs,
         )
+        return table.assign(**{name: [value] for name, value in one.own})
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -267,15 +268,6 @@ def outline_digest(one: Field) -> str:
 
 def _field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[str, Any]) -> Field:
     row = rows.iloc[0]
-    recorded = evidence.get("field", {}).get("quality")
-    quality = None
-    if recorded:
-        quality = FieldQuality(
-            score=recorded["score"],
-            reasons=tuple(recorded["reasons"]),
-            figures=tuple((name, value) for name, value in recorded["figures"]),
-            trusted=recorded["trusted"],
-        )
 
     def text(name: str) -> str:
         value = row.get(name)
@@ -287,10 +279,15 @@ def _field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[
         name=text("name"),
         field_id=text("field_id"),
         method=text("method") or "given",
-        quality=quality,
+        quality=quality_from_json(evidence),
         imagery=text("imagery"),
         imagery_date=text("imagery_date") or None,
         licence=text("licence"),
+        own=tuple(
+            (name, rows[name].iloc[0])
+            for name in schema.own_columns(schema.FIELD, rows)
+            if rows[name].notna().iloc[0]
+        ),
     )
 
 

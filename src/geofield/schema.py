@@ -344,6 +344,12 @@ def table(of: Layer, data: dict[str, Any], geometry: Any, crs: CRS) -> gpd.GeoDa
     return gpd.GeoDataFrame(frame, geometry=gpd.GeoSeries(geometry, crs=crs), crs=crs)
 
 
+def own_columns(of: Layer, frame: gpd.GeoDataFrame) -> list[str]:
+    """The columns that the user added to a layer."""
+    known = {*of.column_names, frame.geometry.name, "geometry", "fid"}
+    return [name for name in frame.columns if name not in known]
+
+
 def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.GeoDataFrame:
     """Any table in the shape of a layer: its columns, order and types, sorted by its key.
 
@@ -381,10 +387,7 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
         else:
             data[column.name] = [None if pd.isna(v) else str(v) for v in series]
     result = table(of, data, frame.geometry.to_numpy(), frame.crs)
-    if extras:
-        known = {*of.column_names, frame.geometry.name, result.geometry.name}
-        for name in frame.columns:
-            if name not in known:
-                result[name] = frame[name].to_numpy()
+    for name in own_columns(of, frame) if extras else ():
+        result[name] = frame[name].array
     result = result.sort_values(list(of.key), kind="stable", na_position="last")
     return result.reset_index(drop=True)

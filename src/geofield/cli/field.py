@@ -161,7 +161,7 @@ def _extract(
                 "vertices": len(found.polygon.exterior.coords) - 1,
                 "holes": len(found.polygon.interiors),
                 "crs": found.crs.to_string(),
-                "evidence": dict(plan.evidence.get("field", {})),
+                "evidence": plan.to_dataset().provenance.evidence.get("field", {}),
             }
         )
         return

@@ -64,7 +64,7 @@ def obstacles(
         echo_json(
             {
                 "file": str(output),
-                "detection": plan.evidence.get("obstacles", {}),
+                "detection": dict(plan.evidence.detection),
                 "obstacles": table.drop(columns="geometry").to_dict("records"),
             }
         )

@@ -147,12 +147,6 @@ def arrow_values(column: Column, series: Any) -> pa.Array:
         ) from error
 
 
-def extra_columns(of: Layer, table: gpd.GeoDataFrame) -> list[str]:
-    """Columns that a person added to a layer."""
-    known = {*of.column_names, table.geometry.name, "fid"}
-    return [str(name) for name in table.columns if name not in known]
-
-
 def arrow_table(
     of: Layer,
     table: gpd.GeoDataFrame,
@@ -187,7 +181,7 @@ def arrow_table(
             key = column.name if names is None else names[column.name]
             columns[key] = arrow_values(column, table[column.name])
     if extras and names is None:
-        for name in extra_columns(of, table):
+        for name in schema.own_columns(of, table):
             columns[name] = _extra_values(table[name])
     columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
     return pa.table(columns)

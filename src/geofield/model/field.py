@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -65,6 +66,8 @@ class Field:
         Name and licence of the picture behind it.
     imagery_date : str or None
         ISO 8601.
+    own : tuple of (str, value)
+        The columns that the user added to the layer `field`.
     """
 
     polygon: Polygon
@@ -76,6 +79,7 @@ class Field:
     imagery: str = ""
     imagery_date: str | None = None
     licence: str = ""
+    own: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         crs = parse_crs(self.crs)

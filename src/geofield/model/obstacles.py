@@ -219,10 +219,9 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
     frame, geometry = frame[present], geometry[present]
-    count = len(geometry)
     numbers = frame["obstacle_no"].to_numpy(dtype=np.int64)
-    radius = _floats(frame, "radius_m", count)
-    margin = np.nan_to_num(_floats(frame, "buffer_m", count), nan=0.0)
+    radius = floats(frame, "radius_m")
+    margin = np.nan_to_num(floats(frame, "buffer_m"), nan=0.0)
     if np.any(np.isinf(radius) | (radius < 0) | ~np.isfinite(margin) | (margin < 0)):
         raise ObstacleError(
             "An obstacle's radius_m or buffer_m is negative or infinite.",
@@ -231,7 +230,7 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     total = radius + margin
     sized = np.isfinite(total)
     total[sized] *= ground_scale_of(geometry[sized], CRS(obstacles.crs))
-    is_circle = _still_round(geometry, total)
+    is_circle = still_round(geometry, total)
     centre = shapely.centroid(geometry[is_circle])
     return ObstacleShapes(
         np.column_stack([shapely.get_x(centre), shapely.get_y(centre), total[is_circle]]),
@@ -241,8 +240,11 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     )
 
 
-def _still_round(geometry: NDArray[np.object_], radius: FloatArray) -> NDArray[np.bool_]:
-    """Whether each geometry is, vertex by vertex, the polygon of a circle of the radius."""
+def still_round(geometry: NDArray[np.object_], radius: FloatArray) -> NDArray[np.bool_]:
+    """Whether each geometry is, vertex by vertex, the polygon of a circle of the radius.
+
+    The radius is in units of the geometries' CRS.
+    """
     polygon = shapely.get_type_id(geometry) == shapely.GeometryType.POLYGON.value
     candidate = np.flatnonzero(
         polygon
@@ -266,7 +268,8 @@ def _still_round(geometry: NDArray[np.object_], radius: FloatArray) -> NDArray[n
     return result
 
 
-def _floats(frame: gpd.GeoDataFrame, column: str, count: int) -> FloatArray:
+def floats(frame: gpd.GeoDataFrame, column: str) -> FloatArray:
+    """A column's numbers; NaN where they are missing, as all are without the column."""
     if column not in frame.columns:
-        return np.full(count, np.nan)
+        return np.full(len(frame), np.nan)
     return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))

@@ -21,7 +21,7 @@ from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
-from geofield.model.review import complete_review
+from geofield.model.review import reconcile
 from geofield.settings import Settings, TrackSettings
 
 if TYPE_CHECKING:
@@ -202,7 +202,9 @@ def _reshaped(plan: Plan, command: Command, shape: Any, values: Mapping[str, Any
     _on_the_picture(plan, shape)
     status = "added" if _row(plan, command)["status"] == "added" else "confirmed"
     edited = _with_row(plan, command, {**values, "status": status, "geometry": shape})
-    return replace(edited, obstacles=complete_review(edited.obstacles, plan.grid))
+    assert edited.obstacles is not None  # noqa: S101 - a row was found in it
+    obstacles, written = reconcile(edited.obstacles, plan.evidence.written, plan.grid)
+    return replace(edited, obstacles=obstacles, evidence=replace(plan.evidence, written=written))
 
 
 def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: float | None) -> Plan:

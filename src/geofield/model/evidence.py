@@ -1,0 +1,84 @@
+"""Evidence: what the stages recorded of their work, besides the values that they made.
+
+In files it is plain JSON; here, and only here, stand the names under which it is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from geofield.model.field import Field, FieldQuality
+from geofield.model.written import Written
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What the stages recorded.
+
+    Attributes
+    ----------
+    point : (float, float) or None
+        Latitude and longitude that the field was looked for at, degrees.
+    outline : str or None
+        Fingerprint of the outline as stage 2 left it: another one means a person drew.
+    detection : mapping
+        How obstacles were found, plain JSON values.
+    written : Written or None
+        The obstacles as the last stage left them; None where nobody recorded them.
+    """
+
+    point: tuple[float, float] | None = None
+    outline: str | None = None
+    detection: Mapping[str, Any] = field(default_factory=dict)
+    written: Written | None = None
+
+    def to_json(self, of: Field, tracks: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Plain JSON values, with those of the field's quality and of the tracks."""
+        result: dict[str, Any] = {}
+        if self.point is not None:
+            result["point"] = {"lat": self.point[0], "lon": self.point[1]}
+        if self.outline is not None:
+            result["field"] = {"method": of.method, "outline_sha256": self.outline}
+        if of.quality is not None:
+            result.setdefault("field", {})["quality"] = _quality_json(of.quality)
+        if self.detection:
+            result["obstacles"] = dict(self.detection)
+        if self.written is not None:
+            result["written"] = self.written.to_json()
+        if tracks is not None:
+            result["tracks"] = dict(tracks)
+        return result
+
+    @classmethod
+    def from_json(cls, value: Mapping[str, Any]) -> Evidence:
+        """The evidence that was written with :meth:`to_json`, by this or an earlier version."""
+        point, written = value.get("point"), value.get("written")
+        return cls(
+            None if point is None else (float(point["lat"]), float(point["lon"])),
+            value.get("field", {}).get("outline_sha256"),
+            dict(value.get("obstacles", {})),
+            None if written is None else Written.from_json(written),
+        )
+
+
+def quality_from_json(value: Mapping[str, Any]) -> FieldQuality | None:
+    """The field's quality in the JSON of :meth:`Evidence.to_json`."""
+    recorded = value.get("field", {}).get("quality")
+    if not recorded:
+        return None
+    return FieldQuality(
+        score=recorded["score"],
+        reasons=tuple(recorded["reasons"]),
+        figures=tuple((name, figure) for name, figure in recorded["figures"]),
+        trusted=recorded["trusted"],
+    )
+
+
+def _quality_json(quality: FieldQuality) -> dict[str, Any]:
+    return {
+        **asdict(quality),
+        "reasons": list(quality.reasons),
+        "figures": [[name, float(figure)] for name, figure in quality.figures],
+    }

@@ -1,0 +1,243 @@
+"""What the software last wrote of the obstacles: the measure of what a person changed since.
+
+Every stage leaves such a record in its plan, and a file carries it beside the table. A row
+that differs from its record was changed by a person; a row that is missing was deleted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from pyproj import CRS
+
+from geofield.crs import transformer
+from geofield.model.obstacles import QUARTER_SEGMENTS, floats, still_round
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: A shape farther than this from the one that was written was changed by a person, metres.
+#: Editors and formats that keep the coordinates stay far below it.
+SAME_M = 0.001
+_DECIMALS = 4
+
+#: A shape in plain values: centre x, y and radius of a circle, or WKT; in units of the CRS.
+PlainShape = tuple[float, float, float] | str
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenRow:
+    """One obstacle as it was written.
+
+    Attributes
+    ----------
+    obstacle_no : int
+    kind, status : str
+    radius_m, buffer_m : float or None
+    kept : bool
+        Whether it is a person's word, which no detection changes.
+    shape : tuple or str
+        Its buffer, in the plan's metric CRS.
+    """
+
+    obstacle_no: int
+    kind: str
+    status: str
+    radius_m: float | None
+    buffer_m: float | None
+    kept: bool
+    shape: PlainShape
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The obstacles as they were written, and what a person took away.
+
+    Attributes
+    ----------
+    rows : tuple of WrittenRow
+    removed : tuple of shapes
+        Where a person deleted an obstacle, or moved it away from: nothing is found there again.
+    """
+
+    rows: tuple[WrittenRow, ...] = ()
+    removed: tuple[PlainShape, ...] = ()
+
+    @classmethod
+    def of(
+        cls, obstacles: gpd.GeoDataFrame, kept: ArrayLike, removed: Sequence[PlainShape] = ()
+    ) -> Written:
+        """The record of a table in which every row has a number.
+
+        Parameters
+        ----------
+        obstacles : GeoDataFrame
+            Layer `obstacles`.
+        kept : bool array
+            Of each row, whether it is a person's word.
+        removed : sequence of shapes
+        """
+        radius, margin = floats(obstacles, "radius_m"), floats(obstacles, "buffer_m")
+        shapes = plain(obstacles.geometry.to_numpy())
+        columns = (obstacles["obstacle_no"], obstacles["kind"], obstacles["status"])
+        rows = zip(*columns, radius, margin, np.asarray(kept, bool), shapes, strict=True)
+        return cls(
+            tuple(
+                WrittenRow(int(no), kind, status, _number(r), _number(m), bool(k), shape)
+                for no, kind, status, r, m, k, shape in rows
+            ),
+            tuple(dict.fromkeys(removed)),
+        )
+
+    def table(self) -> pd.DataFrame:
+        """The rows by number, with their shapes."""
+        columns = {
+            name: [getattr(row, name) for row in self.rows]
+            for name in ("kind", "status", "radius_m", "buffer_m", "kept")
+        }
+        numbers = pd.Index([row.obstacle_no for row in self.rows], dtype="int64")
+        table = pd.DataFrame(columns, index=numbers)
+        table = table.astype({"radius_m": float, "buffer_m": float, "kept": bool})
+        return table.assign(geometry=shapes_of_plain([row.shape for row in self.rows]))
+
+    def reprojected(self, source: CRS, target: CRS) -> Written:
+        """The same in another metric CRS."""
+        if source == target:
+            return self
+        from dataclasses import replace
+
+        rows = [replace(row, shape=_moved(row.shape, source, target)) for row in self.rows]
+        return Written(tuple(rows), tuple(_moved(each, source, target) for each in self.removed))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; see :meth:`from_json`."""
+        return {
+            "rows": [
+                [r.obstacle_no, r.kind, r.status, r.radius_m, r.buffer_m, r.kept, _listed(r.shape)]
+                for r in self.rows
+            ],
+            "removed": [_listed(shape) for shape in self.removed],
+        }
+
+    @classmethod
+    def from_json(cls, value: Mapping[str, Any]) -> Written:
+        """The record that was written with :meth:`to_json`."""
+        return cls(
+            tuple(_row(*row) for row in value["rows"]),
+            tuple(_unlisted(shape) for shape in value["removed"]),
+        )
+
+
+def plain(geometry: Any) -> list[PlainShape]:
+    """Shapes in plain values: circles by centre and radius, others as WKT."""
+    geometry = np.asarray(geometry, dtype=object)
+    fitted = fitted_circles(geometry)
+    result: list[PlainShape] = [
+        str(text) for text in shapely.to_wkt(geometry, rounding_precision=_DECIMALS)
+    ]
+    rows = np.flatnonzero(still_round(geometry, fitted[:, 2]))
+    # Some are round enough to be driven around as circles, but were drawn as they are.
+    rows = rows[same_shapes(_circles(fitted[rows]), geometry[rows], SAME_M / 2)]
+    for row, (x, y, radius) in zip(rows, fitted[rows].round(_DECIMALS).tolist(), strict=True):
+        result[row] = (x, y, radius)
+    return result
+
+
+def fitted_circles(geometry: Any) -> NDArray[np.float64]:
+    """Centre x, y and mean distance of the vertices from it, of each polygon (n, 3)."""
+    geometry = np.asarray(geometry, dtype=object)
+    centre = shapely.get_coordinates(shapely.centroid(geometry))
+    xy, row = shapely.get_coordinates(geometry, return_index=True)
+    away = np.hypot(*(xy - centre[row]).T)
+    count = np.bincount(row, minlength=len(geometry))
+    return np.column_stack([centre, np.bincount(row, away, minlength=len(geometry)) / count])
+
+
+def _circles(circles: NDArray[np.float64]) -> NDArray[np.object_]:
+    """Polygons of circles, all in units of their CRS."""
+    points = shapely.points(circles[:, :2])
+    return np.asarray(
+        shapely.orient_polygons(shapely.buffer(points, circles[:, 2], quad_segs=QUARTER_SEGMENTS))
+    )
+
+
+def shapes_of_plain(shapes: Sequence[PlainShape]) -> NDArray[np.object_]:
+    """The polygons of plain shapes."""
+    result = np.empty(len(shapes), dtype=object)
+    round_ones = [i for i, shape in enumerate(shapes) if not isinstance(shape, str)]
+    if round_ones:
+        result[round_ones] = _circles(np.array([shapes[i] for i in round_ones], dtype=float))
+    for i, shape in enumerate(shapes):
+        if isinstance(shape, str):
+            result[i] = shapely.from_wkt(shape)
+    return result
+
+
+def same_shapes(one: Any, other: Any, tolerance_m: float = SAME_M) -> NDArray[np.bool_]:
+    """Whether shapes are the same, however an editor arranged their rings and parts."""
+    one, other = np.asarray(one, dtype=object), np.asarray(other, dtype=object)
+    result = np.asarray(shapely.equals_exact(one, other, tolerance=tolerance_m), dtype=bool)
+    rest = np.flatnonzero(~result)
+    if len(rest):
+        result[rest] = shapely.hausdorff_distance(one[rest], other[rest]) <= tolerance_m
+    return result
+
+
+def matches(shapes: Any, others: Any) -> NDArray[np.int64]:
+    """For each shape the nearest other that is the same object, by position; -1 for none.
+
+    Two shapes are the same object when the centre of one lies in the other.
+    """
+    mine, theirs = np.asarray(shapes, dtype=object), np.asarray(others, dtype=object)
+    result = np.full(len(mine), -1, dtype=np.int64)
+    if not len(mine) or not len(theirs):
+        return result
+    rows, candidates = shapely.STRtree(theirs).query(mine, predicate="intersects")
+    centre, other = shapely.centroid(mine)[rows], shapely.centroid(theirs)[candidates]
+    same = shapely.intersects(centre, theirs[candidates]) | shapely.intersects(other, mine[rows])
+    distance = shapely.distance(centre, other)
+    for index in np.argsort(distance, kind="stable"):
+        if same[index] and result[rows[index]] < 0:
+            result[rows[index]] = candidates[index]
+    return result
+
+
+def _moved(shape: PlainShape, source: CRS, target: CRS) -> PlainShape:
+    project = transformer(source, target)
+    if not isinstance(shape, str):
+        x, y = project.transform(shape[0], shape[1])
+        return (round(x, _DECIMALS), round(y, _DECIMALS), shape[2])
+    moved = shapely.transform(
+        shapely.from_wkt(shape), lambda xy: np.column_stack(project.transform(*xy.T))
+    )
+    return str(shapely.to_wkt(moved, rounding_precision=_DECIMALS))
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else round(float(value), 6)
+
+
+def _row(
+    obstacle_no: int,
+    kind: str,
+    status: str,
+    radius_m: float | None,
+    buffer_m: float | None,
+    kept: bool,
+    shape: Any,
+) -> WrittenRow:
+    return WrittenRow(obstacle_no, kind, status, radius_m, buffer_m, kept, _unlisted(shape))
+
+
+def _listed(shape: PlainShape) -> list[float] | str:
+    return shape if isinstance(shape, str) else list(shape)
+
+
+def _unlisted(shape: Any) -> PlainShape:
+    return shape if isinstance(shape, str) else (shape[0], shape[1], shape[2])
