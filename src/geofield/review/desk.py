@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from geofield.crs import ground_scale_of
 from geofield.errors import FormatError, GeofieldError
 from geofield.imagery.display import TiledPicture
 from geofield.plan import Plan, read_plan
@@ -20,7 +21,7 @@ from geofield.review.session import Session
 from geofield.review.shown import state_of, tracks_of
 from geofield.staging import refuse_locked
 from geofield.theme import web_theme
-from geofield.web.view import ground_scale, margin_bounds, place_table
+from geofield.web.view import margin_bounds, place_table
 
 
 class ChangedError(FormatError):
@@ -71,7 +72,7 @@ class Desk:
                 "bounds": bounds,
                 "places": place_table(plan.field.crs, bounds),
                 "picture": self._picture_facts(),
-                "scale": ground_scale(plan.field.polygon, plan.field.crs),
+                "scale": 1.0 / float(ground_scale_of(plan.field.polygon, plan.field.crs)),
                 "theme": web_theme(),
                 "formats": _formats(),
             }

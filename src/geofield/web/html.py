@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield import schema
+from geofield.crs import ground_scale_of
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
@@ -22,7 +23,6 @@ from geofield.staging import staged_file
 from geofield.theme import web_theme
 from geofield.web import inlined, page_file
 from geofield.web.view import (
-    ground_scale,
     margin_bounds,
     obstacles_view,
     outline_view,
@@ -141,7 +141,7 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
         "picture": picture,
         "bounds": bounds,
         "places": place_table(crs, bounds),
-        "scale": ground_scale(polygon, crs),
+        "scale": 1.0 / float(ground_scale_of(polygon, crs)),
         "theme": web_theme(),
     }
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from pyproj import CRS, Proj
+from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
@@ -122,13 +122,6 @@ def place_table(crs: CRS, bounds: tuple[float, float, float, float]) -> dict[str
     xx, yy = np.meshgrid(x, y)
     lon, lat = transformer(crs, LONLAT).transform(xx, yy)
     return {"x": x.tolist(), "y": y.tolist(), "lon": lon.tolist(), "lat": lat.tolist()}
-
-
-def ground_scale(polygon: shapely.Polygon, crs: CRS) -> float:
-    """True metres on the ground per metre of the metric CRS, at the field's middle."""
-    middle = polygon.representative_point()
-    lon, lat = transformer(crs, LONLAT).transform(middle.x, middle.y)
-    return 1.0 / float(Proj(crs).get_factors(lon, lat).meridional_scale)
 
 
 def margin_bounds(polygon: shapely.Polygon) -> tuple[float, float, float, float]:

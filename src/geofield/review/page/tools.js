@@ -46,7 +46,7 @@ const MAKERS = {
   circle() {
     const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "Circle", freehand: true});
     const command = geometry => ({do: "circle", x: at(geometry.getCenter())[0], y: at(geometry.getCenter())[1],
-                                  radius_m: Math.max(0.3, Math.round(geometry.getRadius() * 1000) / 1000)});
+                                  radius_m: Math.max(0.3, Math.round(geometry.getRadius() * desk.scale() * 1000) / 1000)});
     draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => live(command(target))));
     draw.on("drawend", async ({feature}) => {
       await commit(command(feature.getGeometry()));
@@ -135,7 +135,7 @@ function resizer() {
   const command = event => {
     const row = desk.row(desk.chosen()), [x, y] = row.centre;
     const reach = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
-    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((reach - row.buffer_m) * 1000) / 1000)};
+    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((reach * desk.scale() - row.buffer_m) * 1000) / 1000)};
   };
   translate.on("translating", event => {
     const row = desk.row(desk.chosen()), wanted = command(event);

@@ -1,0 +1,224 @@
+"""The review page as a person feels it: ready, after a drag, on large fields and pictures.
+
+Needs Chromium and its driver (Debian: chromium chromium-driver). Times are medians of wall time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import rasterio
+import shapely
+from affine import Affine
+from rasterio.windows import Window
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+
+import geofield as gf
+from common import machine, write_page
+from geofield import schema
+from geofield.model.obstacles import circle_polygons, from_polygons
+from geofield.plan import Plan
+from geofield.plan_files import save_plan
+from geofield.settings import Settings
+
+SAMPLE = Path(__file__).resolve().parents[1] / "sample_data" / "field_1.tif"
+TIMES = 15
+
+# From the end of an edit to the frame in which the browser has drawn the answer.
+EDIT = """
+const done = arguments[1], command = arguments[0];
+(async () => {
+  const api = await import("/api.js"), maps = await import("/map.js"), map = maps.map;
+  const start = performance.now();
+  const answer = await api.edit(command);
+  maps.showOutline(answer.field); maps.showObstacles(answer.obstacles); maps.showTracks(answer);
+  map.once("rendercomplete", () => done(performance.now() - start));
+  map.render();
+})();
+"""
+# How many answers of previews are drawn within a second of dragging.
+FRAMES = """
+const done = arguments[1], command = arguments[0];
+(async () => {
+  const api = await import("/api.js"), maps = await import("/map.js");
+  let drawn = 0; const end = performance.now() + 1000;
+  const tick = () => {
+    if (performance.now() > end) { api.endPreview(); return done(drawn); }
+    const show = answer => { maps.showTracks(answer); maps.map.renderSync(); drawn++; };
+    api.preview({...command, dx_m: Math.random()}, show, () => {});
+    requestAnimationFrame(tick);
+  };
+  tick();
+})();
+"""
+# Pans and zooms; the longest time in which tiles were missing on the screen.
+PAN = """
+const done = arguments[0];
+(async () => {
+  const {map, view} = await import("/map.js");
+  let worst = 0;
+  const [left, bottom, right, top] = view.getProjection().getExtent();
+  view.setResolution(0.6);
+  for (let i = 0; i < 12; i++) {
+    const start = performance.now();
+    const x = 0.1 + 0.065 * i, y = 0.85 - 0.06 * i;
+    view.setCenter([left + (right - left) * x, bottom + (top - bottom) * y]);
+    await new Promise(next => { map.once("rendercomplete", next); map.render(); });
+    worst = Math.max(worst, performance.now() - start);
+  }
+  done(worst);
+})();
+"""
+
+
+@contextlib.contextmanager
+def served(plan: Path, *options: str) -> Iterator[tuple[str, psutil.Process, float]]:
+    """Address, process and seconds until the page answers."""
+    start = time.perf_counter()
+    command = [sys.executable, "-m", "geofield", "review", str(plan), "--no-browser", *options]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    address = process.stdout.readline().strip()
+    with contextlib.suppress(urllib.error.HTTPError):  # the cookie is the browser's to keep
+        urllib.request.urlopen(address)
+    ready = time.perf_counter() - start
+    try:
+        yield address, psutil.Process(process.pid), ready
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(20)
+
+
+def opened(driver: webdriver.Chrome, address: str) -> float:
+    """Seconds until the page shows the plan."""
+    start = time.perf_counter()
+    driver.get(address)
+    while not driver.execute_script("return document.body && document.body.dataset.ready"):
+        time.sleep(0.02)
+    driver.execute_async_script(
+        "const done = arguments[0]; import('/map.js').then(({map}) => "
+        "{ map.once('rendercomplete', () => done()); map.render(); });"
+    )
+    return time.perf_counter() - start
+
+
+def left(driver: webdriver.Chrome) -> None:
+    """Leave the page though there are edits."""
+    driver.execute_cdp_cmd("Page.enable", {})
+    driver.get("about:blank")
+    with contextlib.suppress(Exception):
+        driver.switch_to.alert.accept()
+
+
+def large_plan(folder: Path) -> Path:
+    """100 ha with 400 obstacles, 3 m spacing."""
+    x, y = 500_000.0, 4_000_000.0
+    field = gf.Field(
+        shapely.Polygon([(x, y), (x + 1000, y + 50), (x + 1020, y + 1000), (x + 10, y + 990)]),
+        crs=32636,
+    )
+    rng = np.random.default_rng(7)
+    cx, cy = x + 50 + 900 * rng.random(400), y + 80 + 880 * rng.random(400)
+    radius = 2 + 6 * rng.random(400)
+    circles = circle_polygons(cx, cy, radius + 1, field.crs)
+    obstacles = from_polygons(circles, field.crs, buffer_m=0.0)
+    obstacles["radius_m"], obstacles["buffer_m"], obstacles["kind"] = radius, 1.0, "tree"
+    plan = Plan(
+        field,
+        schema.conform(schema.OBSTACLES, obstacles),
+        settings=Settings(tracks={"spacing_m": 3.0}),
+    )
+    save_plan(plan, folder / "large.gpkg")
+    return folder / "large.gpkg"
+
+
+def large_picture(folder: Path, plan: Path, side_px: int = 20_000) -> Path:
+    """A COG of 20 000 x 20 000 px of the sample repeated, around the sample's field."""
+    with rasterio.open(SAMPLE) as data:
+        block = data.read([1, 2, 3])
+        profile, transform = data.profile, data.transform
+    block = np.tile(block, (1, 2, 2))[:, :512, :512]
+    shift = Affine.translation(-side_px // 2, -side_px // 2)
+    profile = {
+        **{"driver": "GTiff", "dtype": "uint8", "count": 3, "crs": profile["crs"]},
+        **{"width": side_px, "height": side_px, "transform": transform @ shift},
+        **{"tiled": True, "blockxsize": 512, "blockysize": 512},
+        **{"compress": "JPEG", "photometric": "YCBCR", "jpeg_quality": 80},
+    }
+    path = folder / "large.tif"
+    with rasterio.open(path, "w", **profile) as out:
+        for row in range(0, side_px, 512):
+            for column in range(0, side_px, 512):
+                size = min(512, side_px - column), min(512, side_px - row)
+                part = block[:, : size[1], : size[0]]
+                out.write(part, window=Window(column, row, *size))
+    with rasterio.open(path, "r+") as out:
+        out.build_overviews([2, 4, 8, 16, 32], rasterio.enums.Resampling.average)
+    return path
+
+
+def main() -> None:
+    options = webdriver.ChromeOptions()
+    options.binary_location = "/usr/bin/chromium"
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1280,860"):
+        options.add_argument(flag)
+    driver = webdriver.Chrome(options=options, service=Service("/usr/bin/chromedriver"))
+    driver.set_script_timeout(120)
+    rows: list[tuple[str, str, str]] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        run = [sys.executable, "-m", "geofield", "run", str(SAMPLE), "--lat", "35.075373"]
+        more = ["--lon", "33.531142", "--spacing", "4", "--format", "gpkg", "--out", str(folder)]
+        subprocess.run([*run, *more], check=True, capture_output=True)
+        for what, plan, number, goals in (
+            ("3.6 ha, 21 obstacles", folder / "field.gpkg", 8, ("1 s", "150 ms", "10")),
+            ("100 ha, 400 obstacles", large_plan(folder), 200, ("-", "500 ms", "-")),
+        ):
+            with served(plan) as (address, _, ready):
+                opened(driver, address)
+                command: dict[str, Any] = {"do": "move", "no": number, "dx_m": 0.5, "dy_m": 0.0}
+                times = [
+                    driver.execute_async_script(EDIT, {**command, "dy_m": 0.01 * i})
+                    for i in range(TIMES)
+                ]
+                frames = driver.execute_async_script(FRAMES, command)
+                rows.append((f"{what}: command to answering page", f"{ready:.2f} s", goals[0]))
+                median = statistics.median(times)
+                rows.append((f"{what}: end of a drag to new tracks", f"{median:.0f} ms", goals[1]))
+                rows.append((f"{what}: tracks drawn a second in a drag", f"{frames}", goals[2]))
+                left(driver)
+        picture = large_picture(folder, folder / "field.gpkg")
+        with served(folder / "field.gpkg", "--picture", str(picture)) as (address, process, _):
+            shown = opened(driver, address)
+            worst = driver.execute_async_script(PAN)
+            memory = process.memory_info().rss / 1e6
+            rows.append(("20 000 x 20 000 px: page shown", f"{shown:.2f} s", "2 s"))
+            rows.append(("the same: longest wait for tiles", f"{worst:.0f} ms", "500 ms"))
+            rows.append(("the same: memory of the server", f"{memory:.0f} MB", "400 MB"))
+    driver.quit()
+    table = ["| what | measured | goal |", "| --- | --- | --- |"]
+    table += [f"| {a} | {b} | {c} |" for a, b, c in rows]
+    write_page(
+        "review",
+        "The review page",
+        [*table, "", f"Medians of {TIMES} edits; headless Chromium.", "", *machine()],
+    )
+    print(json.dumps(rows))
+
+
+if __name__ == "__main__":
+    main()
