@@ -93,7 +93,9 @@ def open_scene(path: str | Path, lat: float, lon: float, settings: Settings) -> 
     """Read the picture around a point (stage 1)."""
     from geofield.imagery import read_scene
 
-    return read_scene(path, lat=lat, lon=lon, **settings.imagery.model_dump())
+    return read_scene(
+        path, lat=lat, lon=lon, allow=settings.fetch.allow, **settings.imagery.model_dump()
+    )
 
 
 def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:

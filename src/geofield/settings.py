@@ -86,6 +86,11 @@ class FetchSettings(Section):
         description="Tiles kept per source at most, megabytes.",
     )
     cache_max_days: PositiveFloat = Field(90.0, description="Tiles are fetched anew after, days.")
+    allow: tuple[str, ...] = Field(
+        (),
+        description="Folder or address that a VRT, tile index, STAC file, capabilities document "
+        "or redirect may lead to; repeat for several.",
+    )
     keys: dict[str, SecretStr] = Field(
         {}, description="Keys by source name; GEOFIELD_KEY_NAME in the environment wins."
     )
@@ -280,7 +285,7 @@ def load_settings(
 def from_mapping(values: Mapping[str, Any]) -> Settings:
     """Settings as a product recorded them; names that are gone since are passed over."""
     known: dict[str, Any] = {}
-    for section in SECTIONS:
+    for section in SECTIONS[:-1]:  # what may be reached, a product does not say
         fields = Settings.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
         recorded = values.get(section, {})
         known[section] = {name: recorded[name] for name in recorded if name in fields}

@@ -452,13 +452,15 @@ def test_wmts(tmp_path: Path, mercator: bool, rest: bool) -> None:
 def test_capabilities_from_a_file_and_bad_ones(tmp_path: Path) -> None:
     file = tmp_path / "caps.xml"
     file.write_text(wmts_document("http://127.0.0.1:9", mercator=True, rest=True))
-    source = find_source(str(file))
+    with pytest.raises(ImageryError, match=r"leads to http://127\.0\.0\.1:9"):
+        find_source(str(file))
+    source = find_source(str(file), allow=["http://127.0.0.1:9"])
     assert not isinstance(source, PictureSource)
     assert source.pyramid.zooms == (5, 20)
     for text, message in [
         ("<html>wmts<body>", "does not give XML"),
         ("<ExceptionReport>wmts is down</ExceptionReport>", "answers: wmts is down"),
-        ('<!DOCTYPE a [<!ENTITY b "wmts">]><a>&b;</a>', "entities"),
+        ('<!DOCTYPE a [<!ENTITY b "wmts">]><a>&b;</a>', "entity"),
     ]:
         file.write_text(text)
         with pytest.raises(ImageryError, match=message):

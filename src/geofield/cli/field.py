@@ -56,6 +56,7 @@ Examples (on the project's own sample):
 @boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @settings_option
+@section_options("fetch", only=("allow",))
 @section_options("imagery")
 @section_options("field")
 def field(

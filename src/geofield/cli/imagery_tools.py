@@ -100,6 +100,7 @@ def fetch_options(settings: Settings, cache_dir: Path | None) -> FetchOptions:
         cache_max_bytes=int(settings.fetch.cache_max_mb * 1e6),
         cache_max_age_s=settings.fetch.cache_max_days * 86400.0,
         proxy=proxies.get("https") or proxies.get("http"),
+        allow=settings.fetch.allow,
         no_proxy=tuple(part.strip() for part in proxies.get("no", "").split(",")),
     )
 
@@ -115,6 +116,7 @@ def resolve(
 ) -> Source:
     """The source that the user names."""
     from geofield.imagery.client import Client
+    from geofield.imagery.reach import Reach
     from geofield.imagery.sources import find_source
 
     catalogue = catalogue_of(settings)
@@ -125,10 +127,17 @@ def resolve(
             secrets=keys.values(),
             proxy=options.proxy if options else None,
             no_proxy=options.no_proxy if options else (),
+            reach=Reach(settings.fetch.allow),
         )
     try:
         return find_source(
-            what, catalogue=catalogue, keys=keys, client=client, layer=layer, point=point
+            what,
+            catalogue=catalogue,
+            keys=keys,
+            client=client,
+            layer=layer,
+            point=point,
+            allow=settings.fetch.allow,
         )
     finally:
         if client is not None:
@@ -161,7 +170,13 @@ def as_picture(
             yield source.path
             return
         # What the settings say of its terms must travel with it: as a file that says so.
-        scene = read_scene(source.path, lat=lat, lon=lon, size_m=settings.imagery.size_m)
+        scene = read_scene(
+            source.path,
+            lat=lat,
+            lon=lon,
+            size_m=settings.imagery.size_m,
+            allow=settings.fetch.allow,
+        )
         with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
             yield str(write_scene(with_provenance(scene, source), Path(folder) / "scene.tif"))
         return
@@ -239,19 +254,13 @@ def where_json(done: Acquired) -> dict[str, object]:
 
 def area_of(path: Path) -> Where:
     """The ground that a vector file covers."""
-    import geopandas as gpd
     import shapely
-    from pyogrio.errors import DataSourceError
 
     from geofield.errors import ImageryError
+    from geofield.formats.foreign import read_vector
     from geofield.imagery import Where
 
-    try:
-        table = gpd.read_file(path)
-    except (DataSourceError, OSError) as error:
-        raise ImageryError(
-            f"The area {path} cannot be read: {error}.", hint="Give GeoJSON, GeoPackage or Shape."
-        ) from None
+    table = read_vector(path)
     if table.crs is None:
         raise ImageryError(f"The area {path} does not name its coordinate reference system.")
     shape = shapely.union_all(table.to_crs("EPSG:4326").geometry.to_numpy())

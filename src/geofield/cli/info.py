@@ -85,34 +85,28 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
 
 
 def _picture(file: Path) -> dict[str, Any]:
-    import rasterio
-    from rasterio.errors import RasterioIOError
-
-    from geofield.errors import ImageryError
     from geofield.grid import Grid
+    from geofield.imagery.gdal import gdal_env, open_picture, reading
 
-    try:
-        with rasterio.open(file) as picture:
-            facts: dict[str, Any] = {
-                "file": str(file),
-                "format": picture.driver,
-                "size": f"{picture.width} x {picture.height} px",
-                "bands": ", ".join(
-                    f"{role.name} {kind}"
-                    for role, kind in zip(picture.colorinterp, picture.dtypes, strict=True)
-                ),
-                "CRS": str(picture.crs) if picture.crs else "not recorded",
+    with gdal_env(str(file)), reading(str(file)), open_picture(str(file)) as picture:
+        facts: dict[str, Any] = {
+            "file": str(file),
+            "format": picture.driver,
+            "size": f"{picture.width} x {picture.height} px",
+            "bands": ", ".join(
+                f"{role.name} {kind}"
+                for role, kind in zip(picture.colorinterp, picture.dtypes, strict=True)
+            ),
+            "CRS": str(picture.crs) if picture.crs else "not recorded",
+        }
+        tags = {key: value for key, value in picture.tags().items() if key != "AREA_OR_POINT"}
+        if picture.crs:
+            grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())
+            lon, lat = grid.centre_lonlat
+            facts |= {
+                "metres per pixel on the ground": round(grid.ground_resolution_m, 4),
+                "centre": {"lat": round(lat, 6), "lon": round(lon, 6)},
             }
-            tags = {key: value for key, value in picture.tags().items() if key != "AREA_OR_POINT"}
-            if picture.crs:
-                grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())
-                lon, lat = grid.centre_lonlat
-                facts |= {
-                    "metres per pixel on the ground": round(grid.ground_resolution_m, 4),
-                    "centre": {"lat": round(lat, 6), "lon": round(lon, 6)},
-                }
-    except RasterioIOError as error:
-        raise ImageryError(f"{file} cannot be read: {error}.", hint="Is it whole?") from error
     if tags:
         facts["tags"] = tags
     return facts

@@ -32,6 +32,7 @@ Examples (on the project's own sample):
 @click.option("--overwrite", is_flag=True, help="Replace another file than the one that was read.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @settings_option
+@section_options("fetch", only=("allow",))
 @section_options("obstacles")
 def obstacles(
     imagery: str,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from geofield.errors import FieldError
+from geofield.errors import FieldError, FormatError
 
 if TYPE_CHECKING:
     from geofield.model import Field
@@ -33,16 +33,14 @@ def boundary_options(command: Command) -> Command:
 
 def own_parcel(path: Path, layer: str | None, name: str | None, lat: float, lon: float) -> Field:
     """The user's own parcel from any vector file."""
-    import geopandas as gpd
-    from pyogrio.errors import DataLayerError, DataSourceError
-
     from geofield.field import field_from_boundary
+    from geofield.formats.foreign import read_vector
 
     try:
-        table = gpd.read_file(path, layer=layer)
-    except (DataSourceError, DataLayerError) as error:
+        table = read_vector(path, layer)
+    except FormatError as error:
         raise FieldError(
-            f"The boundary file {path} cannot be read: {error}",
+            f"The boundary: {error.message}",
             hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
         ) from None
     return field_from_boundary(table, lat=lat, lon=lon, name=name)

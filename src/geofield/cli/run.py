@@ -48,6 +48,7 @@ Examples (on the project's own sample):
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
 @boundary_options
 @settings_option
+@section_options("fetch", only=("allow",))
 @section_options("imagery")
 @section_options("field")
 @section_options("obstacles")

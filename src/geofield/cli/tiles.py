@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar
-from geofield.cli.options import Degrees, settings_option
+from geofield.cli.options import Degrees, section_options, section_values, settings_option
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
@@ -102,6 +102,7 @@ Examples (the first one on the project's own sample):
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was made as JSON on stdout.")
 @settings_option
+@section_options("fetch", only=("allow",))
 def tiles(
     source: str,
     lat: float | None,
@@ -139,8 +140,9 @@ def tiles(
     from geofield.imagery import acquire
     from geofield.settings import load_settings
 
+    allow = section_values({"fetch__allow": place.pop("fetch__allow")})
     where = _where(lat, lon, area, place)
-    settings = load_settings(settings_file)
+    settings = load_settings(settings_file, allow)
     folder = None if no_cache else cache_dir_of(settings, cache_dir)
     options = replace(
         fetch_options(settings, folder),

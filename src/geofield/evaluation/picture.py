@@ -13,6 +13,7 @@ from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.matching import Evaluation, reliability
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
+from geofield.strangers import check_vector
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -46,6 +47,7 @@ def read_obstacles(
 
     from geofield.crs import is_metric
 
+    check_vector(path)
     try:
         layers = [str(name) for name in pyogrio.list_layers(path)[:, 0]]
         if layer is not None and layer not in layers:

@@ -19,6 +19,7 @@ from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
+from geofield.strangers import check_vector
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -39,6 +40,7 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
     from shapely.errors import GEOSException
 
+    _look_at(path)
     try:
         with warnings.catch_warnings():
             # GDAL tells of each ring that is not closed; they are counted below.
@@ -57,6 +59,14 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
     return frame
+
+
+def _look_at(path: Path) -> None:
+    """Refuse files that lead elsewhere; schemas that GML names are not fetched."""
+    import pyogrio
+
+    check_vector(path)
+    pyogrio.set_gdal_config_options({"GML_DOWNLOAD_SCHEMA": "NO"})
 
 
 def _mended(path: Path, layer: str | None) -> Any:
@@ -90,6 +100,7 @@ def layer_names(path: Path) -> list[str]:
     import pyogrio
     from pyogrio.errors import DataSourceError
 
+    _look_at(path)
     try:
         return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
     except DataSourceError as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from geofield.errors import FormatError
+from geofield.strangers import parse_xml
 
 # Control characters that XML 1.0 has no way to write.
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
@@ -43,11 +44,11 @@ def read_xml(path: Path) -> ET.Element:
     Raises
     ------
     FormatError
-        When it is not well-formed.
+        When it is not well-formed, or hostile.
     """
     try:
-        return ET.parse(path).getroot()  # noqa: S314  expat limits entity expansion
-    except (ET.ParseError, UnicodeDecodeError, LookupError) as error:
+        return parse_xml(path.read_bytes(), path.name)
+    except ET.ParseError as error:
         raise FormatError(
             f"{path} is not well-formed XML: {error}.", hint="Is the file whole?"
         ) from error

@@ -18,6 +18,7 @@ from geofield.imagery.cache import TileCache, cache_file
 from geofield.imagery.client import Client
 from geofield.imagery.fetch import FetchReport, Missing, Progress, TileFetcher, absence_error
 from geofield.imagery.mosaic import Staging, stage_to_cog
+from geofield.imagery.reach import Reach
 from geofield.imagery.scene import read_scene
 from geofield.imagery.sources.base import FrameSource, LocalTiles, PictureSource, Source, TileSource
 from geofield.imagery.tags import source_tags
@@ -118,6 +119,8 @@ class FetchOptions:
         The user answers for terms that forbid deriving geodata.
     proxy : str or None
     no_proxy : tuple of str
+    allow : tuple of str
+        Folders and hosts that files and servers may lead to besides their own.
     """
 
     cache_dir: Path | None = None
@@ -132,6 +135,7 @@ class FetchOptions:
     acknowledged: bool = False
     proxy: str | None = None
     no_proxy: tuple[str, ...] = ()
+    allow: tuple[str, ...] = ()
 
 
 def acquire(
@@ -168,7 +172,7 @@ def acquire(
     options = options or FetchOptions()
     check_terms(source.name, source.terms, acknowledged=options.acknowledged)
     if isinstance(source, PictureSource):
-        return _picture(source, place, path, overwrite=overwrite)
+        return _picture(source, place, path, options.allow, overwrite=overwrite)
     source, block = plan(source, place)
     with ExitStack() as stack:
         temporary = stack.enter_context(replacing(path, overwrite=overwrite))
@@ -277,6 +281,7 @@ def _fetcher(
             secrets=source.secrets,
             proxy=options.proxy,
             no_proxy=options.no_proxy,
+            reach=Reach(options.allow),
         )
         stack.callback(client.close)
     return TileFetcher(source, client=client, cache=cache, threads=options.threads)
@@ -314,7 +319,14 @@ def _today() -> date:
     return datetime.now(UTC).date()
 
 
-def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite: bool) -> Acquired:
+def _picture(
+    source: PictureSource,
+    place: Where,
+    path: str | Path,
+    allow: tuple[str, ...],
+    *,
+    overwrite: bool,
+) -> Acquired:
     """A window of the user's own picture."""
     if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
         raise ImageryError(f"{path} is the picture itself.", hint="Give the output another name.")
@@ -329,6 +341,7 @@ def _picture(source: PictureSource, place: Where, path: str | Path, *, overwrite
         size_m=size_m,
         size_px=place.size_px,
         bands=source.bands,
+        allow=allow,
     )
     scene = with_provenance(scene, source)
     write_scene(scene, path, overwrite=overwrite)

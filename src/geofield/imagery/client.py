@@ -15,13 +15,14 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
-from urllib.parse import urlsplit
+from urllib.parse import urljoin, urlsplit
 
 import urllib3
 from urllib3.exceptions import HTTPError, LocationParseError, NewConnectionError
 
-from geofield.errors import NetworkError
+from geofield.errors import ImageryError, NetworkError
 from geofield.imagery.gdal import USER_AGENT
+from geofield.imagery.reach import Reach
 
 T = TypeVar("T")
 
@@ -29,6 +30,7 @@ T = TypeVar("T")
 _AGAIN = frozenset({408, 425, 429, 500, 502, 503, 504, 520, 521, 522, 523, 524})
 #: There is nothing at this address.
 _NOTHING = frozenset({204, 404, 410})
+_MAX_REDIRECTS = 5
 _MAX_BODY = 128 * 2**20
 #: A server that asks for a longer pause has said no.
 _MAX_PAUSE_S = 120.0
@@ -95,6 +97,8 @@ class Client:
         Address of an HTTP proxy; never used for this machine itself.
     no_proxy : tuple of str
         Endings of host names that are asked without the proxy.
+    reach : Reach, optional
+        Hosts that servers may send on to; without it, none but themselves.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class Client:
         backoff_s: float = 0.25,
         proxy: str | None = None,
         no_proxy: tuple[str, ...] = (),
+        reach: Reach | None = None,
     ) -> None:
         self.attempts = attempts
         self.redact = Redactor(secrets)
@@ -137,7 +142,7 @@ class Client:
         self._log_filter = _KeylessLog(self.redact)
         for name in _LOGGERS:
             logging.getLogger(name).addFilter(self._log_filter)
-        self._retries = urllib3.Retry(0, redirect=5, raise_on_redirect=False)
+        self._reach = reach or Reach()
 
     def stop(self) -> None:
         """Make every pause and every further request end at once."""
@@ -246,9 +251,18 @@ class Client:
         near = any(host == each or host.endswith("." + each) for each in self._no_proxy)
         pool = self._direct if near else self._proxied
         merged = {**pool.headers, **headers} if headers else None
-        response = pool.request(
-            "GET", url, headers=merged, preload_content=False, retries=self._retries
-        )
+        for _ in range(_MAX_REDIRECTS):
+            response = pool.request(
+                "GET", url, headers=merged, preload_content=False, retries=False, redirect=False
+            )
+            onward = response.get_redirect_location()
+            if not onward:
+                break
+            response.drain_conn()
+            response.release_conn()
+            url = self._redirected(url, onward)
+        else:
+            raise GaveUpError("sent on and on")
         deadline = time.monotonic() + 3 * self._timeout_s
         parts, size = [], 0
         try:
@@ -270,6 +284,20 @@ class Client:
             raise OSError(f"the body ended after {size} of {expected} bytes")
         asked = _retry_after(response.headers.get("Retry-After"))
         return response.status, response.headers.get("Content-Type", ""), asked, b"".join(parts)
+
+    def _redirected(self, url: str, onward: str) -> str:
+        """Where a server sends on to, when that is itself or allowed."""
+        target = urljoin(url, onward)
+        parts, asked = urlsplit(target), urlsplit(url)
+        if parts.scheme not in ("http", "https"):
+            raise ImageryError(
+                f"{asked.hostname} sends on to {self.redact(parts.scheme)}:, which is no address "
+                "of the web: refused."
+            )
+        if asked.scheme == "https" and parts.scheme == "http":
+            raise ImageryError(f"{asked.hostname} sends on from https to http: refused.")
+        self._reach.of(url).require(target, f"The server {asked.hostname}")
+        return target
 
     def _wait_turn(self, host: str) -> None:
         with self._lock:

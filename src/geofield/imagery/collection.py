@@ -20,6 +20,7 @@ from geofield.errors import GeofieldError, ImageryError, PointOutsideError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name
 from geofield.imagery.placing import REACH_M, WarpOrigin
+from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import ImagerySource
 
@@ -100,6 +101,7 @@ def open_collection(
     crs: Any = None,
     scaling: tuple[float, float] | None = None,
     source: ImagerySource | None = None,
+    reach: Reach | None = None,
     name: str = "",
 ) -> SceneReader:
     """A reader over several pictures.
@@ -124,7 +126,9 @@ def open_collection(
     notes: list[str] = []
     for path in paths:
         try:
-            readers.append(SceneReader.open(path, bands=bands, crs=crs, scaling=scaling))
+            readers.append(
+                SceneReader.open(path, bands=bands, crs=crs, scaling=scaling, reach=reach)
+            )
         except GeofieldError as error:
             notes.append(f"{display_name(path)} was left out: {error.message}")
     if not readers:

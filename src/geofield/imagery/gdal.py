@@ -12,10 +12,13 @@ from typing import Any
 import rasterio
 from pyproj import CRS
 from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
+from rasterio.io import DatasetReader
 
 from geofield import __version__
 from geofield.crs import parse_crs
 from geofield.errors import CRSError, ImageryError
+from geofield.imagery.reach import OWN_FOLDER, Reach
+from geofield.imagery.vrt import check_beside, check_vrt
 
 #: Sent with every request: servers answer 403 without one.
 USER_AGENT = f"geofield/{__version__} (farm field mapping; python-urllib3)"
@@ -30,6 +33,12 @@ _OPTIONS: dict[str, Any] = {
     "GDAL_HTTP_MERGE_CONSECUTIVE_RANGES": "YES",
     "GDAL_INGESTED_BYTES_AT_OPEN": "32768",
 }
+
+#: Their files hold the pixels themselves, and name no other file or host.
+_DRIVERS = [
+    *("GTiff", "JPEG", "PNG", "JP2OpenJPEG", "WEBP", "HFA", "GPKG", "MBTiles", "BMP", "GIF"),
+    *("ENVI", "EHdr", "AAIGrid"),
+]
 
 _REMOTE = re.compile(r"^(https?://|/vsicurl/|/vsis3/|s3://|gs://)", re.IGNORECASE)
 
@@ -88,8 +97,18 @@ def to_rasterio(crs: CRS) -> Any:
         raise CRSError(f"GDAL does not know the coordinate reference system {crs.name}.") from error
 
 
-def open_picture(path: str) -> Any:
+def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
     """Open a picture with rasterio, or say why it cannot be opened.
+
+    Only drivers are used whose files hold the pixels themselves, and VRTs that were looked
+    at: nothing is opened beyond what the user named and its folder.
+
+    Parameters
+    ----------
+    path : str
+        File, address, or a VRT as text.
+    reach : Reach
+        What the user allowed besides.
 
     Raises
     ------
@@ -106,7 +125,11 @@ def open_picture(path: str) -> Any:
         if file.is_file() and file.stat().st_size == 0:
             raise ImageryError(f"The picture {path} is empty (0 bytes).", hint="Copy it again.")
     try:
-        return rasterio.open(path)
+        dataset = DatasetReader(path, driver=_drivers_for(path, reach))
+        if "OVERVIEW_FILE" in dataset.tags(ns="OVERVIEWS"):
+            dataset.close()
+            raise ImageryError(f"The picture {name} names overviews in another file.")
+        return dataset
     except RasterioIOError as error:
         raise ImageryError(
             f"The picture {name} cannot be opened: {reason(error, path)}.",
@@ -117,6 +140,25 @@ def open_picture(path: str) -> Any:
                 "`gdalinfo` tells more."
             ),
         ) from None
+
+
+def _drivers_for(path: str, reach: Reach) -> list[str]:
+    """The drivers that may open a picture, after a look at it."""
+    if path.startswith("<"):
+        check_vrt(path.encode(), "stacked bands", Path(), reach)
+        return ["VRT"]
+    file = Path(path)
+    if is_remote(path) or not file.is_file():
+        return _DRIVERS
+    with file.open("rb") as stream:
+        head = stream.read(4096)
+    if b"<VRTDataset" in head:
+        body = file.read_bytes()[: 1 << 26]
+        # GDAL begins at the file that a link leads to.
+        check_vrt(body, file.name, file.resolve().parent, reach.of(path))
+        return ["VRT"]
+    check_beside(file)
+    return _DRIVERS
 
 
 @contextmanager

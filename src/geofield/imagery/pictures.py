@@ -9,9 +9,11 @@ from typing import Any
 from geofield.errors import ImageryError
 from geofield.imagery.collection import open_collection
 from geofield.imagery.gdal import display_name, is_remote
+from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.stac import is_stac, open_stac
 from geofield.model.scene import ImagerySource
+from geofield.strangers import check_vector
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
@@ -26,8 +28,12 @@ def open_reader(
     crs: Any = None,
     scaling: tuple[float, float] | None = None,
     source: ImagerySource | None = None,
+    allow: Sequence[str] = (),
 ) -> SceneReader:
     """A reader of any picture or set of pictures; parameters as `SceneReader.open`.
+
+    `allow` are files, folders and addresses that VRTs, indexes and STAC files may lead to
+    besides their own folder.
 
     Raises
     ------
@@ -40,6 +46,7 @@ def open_reader(
         "crs": crs,
         "scaling": scaling,
         "source": source,
+        "reach": Reach(tuple(allow)),
     }
     if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):
         return SceneReader.open(path, **options)
@@ -50,6 +57,9 @@ def open_reader(
         return open_stac(file, **options)
     if file.suffix.lower() in _INDEXES and file.is_file():
         located = pictures_of_index(file)
+        reach = Reach(tuple(allow)).of(path)
+        for each in located:
+            reach.require(each, file.name)
         if located:
             return open_collection(located, name=file.name, **options)
     return SceneReader.open(path, **options)
@@ -81,6 +91,7 @@ def pictures_of_index(index: Path) -> list[str]:
     import fiona
     from fiona.errors import FionaError
 
+    check_vector(index)
     try:
         with fiona.open(index) as table:
             names = {name.lower(): name for name in table.schema["properties"]}

@@ -33,6 +33,7 @@ from geofield.imagery.gdal import (
     to_rasterio,
 )
 from geofield.imagery.placing import WarpOrigin, find_place
+from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scale_limits, to_uint8
 from geofield.imagery.tags import (
     notes_from_tags,
@@ -80,6 +81,8 @@ class SceneReader:
     scaled_before: tuple[float, float] | None = None
     # Set where the file is read through a warp: its own CRS, control points or transform.
     warped_from: WarpOrigin | None = None
+    # What a VRT may lead to.
+    reach: Reach = OWN_FOLDER
 
     @classmethod
     def open(
@@ -92,6 +95,7 @@ class SceneReader:
         crs: Any = None,
         scaling: tuple[float, float] | None = None,
         source: ImagerySource | None = None,
+        reach: Reach | None = None,
     ) -> SceneReader:
         """Look at a picture without reading its pixels.
 
@@ -109,6 +113,8 @@ class SceneReader:
             File values that become 0 and 255.
         source : ImagerySource, optional
             Provenance that is known better than the file knows it.
+        reach : Reach, optional
+            What a VRT may lead to besides its own folder.
 
         Raises
         ------
@@ -118,7 +124,8 @@ class SceneReader:
             Without CRS or without position.
         """
         path = str(path)
-        with gdal_env(path), open_picture(path) as dataset:
+        reach = reach or OWN_FOLDER
+        with gdal_env(path), open_picture(path, reach) as dataset:
             if dataset.count == 0:
                 raise ImageryError(
                     f"The file {display_name(path)} holds no picture itself"
@@ -150,6 +157,7 @@ class SceneReader:
                 notes=(*notes_from_tags(dataset.tags()), *roles.notes),
                 nodata=dataset.nodata,
                 palette=palette,
+                reach=reach,
                 has_mask=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
             )
             if reader.dtype == "uint8":
@@ -302,7 +310,7 @@ class SceneReader:
         indexes = [i + 1 for i in self.roles.shown]
         with (
             gdal_env(self.path),
-            open_picture(self.path) as dataset,
+            open_picture(self.path, self.reach) as dataset,
             reading(self.path),
             self._through_warp(dataset) as raster,
         ):

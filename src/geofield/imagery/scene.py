@@ -27,6 +27,7 @@ def read_scene(
     crs: Any = None,
     scaling: tuple[float, float] | None = None,
     source: ImagerySource | None = None,
+    allow: Sequence[str] = (),
 ) -> Scene:
     """Read the picture around a point.
 
@@ -54,6 +55,9 @@ def read_scene(
         File values that become 0 and 255.
     source : ImagerySource, optional
         Provenance that is known better than the file knows it.
+    allow : sequence of str, optional
+        Folders and hosts that a VRT, a tile index or a STAC file may lead to besides its own
+        folder.
 
     Raises
     ------
@@ -77,7 +81,14 @@ def read_scene(
     if size_m is not None and size_px is not None:
         raise ImageryError("The size is given twice.", hint="Give size_m or size_px, not both.")
     reader = open_reader(
-        str(path), lat=lat, lon=lon, bands=bands, crs=crs, scaling=scaling, source=source
+        str(path),
+        lat=lat,
+        lon=lon,
+        bands=bands,
+        crs=crs,
+        scaling=scaling,
+        source=source,
+        allow=allow,
     )
     if lat is None or lon is None:
         if max(reader.grid.shape) > MAX_SIDE_PX and resolution_m is None:

@@ -18,6 +18,7 @@ from geofield.errors import ImageryError, PointOutsideError
 from geofield.imagery.bands import find_roles
 from geofield.imagery.collection import open_collection
 from geofield.imagery.gdal import gdal_env, is_remote, open_picture
+from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import ImagerySource
 
@@ -55,6 +56,7 @@ def open_stac(
     crs: Any = None,
     scaling: tuple[float, float] | None = None,
     source: ImagerySource | None = None,
+    reach: Reach | None = None,
 ) -> SceneReader:
     """A reader over the items of a file that hold the point, the newest first.
 
@@ -65,6 +67,7 @@ def open_stac(
     ImageryError
         No item has a picture.
     """
+    reach = (reach or Reach()).of(path)
     document = _document(path)
     features = document.get("features", [document])
     if lat is not None and lon is not None:
@@ -80,7 +83,7 @@ def open_stac(
             )
         features = here
     features = sorted(features, key=lambda f: _date(f) or "", reverse=True)
-    items = [item for item in (_item(f, path) for f in features) if item is not None]
+    items = [item for item in (_item(f, path, reach) for f in features) if item is not None]
     if not items:
         raise ImageryError(
             f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
@@ -100,6 +103,7 @@ def open_stac(
         bands=bands or first.bands,
         crs=crs,
         scaling=scaling,
+        reach=reach,
         source=known,
         name=path.name,
     )
@@ -128,7 +132,7 @@ def _date(feature: Mapping[str, Any]) -> str | None:
     return str(value) if value else None
 
 
-def _item(feature: Mapping[str, Any], path: Path) -> Item | None:
+def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
     rasters = {
         name: asset
         for name, asset in feature.get("assets", {}).items()
@@ -144,12 +148,14 @@ def _item(feature: Mapping[str, Any], path: Path) -> Item | None:
         return None
     chosen, roles = _chosen(rasters)
     places = [_place(asset, feature, path) for asset in chosen]
+    for place in places:
+        reach.require(place, path.name)
     properties = feature.get("properties", {})
     providers = [p.get("name", "") for p in properties.get("providers", [])]
     licence = str(properties.get("license", ""))
     return Item(
         str(feature.get("id", path.stem)),
-        places[0] if len(places) == 1 else stacked(places, roles or ()),
+        places[0] if len(places) == 1 else stacked(places, roles or (), reach),
         roles,
         _date(feature),
         "" if licence in ("proprietary", "various", "other") else licence,
@@ -202,9 +208,9 @@ def _place(asset: Mapping[str, Any], feature: Mapping[str, Any], path: Path) -> 
     return urljoin(own, href) if is_remote(own) and not near.exists() else str(near)
 
 
-def stacked(paths: Sequence[str], roles: Sequence[str]) -> str:
+def stacked(paths: Sequence[str], roles: Sequence[str], reach: Reach) -> str:
     """One-band pictures of the same ground as the bands of one: a VRT as text."""
-    with gdal_env(paths[0]), open_picture(paths[0]) as first:
+    with gdal_env(paths[0]), open_picture(paths[0], reach) as first:
         width, height, dtype = first.width, first.height, first.dtypes[0]
         crs, transform, nodata = first.crs, first.transform, first.nodata
     gdal_type = rasterio.dtypes._gdal_typename(dtype)
@@ -213,7 +219,7 @@ def stacked(paths: Sequence[str], roles: Sequence[str]) -> str:
         lines.append(f"<SRS>{escape(crs.to_wkt())}</SRS>")
     lines.append(f"<GeoTransform>{', '.join(map(repr, transform.to_gdal()))}</GeoTransform>")
     for n, (path, role) in enumerate(zip(paths, roles, strict=True), 1):
-        with gdal_env(path), open_picture(path) as each:
+        with gdal_env(path), open_picture(path, reach) as each:
             size = each.width, each.height
         source = f"/vsicurl/{path}" if path.startswith("http") else str(Path(path).resolve())
         lines.append(

@@ -187,7 +187,8 @@ def _colour_bands(path: Path) -> tuple[int, ...]:
     import rasterio
     from rasterio.enums import ColorInterp
 
-    with rasterio.open(path) as picture:
+    # Only what holds its pixels itself: the file may be a stranger's.
+    with rasterio.open(path, driver="GTiff") as picture:
         roles = list(picture.colorinterp)
         wanted = (ColorInterp.red, ColorInterp.green, ColorInterp.blue)
         if all(role in roles for role in wanted):

@@ -10,8 +10,9 @@ from xml.etree import ElementTree as ET
 from pyproj import CRS
 from pyproj.exceptions import CRSError as ProjCRSError
 
-from geofield.errors import ImageryError
+from geofield.errors import FormatError, ImageryError
 from geofield.imagery.client import Client
+from geofield.strangers import parse_xml
 
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 
@@ -36,10 +37,10 @@ def read_document(address: str, client: Client | None) -> ET.Element:
             body = Path(address).read_bytes()
         except OSError as error:
             raise ImageryError(f"{address} cannot be read: {error.strerror}.") from None
-    if b"<!ENTITY" in body[:4096]:  # entities can be made to fill all memory
-        raise ImageryError("The capabilities document defines XML entities: refused.")
     try:
-        root = ET.fromstring(body)  # noqa: S314
+        root = parse_xml(body, "The capabilities document")
+    except FormatError as error:
+        raise ImageryError(error.message, hint=error.hint) from None
     except ET.ParseError as error:
         raise ImageryError(
             f"{plain_address(address)} does not give XML: {error}.",

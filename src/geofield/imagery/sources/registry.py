@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
 from geofield.errors import ImageryError
 from geofield.imagery.client import Client
 from geofield.imagery.gdal import display_name
+from geofield.imagery.reach import Reach
 from geofield.imagery.sources.base import PictureSource, Source
 from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
 from geofield.imagery.sources.google import GoogleStaticSource
@@ -50,6 +51,7 @@ def find_source(
     client: Client | None = None,
     layer: str = "",
     point: tuple[float, float] | None = None,
+    allow: Sequence[str] = (),
 ) -> Source:
     """The source that a name, address or path means.
 
@@ -67,6 +69,8 @@ def find_source(
         Of a WMS or WMTS.
     point : (lon, lat), optional
         Where the picture will be; a WMS without Web Mercator is asked in its UTM zone.
+    allow : sequence of str
+        Hosts that a capabilities document may lead to besides its own.
 
     Raises
     ------
@@ -77,14 +81,20 @@ def find_source(
     if what in catalogue:
         entry = catalogue[what]
         return open_entry(
-            what, entry, key=(keys or {}).get(what, ""), client=client, layer=layer, point=point
+            what,
+            entry,
+            key=(keys or {}).get(what, ""),
+            client=client,
+            layer=layer,
+            point=point,
+            allow=allow,
         )
     kind, address = kind_of(what)
     if not kind:
         raise _unknown(what, catalogue)
     entry = SourceEntry(kind=kind, address=address, terms=terms_of_host(address))
     name = urlsplit(address).hostname or display_name(address)
-    return open_entry(name, entry, key="", client=client, layer=layer, point=point)
+    return open_entry(name, entry, key="", client=client, layer=layer, point=point, allow=allow)
 
 
 def open_entry(
@@ -95,6 +105,7 @@ def open_entry(
     client: Client | None,
     layer: str = "",
     point: tuple[float, float] | None = None,
+    allow: Sequence[str] = (),
 ) -> Source:
     """The source of a catalogue entry."""
     kind = entry.kind.removesuffix("-file")
@@ -127,6 +138,7 @@ def open_entry(
             terms=given,
             key=key,
             key_parameter=entry.key_parameter,
+            reach=Reach(tuple(allow)),
         )
     if kind == "wms":
         return open_wms(
@@ -137,6 +149,7 @@ def open_entry(
             terms=given,
             key=key,
             key_parameter=entry.key_parameter,
+            reach=Reach(tuple(allow)),
             point=point,
         )
     return PictureSource(name, entry.terms, entry.address, entry.bands, entry.date)

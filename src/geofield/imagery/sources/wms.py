@@ -10,6 +10,7 @@ from pyproj import CRS
 from geofield.crs import WEB_MERCATOR, is_metric, metric_crs
 from geofield.errors import ImageryError
 from geofield.imagery.client import Client
+from geofield.imagery.reach import Reach
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     children,
@@ -101,6 +102,7 @@ def open_wms(
     key_parameter: str = "",
     point: tuple[float, float] | None = None,
     service: str = "",
+    reach: Reach | None = None,
 ) -> WMSSource:
     """A WMS source from the address or path of its capabilities.
 
@@ -115,6 +117,9 @@ def open_wms(
         Where the picture will be, for the choice of the CRS.
     service : str
         Where maps are asked for, when the document's own address is wrong.
+
+    reach : Reach, optional
+        Hosts that the document may lead to besides its own.
 
     Raises
     ------
@@ -142,6 +147,8 @@ def open_wms(
     )
     form = next((f for f in _FORMATS if f in offered), "image/png")
     target = target or address
+    if not service:
+        (reach or Reach()).of(address).require(target, plain_address(address))
     own = with_query(target, SERVICE="WMS") if target else address
     return WMSSource(
         name=name or chosen,

@@ -12,6 +12,7 @@ from pyproj import CRS
 from geofield.crs import WEB_MERCATOR, is_metric
 from geofield.errors import ImageryError
 from geofield.imagery.client import Client
+from geofield.imagery.reach import Reach
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     children,
@@ -82,6 +83,7 @@ def open_wmts(
     terms: Terms | None = None,
     key: str = "",
     key_parameter: str = "",
+    reach: Reach | None = None,
 ) -> WMTSSource:
     """A WMTS source from the address or path of its capabilities.
 
@@ -96,6 +98,8 @@ def open_wmts(
         Better known than the document's own words.
     key, key_parameter : str
         Added to each request as ``key_parameter=key``.
+    reach : Reach, optional
+        Hosts that the document may lead to besides its own.
 
     Raises
     ------
@@ -116,11 +120,13 @@ def open_wmts(
     sets = {text(each, "Identifier"): each for each in children(root, "Contents", "TileMatrixSet")}
     links = [text(each, "TileMatrixSet") for each in children(element, "TileMatrixSetLink")]
     set_id, pyramid = _best_set([(i, sets[i]) for i in links if i in sets], address)
+    template = _template(root, element, set_id, address)
+    (reach or Reach()).of(address).require(template, plain_address(address))
     return WMTSSource(
         name=name or chosen,
         layer=chosen,
         pyramid=pyramid,
-        template=_template(root, element, set_id, address),
+        template=template,
         terms=terms or _terms(root),
         key=key,
         key_parameter=key_parameter,

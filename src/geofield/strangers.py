@@ -1,0 +1,152 @@
+"""Files of strangers: what is looked at before a library opens them.
+
+GDAL knows formats that are no data but directions: an OGR VRT, a WFS or a pipeline in a few
+lines of XML or JSON, recognised by their content whatever the file is called, and pointing at
+any file or host. XML may define entities that fill the memory or name other files. Both are
+refused here, for every reader.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+from xml.etree import ElementTree as ET
+from xml.parsers import expat
+
+from geofield.errors import FormatError
+
+#: GDAL looks for these in the beginning of a file.
+_DIRECTIONS = {
+    b"<OGRVRTDataSource": "an OGR VRT",
+    b"<OGRWFSDataSource": "a WFS connection",
+    b"<OGRCSWDataSource": "a CSW connection",
+    b"gdal_streamed_alg": "a GDAL pipeline",
+    b"<GDAL_WMS": "a WMS connection",
+    b"<GDAL_WMTS": "a WMTS connection",
+    b"<VRTDataset": "a VRT",
+    b"<WCS_GDAL": "a WCS connection",
+}
+_HEAD_BYTES = 1 << 18
+_HINT = "Nothing was read. Ask its maker for a file without it."
+#: Elements inside elements; an honest file needs about 20.
+MAX_DEPTH = 200
+
+
+class _RootSeenError(Exception):
+    """The prolog is over: no entity can be defined behind it."""
+
+
+def check_vector(path: Path | str) -> None:
+    """Refuse a vector file that only points elsewhere, or whose XML defines entities.
+
+    Raises
+    ------
+    FormatError
+        Naming file and reason.
+    """
+    file = Path(path)
+    if not file.is_file():
+        return
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as error:
+        raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
+    for mark, what in _DIRECTIONS.items():
+        if mark in head:
+            raise FormatError(
+                f"{file} holds no data itself: it is {what}, which leads to other files or hosts.",
+                hint="Give the data itself, for instance saved from QGIS as a GeoPackage.",
+            )
+    if b"<" in head[:200] and file.suffix.lower() in (".xml", ".gml", ".kml", ".gpx", ".osm"):
+        check_prolog(head, file.name)
+
+
+def check_prolog(head: bytes, name: str) -> None:
+    """Refuse XML that defines entities or names an external document type.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of the document, as far as its root element at least.
+    name : str
+        Of the file, for messages.
+
+    Raises
+    ------
+    FormatError
+    """
+
+    def refuse(reason: str) -> NoReturn:
+        raise FormatError(f"{name}: {reason}.", hint=_HINT)
+
+    def entity(entity_name: str, *_: object) -> None:
+        refuse(f"it defines the XML entity {entity_name!r:.40}")
+
+    def doctype(_: str, system: str | None, public: str | None, internal: bool) -> None:
+        if system or public:
+            refuse(f"it names an external document type ({(system or public)!r:.80})")
+
+    def root(*_: object) -> NoReturn:
+        raise _RootSeenError
+
+    parser = expat.ParserCreate()
+    parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
+    parser.EntityDeclHandler = entity
+    parser.StartDoctypeDeclHandler = doctype
+    parser.StartElementHandler = root
+    try:
+        parser.Parse(head, False)
+    except _RootSeenError:
+        return
+    except expat.ExpatError:
+        return  # not well-formed: its reader says where
+    except (LookupError, ValueError):
+        return  # an encoding that Python does not know: the reader says so
+
+
+def parse_xml(body: bytes, name: str) -> ET.Element:
+    """The root of a document that defines no entities and is nested like an honest one.
+
+    Parameters
+    ----------
+    body : bytes
+    name : str
+        Of the file, for messages.
+
+    Raises
+    ------
+    FormatError
+        Hostile.
+    xml.etree.ElementTree.ParseError
+        Not well-formed; also for an encoding that is not known.
+    """
+    check_prolog(body, name)
+    parser = ET.XMLParser(target=_Nested(name))  # noqa: S314  no entities are left
+    try:
+        parser.feed(body)
+        root: ET.Element = parser.close()
+    except (LookupError, ValueError) as error:
+        raise ET.ParseError(str(error)) from None
+    return root
+
+
+class _Nested(ET.TreeBuilder):
+    """Builds the tree of a document, but no deeper than an honest one is."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+        self._depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ET.Element:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise FormatError(
+                f"{self._name}: its elements are nested deeper than {MAX_DEPTH}.", hint=_HINT
+            )
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ET.Element:
+        self._depth -= 1
+        return super().end(tag)
