@@ -39,7 +39,7 @@ Examples:
     type=click.Choice(["generic", "tracklead", "aggps"]),
     help="Names and columns of Shapefiles.",
 )
-@click.option("--zip", "zipped", is_flag=True, help="Shapefiles in one archive.")
+@click.option("--zip", "zipped", is_flag=True, help="Shapefiles or ISOXML in one archive.")
 @click.option("--points/--no-points", default=None, help="Track points in the GeoPackage.")
 @click.option(
     "--option", "further", multiple=True, metavar="NAME=VALUE", help="Further option of a format."
@@ -62,18 +62,24 @@ def export(
     PLAN is a GeoPackage of geofield, or any file it can import. All products come into
     place together or not at all; what a format cannot carry is said once.
     """
-    from geofield.formats import read_dataset, write_dataset
+    from geofield.formats import format_named, read_dataset, write_dataset
+    from geofield.formats.export import unknown_option
 
     given["zip"] = given.pop("zipped") or None
     options = {key: value for key, value in given.items() if value is not None}
     options |= dict(_named(text) for text in further)
+    names = [name for text in formats for name in text.split(",")]
+    unknown = unknown_option([format_named(name) for name in names], options)
+    if unknown is not None:
+        flag = f"--{unknown[0]}" if unknown[0] in given else f"--option {unknown[0]}"
+        raise click.UsageError(f"No chosen format knows {flag}. {unknown[1]}")
     dataset = read_dataset(plan_file, crs=crs)
     for note in dataset.notes:
         say(note)
     written = write_dataset(
         dataset,
         folder,
-        [name for text in formats for name in text.split(",")],
+        names,
         stem=stem,
         overwrite=overwrite,
         options=options,

@@ -21,6 +21,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, authority_name, transformer
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import split
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -57,7 +58,7 @@ def disk_hint(path: Path) -> str:
 
 
 def to_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
-    """Geometries in WGS 84 longitude and latitude, degrees."""
+    """Geometries in WGS 84 longitude and latitude, degrees; those across 180 jump there."""
     if crs == LONLAT:
         return geometry
     project = transformer(crs, LONLAT)
@@ -174,7 +175,7 @@ def arrow_table(
 
     geometry = exact_geometry(of, table)
     if lonlat and len(geometry):
-        geometry = to_lonlat(geometry, CRS(table.crs))
+        geometry = split(to_lonlat(geometry, CRS(table.crs)))
     columns: dict[str, pa.Array] = {}
     for column in of.columns:
         if names is None or column.name in names:

@@ -10,12 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import shapely
-
 from geofield import schema
 from geofield.errors import FormatError
-from geofield.formats.arrow import exact_geometry
+from geofield.formats.arrow import exact_geometry, gdal_config
 from geofield.formats.avoided import avoided
 from geofield.model import Dataset
 
@@ -39,16 +36,15 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     for name, drawing_layer in LAYERS.items():
         table = avoided(dataset) if name == "obstacles" else dataset.table(name)
         shapes = exact_geometry(schema.layer(name), table)
-        if name in ("field", "obstacles"):
-            shapes = shapely.get_rings(shapes)
-            shapes = np.array([shapely.LineString(ring.coords) for ring in shapes], dtype=object)
         names += [drawing_layer] * len(shapes)
         lines += list(shapes)
     path = folder / f"{stem}.dxf"
+    # Polygons are written ring by ring, each with the flag that says it is closed.
     # Arrow would create the column `Layer`, which the driver has already.
     frame = gpd.GeoDataFrame({"Layer": names}, geometry=lines, crs=dataset.crs)
     try:
-        pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
+        with gdal_config(DXF_WRITE_HATCH="NO"):
+            pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
     except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
         raise FormatError(f"{path.name} could not be written: {error}.") from error
     beside = path.with_suffix(".prj")

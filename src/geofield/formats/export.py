@@ -11,7 +11,7 @@ from typing import Any
 import shapely
 
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.registry import Format, format_named
+from geofield.formats.registry import FORMATS, Format, format_named
 from geofield.model import Dataset
 from geofield.staging import staged_folder
 
@@ -67,7 +67,9 @@ def write_dataset(
     """
     chosen = list(dict.fromkeys(format_named(name) for name in formats))
     given = dict(options or {})
-    _check_options(chosen, given)
+    unknown = unknown_option(chosen, given)
+    if unknown is not None:
+        raise FormatError(f"No chosen format knows the option {unknown[0]!r}.", hint=unknown[1])
     _check_stem(stem)
     target = Path(folder)
     written: list[Path] = []
@@ -124,17 +126,29 @@ def _present(dataset: Dataset, when: str) -> bool:
     return layer in dataset.tables and bool(dataset.tables[layer][column].notna().any())
 
 
-def _check_options(chosen: list[Format], given: Mapping[str, Any]) -> None:
-    known = {key for each in chosen for key in each.options}
+def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[str, str] | None:
+    """The first option that no chosen format knows, and what to tell of it; None without one.
+
+    Parameters
+    ----------
+    chosen : iterable of Format
+    given : mapping
+        Values by option, or by format mappings of them.
+    """
     own = {each.name: each.options for each in chosen}
-    inner = [(key, own[name]) for name in own for key in given.get(name, {})]
-    for key, options in [*((key, {*known, *own}) for key in given), *inner]:
+    known = {key for options in own.values() for key in options}
+    asked = [(key, known) for key in given if key not in own]
+    asked += [(key, set(options)) for name, options in own.items() for key in given.get(name, {})]
+    for key, options in asked:
         if key not in options:
             near = difflib.get_close_matches(key, sorted(known), n=1)
-            raise FormatError(
-                f"No chosen format knows the option {key!r}.",
-                hint=f"Did you mean {near[0]!r}?" if near else f"Options: {sorted(known)}.",
-            )
+            others = [each.name for each in FORMATS.values() if key in each.options]
+            if others:
+                return key, f"It is an option of {_join(others)}."
+            if near:
+                return key, f"Did you mean {near[0]!r}?"
+            return key, f"Options: {', '.join(sorted(known)) or 'none'}."
+    return None
 
 
 def _check_stem(stem: str) -> None:

@@ -14,6 +14,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m
+from geofield.formats.antimeridian import split
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.geoparquet import GEOMETRY, write_geoparquet
 from geofield.formats.origin import lineage
@@ -34,7 +35,7 @@ DECIMALS = 7
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``fiboa/{stem}.geojson`` and ``fiboa/{stem}.parquet``."""
     table = dataset.table(schema.FIELD.name)
-    shapes = to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs)
+    shapes = split(to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs))
     rows = [
         _properties(row, shape, dataset)
         for row, shape in zip(table.to_dict("records"), table.geometry, strict=True)
@@ -113,5 +114,11 @@ def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
     collection = json.dumps({"schemas": {COLLECTION: list(SCHEMAS)}})
     # GeoParquet wants boxes as obligatory as the geometry, fiboa wants them optional.
     write_geoparquet(
-        path, [table], fields, LONLAT, "Polygon", {"collection": collection}, covering=False
+        path,
+        [table],
+        fields,
+        LONLAT,
+        sorted({str(shape.geom_type) for shape in shapes}),
+        {"collection": collection},
+        covering=False,
     )

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import shapely
 from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
+from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.strangers import check_vector
@@ -131,7 +133,7 @@ def read_foreign(
         RawLayer(each.name, _with_crs(_present(each.frame), f"{path.name}: {each.name}", crs))
         for each in layers
     ]
-    present = [each for each in present if len(each.frame)]
+    present = [RawLayer(each.name, _whole(each.frame)) for each in present if len(each.frame)]
     if not present:
         raise FormatError(f"{path} holds no geometries.")
     metric = _metric_of(present)
@@ -197,10 +199,19 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
     )
 
 
+def _whole(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The table with shapes as one that were cut at the 180th meridian."""
+    shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    return frame.set_geometry(joined(shapes, CRS(frame.crs)), crs=frame.crs)
+
+
 def _metric_of(layers: list[RawLayer]) -> CRS:
     first = layers[0].frame
     own = CRS(first.crs)
-    west, south, east, north = first.total_bounds
+    places = np.asarray(first.geometry.to_numpy(), dtype=object)
+    if own.is_geographic:
+        places = unwrapped(np.array([shapely.geometrycollections(places)], dtype=object))
+    west, south, east, north = shapely.total_bounds(places)
     if not np.isfinite([west, south, east, north]).all():
         raise FormatError(f"Layer {layers[0].name!r} has coordinates that are not numbers.")
     lon, lat = transformer(own, LONLAT).transform((west + east) / 2, (south + north) / 2)

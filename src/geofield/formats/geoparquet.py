@@ -48,7 +48,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
             tables,
             empty.schema,
             dataset.crs,
-            layer.geometry,
+            [layer.geometry],
             {_ORIGIN_KEY: origin.to_json(dataset)},
         )
         written.append(path)
@@ -60,7 +60,7 @@ def write_geoparquet(
     tables: Iterable[pa.Table],
     fallback: pa.Schema,
     crs: CRS,
-    geometry_type: str,
+    geometry_types: list[str],
     metadata: Mapping[str, str],
     *,
     covering: bool = True,
@@ -75,8 +75,8 @@ def write_geoparquet(
     fallback : pa.Schema
         The columns, should there be no table.
     crs : CRS
-    geometry_type : str
-        Of all geometries.
+    geometry_types : list of str
+        All that there are.
     metadata : mapping
         Further key-value metadata.
     covering : bool
@@ -100,7 +100,7 @@ def write_geoparquet(
     column: dict[str, Any] = {
         "encoding": "WKB",
         "crs": crs.to_json_dict(),
-        "geometry_types": [geometry_type],
+        "geometry_types": geometry_types,
         "orientation": "counterclockwise",
     }
     if covering:

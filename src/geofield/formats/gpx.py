@@ -13,7 +13,7 @@ import shapely
 from geofield import schema
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
-from geofield.formats.origin import lineage, timestamp
+from geofield.formats.origin import imagery_day, lineage
 from geofield.formats.xml import write_xml
 from geofield.model import Dataset
 
@@ -37,9 +37,11 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     metadata = ET.SubElement(root, "metadata")
     ET.SubElement(metadata, "name").text = dataset.name
     ET.SubElement(metadata, "desc").text = lineage(dataset)
-    ET.SubElement(metadata, "time").text = f"{timestamp(dataset)[:19]}Z"
+    day = imagery_day(dataset)
+    if day is not None:
+        ET.SubElement(metadata, "time").text = f"{day}T00:00:00Z"
     obstacles = avoided(dataset)
-    centres = shapely.point_on_surface(obstacles.geometry.to_numpy())
+    centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
     for row, (lon, lat) in zip(
         obstacles.to_dict("records"), _lonlat(centres, dataset), strict=True
     ):
@@ -66,6 +68,8 @@ def _lonlat(points: Any, dataset: Dataset) -> Any:
 
 
 def _position(lon: float, lat: float) -> dict[str, str]:
+    # GPX has no longitude 180, only -180.
+    lon = (round(lon, DECIMALS) + 180.0) % 360.0 - 180.0
     return {"lat": f"{lat:.{DECIMALS}f}", "lon": f"{lon:.{DECIMALS}f}"}
 
 

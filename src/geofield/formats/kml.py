@@ -26,10 +26,12 @@ DECIMALS = 9
 LAYERS = (schema.FIELD, schema.OBSTACLES, schema.TRACKS, schema.GAPS)
 
 _TYPES = {"int": "int", "float": "double", "str": "string", "date": "string"}
-# Colours are aabbggrr.
+# Colours are aabbggrr. Obstacles that tracks run through are outlines without a filling.
 _STYLES = {
     "field": ("ff0ad6ff", 3.0, "00000000"),
     "obstacles": ("ff1c1ae2", 1.5, "601c1ae2"),
+    "obstacles_possible": ("ff00a5ff", 2.0, "00000000"),
+    "obstacles_rejected": ("ff9e9e9e", 1.0, "00000000"),
     "tracks": ("ffffe500", 1.5, None),
     "gaps": ("ff0078ff", 1.0, None),
 }
@@ -46,8 +48,8 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     document = ET.SubElement(root, "Document")
     ET.SubElement(document, "name").text = dataset.name
     ET.SubElement(document, "description").text = lineage(dataset)
-    for layer in LAYERS:
-        _add_style(document, layer)
+    for name, (colour, width, fill) in _STYLES.items():
+        _add_style(document, name, colour, width, fill)
     for layer in LAYERS:
         columns = ET.SubElement(document, "Schema", name=layer.name, id=f"schema_{layer.name}")
         for column in layer.columns:
@@ -76,9 +78,21 @@ def read(path: Path) -> Dataset:
     return read_foreign(layers, path)
 
 
-def _add_style(document: ET.Element, layer: Layer) -> None:
-    colour, width, fill = _STYLES[layer.name]
-    style = ET.SubElement(document, "Style", id=f"style_{layer.name}")
+def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
+    """Obstacles look as their status says, where tracks run through them."""
+    if layer.name == schema.OBSTACLES.name and _status(row) in schema.NOT_AVOIDED:
+        return f"{layer.name}_{_status(row)}"
+    return layer.name
+
+
+def _status(row: Mapping[str, Any]) -> str:
+    return str(row.get("status")).strip().lower()
+
+
+def _add_style(
+    document: ET.Element, name: str, colour: str, width: float, fill: str | None
+) -> None:
+    style = ET.SubElement(document, "Style", id=f"style_{name}")
     line = ET.SubElement(style, "LineStyle")
     ET.SubElement(line, "color").text = colour
     ET.SubElement(line, "width").text = f"{width:g}"
@@ -95,7 +109,7 @@ def _add_layer(document: ET.Element, layer: Layer, dataset: Dataset) -> None:
     for row, shape in zip(table.to_dict("records"), shapes, strict=True):
         placemark = ET.SubElement(folder, "Placemark")
         ET.SubElement(placemark, "name").text = row_name(layer, row)
-        ET.SubElement(placemark, "styleUrl").text = f"#style_{layer.name}"
+        ET.SubElement(placemark, "styleUrl").text = f"#style_{_style_name(layer, row)}"
         data = ET.SubElement(
             ET.SubElement(placemark, "ExtendedData"),
             "SchemaData",
@@ -117,7 +131,8 @@ def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
         return f"Gap {row['gap_no']} of track {row['track_no']}"
     if layer.name == schema.OBSTACLES.name:
         number = row["obstacle_no"]
-        return "Obstacle" if pd.isna(number) else f"Obstacle {number}"
+        name = "Obstacle" if pd.isna(number) else f"Obstacle {number}"
+        return f"{name} ({_status(row)})" if _status(row) in schema.NOT_AVOIDED else name
     return f"Track {row['track_no']}"
 
 

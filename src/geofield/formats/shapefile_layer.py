@@ -20,6 +20,7 @@ from shapely.geometry import mapping
 from geofield import schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import split
 from geofield.formats.arrow import disk_hint, exact_geometry, to_lonlat
 from geofield.model import Dataset
 
@@ -80,7 +81,7 @@ def schema_layer(dataset: Dataset, path: Path, of: schema.Layer, table: Any) -> 
         path,
         of.geometry,
         {column.shapefile: (column.type, list(table[column.name])) for column in of.columns},
-        to_lonlat(shapes, dataset.crs) if len(shapes) else shapes,
+        split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes,
     )
 
 

@@ -35,11 +35,11 @@ class LocalPlane:
         """Degrees to metres: array (n, 2) of easting and northing."""
         lon, lat = np.asarray(lon, float), np.asarray(lat, float)
         north = (lat - self.lat) * self._metres_per_lat()
-        east = (lon - self.lon) * _metres_per_lon(lat)
+        east = ((lon - self.lon + 180.0) % 360.0 - 180.0) * _metres_per_lon(lat)
         return np.column_stack([east, north])
 
     def to_lonlat(self, east: ArrayLike, north: ArrayLike) -> FloatArray:
-        """Metres to degrees: array (n, 2) of longitude and latitude."""
+        """Metres to degrees: array (n, 2) of longitude, on across 180, and latitude."""
         lat = self.lat + np.asarray(north, float) / self._metres_per_lat()
         lon = self.lon + np.asarray(east, float) / _metres_per_lon(lat)
         return np.column_stack([lon, lat])

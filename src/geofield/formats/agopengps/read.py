@@ -38,7 +38,7 @@ def read(path: Path) -> Dataset:
     layers = []
     rings = [_lonlat_polygon(ring, plane) for ring in _rings(folder)]
     if rings:
-        holes, obstacles = _sorted_rings(rings[1:], _flags(folder))
+        holes, obstacles = _sorted_rings(rings[1:], _flags(folder, plane))
         outline = shapely.Polygon(rings[0].exterior, [hole.exterior for hole in holes])
         layers.append(_layer("boundary", [{"name": name, "geometry": outline}]))
         if obstacles:
@@ -84,7 +84,7 @@ def _field(folder: Path) -> tuple[str, LocalPlane]:
     return name, LocalPlane(lat, lon)
 
 
-def _flags(folder: Path) -> list[tuple[Any, int]]:
+def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int]]:
     """The places of our obstacle flags, longitude and latitude, and their numbers."""
     path = folder / "Flags.txt"
     found = []
@@ -92,8 +92,8 @@ def _flags(folder: Path) -> list[tuple[Any, int]]:
         parts = line.split(",", 7)
         match = _FLAG.match(parts[-1]) if len(parts) == 8 else None
         if match is not None:
-            lat, lon = float(parts[0]), float(parts[1])
-            found.append((shapely.Point(lon, lat), int(match.group(1))))
+            placed = plane.to_plane(float(parts[1]), float(parts[0]))
+            found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), int(match.group(1))))
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, 
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
-from geofield.formats.origin import timestamp
+from geofield.formats.origin import imagery_day
 from geofield.model import Dataset
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
@@ -39,7 +38,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     name = safe_name(dataset.name, length=_NAME_CHARACTERS)
     out = folder / "agopengps" / "Fields" / name
     files = {
-        "Field.txt": _field(dataset.name, plane, timestamp(dataset)),
+        "Field.txt": _field(dataset.name, plane, imagery_day(dataset)),
         "Boundary.txt": _boundary(dataset, polygon, plane),
         "TrackLines.txt": _track_lines(dataset, plane),
         "Flags.txt": _flags(dataset, plane),
@@ -53,10 +52,10 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     return written
 
 
-def _field(name: str, plane: LocalPlane, stamp: str) -> list[str]:
-    date = datetime.fromisoformat(stamp)
+def _field(name: str, plane: LocalPlane, day: str | None) -> list[str]:
     return [
-        date.strftime("%Y-%m-%d %H:%M:%S"),
+        # The program passes over this line.
+        f"{day} 00:00:00" if day else "imagery undated",
         "$FieldDir",
         name,
         "$Offsets",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import shapely
 
 from geofield.crs import LONLAT
@@ -40,6 +41,7 @@ def read(path: Path) -> Dataset:
             hint="Export the one you want from the terminal or farm program alone.",
         )
     field = fields[0]
+    _unwrap(field)
     layers = [
         _layer("boundary", list(_boundaries(field))),
         _layer("obstacles", list(_obstacles(field))),
@@ -71,6 +73,15 @@ def _external(root: ET.Element, folder: Path) -> list[ET.Element]:
                 raise FormatError(f"{folder} lacks {name}, to which TASKDATA.XML refers.")
             fields += list(read_xml(matching[0]).iter("PFD"))
     return fields
+
+
+def _unwrap(field: ET.Element) -> None:
+    """Give the positions of a field across 180 degrees longitudes that go on beyond."""
+    points = list(field.iter("PNT"))
+    lons = np.array([_position(point)[0] for point in points])
+    if len(lons) and np.ptp(lons) > 180.0:
+        for point, lon in zip(points, lons, strict=True):
+            point.set("D", repr(float(lon % 360.0)))
 
 
 def _layer(name: str, rows: list[dict[str, Any]]) -> RawLayer | None:

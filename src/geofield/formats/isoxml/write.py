@@ -33,7 +33,9 @@ from geofield.formats.isoxml.codes import (
     PolygonType,
 )
 from geofield.formats.names import cut_name, line_names
+from geofield.formats.origin import imagery_day
 from geofield.formats.xml import write_xml
+from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
 _GEOD = Geod(ellps="WGS84")
@@ -44,19 +46,32 @@ def write_v4(
 ) -> list[Path]:
     """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3.
 
-    Options: ``customer`` and ``farm``, names for the terminal.
+    Options: ``customer`` and ``farm``, names for the terminal; ``zip`` (true: the folder
+    TASKDATA in one archive).
     """
-    return _write(dataset, folder / "isoxml", 4, options)
+    return _written(dataset, folder, f"{stem}_isoxml", 4, options)
 
 
 def write_v3(
     dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
     """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
-    return _write(dataset, folder / "isoxml-v3", 3, options)
+    return _written(dataset, folder, f"{stem}_isoxml-v3", 3, options)
 
 
-def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, Any]) -> list[Path]:
+def _written(
+    dataset: Dataset, folder: Path, archive: str, version: int, options: Mapping[str, Any]
+) -> list[Path]:
+    below = folder / ("isoxml" if version == 4 else "isoxml-v3")
+    path = below / "TASKDATA" / "TASKDATA.XML"
+    write_xml(_task_data(dataset, version, options), path)
+    if not options.get("zip"):
+        return [path]
+    day = imagery_day(dataset)
+    return [archived([path], folder / f"{archive}.zip", day=day, below=below)]
+
+
+def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET.Element:
     field = dataset.table(schema.FIELD.name)
     if len(field) != 1:
         raise FormatError(f"ISOXML needs one field; there are {len(field)}.")
@@ -89,9 +104,7 @@ def _write(dataset: Dataset, folder: Path, version: int, options: Mapping[str, A
         _add_guidance_groups(part, dataset)
     else:
         _add_guidance_lines(part, dataset)
-    path = folder / "TASKDATA" / "TASKDATA.XML"
-    write_xml(root, path)
-    return [path]
+    return root
 
 
 def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:

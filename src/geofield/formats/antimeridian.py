@@ -1,0 +1,104 @@
+"""Fields across the 180th meridian, in formats of longitude and latitude.
+
+Formats of single positions (GPX, ISOXML, KML, CSV) give each its longitude between -180 and
+180. Formats of shapes cut them at the meridian, as RFC 7946 (section 3.1.9) wants it: a polygon
+whose ring jumps from 180 to -180 would go round the earth. Reading joins either again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+
+#: No field is wider: what seems to be, jumps from one side of the map to the other.
+_WIDEST_DEG = 180.0
+_EAST = shapely.box(0.0, -90.0, 180.0, 90.0)
+_WEST = shapely.box(180.0, -90.0, 360.0, 90.0)
+#: Cut edges may differ in their last digits, degrees: less than 0.1 mm, but not of rounded files.
+_SNAP_DEG = 1e-6
+
+
+def unwrapped(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Shapes in degrees, those that jump at 180 with longitudes from 0 to 360 instead."""
+    shapes = np.asarray(shapes, dtype=object)
+    jumps = _jumps(shapes)
+    if jumps.any():
+        shapes = shapes.copy()
+        shapes[jumps] = shapely.transform(shapes[jumps], _positive)
+    return shapes
+
+
+def split(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Shapes in degrees, those that jump at 180 cut there into multi-part ones."""
+    shapes = np.asarray(shapes, dtype=object)
+    jumps = np.flatnonzero(_jumps(shapes))
+    if len(jumps):
+        shapes = shapes.copy()
+        whole = unwrapped(shapes[jumps])
+        west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
+        for row, parts in zip(
+            jumps, zip(shapely.intersection(whole, _EAST), west, strict=True), strict=True
+        ):
+            shapes[row] = _collected(parts)
+    return shapes
+
+
+def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
+    """Shapes as one again that jump at 180 or were cut there, in a CRS of degrees.
+
+    Of other CRS they are handed back as they are.
+    """
+    shapes = np.asarray(shapes, dtype=object)
+    if not crs.is_geographic:
+        return shapes
+    jumps = np.flatnonzero(_jumps(shapes))
+    if len(jumps):
+        shapes = shapes.copy()
+        shapes[jumps] = [_joined(shape) for shape in unwrapped(shapes[jumps])]
+    return shapes
+
+
+def _joined(shape: Any) -> Any:
+    parts = shapely.get_parts(shape)
+    if len(parts) == 1:
+        return shape
+    whole = shapely.union_all(shapely.transform(parts, _on_the_meridian))
+    return shapely.line_merge(whole) if shapely.get_dimensions(whole) == 1 else whole
+
+
+def _jumps(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    bounds = shapely.bounds(shapes).reshape(-1, 4)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((bounds[:, 2] - bounds[:, 0] > _WIDEST_DEG) & (bounds[:, 0] < 0))
+
+
+def _positive(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack([np.where(lonlat[:, 0] < 0, lonlat[:, 0] + 360, lonlat[:, 0]),
+                            lonlat[:, 1]])  # fmt: skip
+
+
+def _negative(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack([lonlat[:, 0] - 360.0, lonlat[:, 1]])
+
+
+def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
+    near = np.abs(lonlat[:, 0] - 180.0) < _SNAP_DEG
+    return np.column_stack([np.where(near, 180.0, lonlat[:, 0]), lonlat[:, 1]])
+
+
+def _collected(pieces: tuple[Any, Any]) -> Any:
+    """The pieces of both sides as one shape; what only touches the meridian has no piece."""
+    dimension = max(int(shapely.get_dimensions(piece)) for piece in pieces)
+    parts = [
+        part
+        for piece in pieces
+        for part in shapely.get_parts(piece)
+        if shapely.get_dimensions(part) == dimension
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    return shapely.multipolygons(parts) if dimension == 2 else shapely.multilinestrings(parts)

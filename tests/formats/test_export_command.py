@@ -1,0 +1,200 @@
+"""`geofield export` as a process: options, archives, what each file says of doubt and time."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+import zipfile
+from xml.etree import ElementTree as ET
+
+import fiona
+import geopandas as gpd
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from formats_plan import UTM, X0, Y0, make_dataset
+from pyproj import CRS, Transformer
+
+from geofield.formats import read_dataset, write_dataset
+from geofield.model import Provenance
+
+pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+GPX = "{http://www.topografix.com/GPX/1/1}"
+KML = "{http://www.opengis.net/kml/2.2}"
+
+
+def geofield(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "geofield", *map(str, arguments)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def plan_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plan")
+    write_dataset(make_dataset(), folder, ["gpkg"])
+    return folder / "field.gpkg"
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["-f", "kml", "--profile", "aggps"], "No chosen format knows --profile. It is an option of"),
+    (["-f", "kml,gpx", "--zip"], "No chosen format knows --zip."),
+    (["-f", "shapefile", "--option", "profil=aggps"], "Did you mean 'profile'?"),
+    (["-f", "dxf", "--option", "colour=red"], "knows --option colour"),
+])  # fmt: skip
+def test_options_that_no_format_knows(plan_file, tmp_path, arguments, message):
+    done = geofield("export", plan_file, *arguments, "--out", tmp_path / "out")
+    assert done.returncode == 2, done.stderr
+    assert message in " ".join(done.stderr.split())
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["isoxml", "isoxml-v3"])
+def test_isoxml_in_an_archive(plan_file, tmp_path, name):
+    for number in (1, 2):
+        done = geofield("export", plan_file, "-f", name, "--zip", "--out", tmp_path / str(number))
+        assert done.returncode == 0, done.stderr
+    file = tmp_path / "1" / f"field_{name}.zip"
+    with zipfile.ZipFile(file) as archive:
+        assert archive.namelist() == ["TASKDATA/TASKDATA.XML"]
+    assert file.read_bytes() == (tmp_path / "2" / file.name).read_bytes()
+    assert len(read_dataset(file).table("obstacles")) == 3
+    assert geofield("validate", file).returncode == 0
+
+
+def test_waypoints_are_the_centres(tmp_path):
+    dataset = make_dataset()
+    write_dataset(dataset, tmp_path, ["gpx"])
+    points = pyogrio.read_dataframe(tmp_path / "field.gpx", layer="waypoints").to_crs(UTM)
+    kept = dataset.table("obstacles").iloc[[0, 1, 3]]
+    off = points.geometry.distance(kept.centroid.reset_index(drop=True))
+    assert off.max() < 1e-3
+
+
+def test_rings_of_drawings_are_closed(tmp_path):
+    write_dataset(make_dataset(), tmp_path, ["dxf"])
+    lines = (tmp_path / "field.dxf").read_text(encoding="utf-8").split("\n")
+    pairs = [(a.strip(), b.strip()) for a, b in zip(lines[::2], lines[1::2], strict=False)]
+    flags = {}
+    for code, value in pairs:
+        if code == "0":
+            entity = layer = None
+            entity = value
+        elif code == "8":
+            layer = value
+        elif code == "70" and entity == "LWPOLYLINE":
+            flags.setdefault(layer, []).append(int(value) & 1)
+    # The field and the shed have a hole each; two trees are kept.
+    assert {layer: (sum(found), len(found)) for layer, found in flags.items()} == {
+        "FIELD": (2, 2), "OBSTACLES": (4, 4), "TRACKS": (0, 23), "GAPS": (0, 11),
+    }  # fmt: skip
+    drawn = gpd.read_file(tmp_path / "field.dxf")
+    assert drawn[drawn["Layer"] == "FIELD"].geometry.is_closed.all()
+
+
+def test_undated_imagery_is_of_no_day(tmp_path):
+    dataset = make_dataset(points=False)
+    source = dataclasses.replace(dataset.provenance.source, date=None)
+    undated = dataclasses.replace(
+        dataset,
+        provenance=Provenance("geofield 0.1.0", source),
+        tables={**dataset.tables, "field": dataset.tables["field"].assign(imagery_date=None)},
+    )
+    names = ["gpkg", "geojson", "shapefile", "geoparquet", "flatgeobuf", "kml", "gpx", "csv"]
+    names += ["fiboa", "dxf", "isoxml", "isoxml-v3", "agopengps", "turtle", "jsonld", "study-xml"]
+    write_dataset(undated, tmp_path, names)
+    written = [path for path in tmp_path.rglob("*") if path.is_file()]
+    for path in written:
+        assert b"1970-01-01" not in path.read_bytes(), path
+    for table in tmp_path.rglob("*.dbf"):
+        assert table.read_bytes()[1:4] == b"\0\0\0"
+        with fiona.open(table.with_suffix(".shp")) as source:
+            assert len(source)
+    assert ET.parse(tmp_path / "field.gpx").getroot().find(f"{GPX}metadata/{GPX}time") is None
+
+
+def test_kml_shows_what_tracks_run_through_apart(tmp_path):
+    dataset = make_dataset(points=False)
+    dataset.tables["obstacles"]["status"] = ["detected", "possible", "rejected", "added"]
+    write_dataset(dataset, tmp_path, ["kml"])
+    root = ET.parse(tmp_path / "field.kml").getroot()
+    styles = {style.get("id"): style for style in root.iter(f"{KML}Style")}
+    looks = {}
+    for mark in root.iter(f"{KML}Placemark"):
+        name, style = mark.find(f"{KML}name").text, mark.find(f"{KML}styleUrl").text[1:]
+        if name.startswith("Obstacle"):
+            fill = styles[style].find(f"{KML}PolyStyle/{KML}color").text
+            looks[name] = (styles[style].find(f"{KML}LineStyle/{KML}color").text, fill)
+    assert list(looks) == [
+        "Obstacle 1", "Obstacle 2 (possible)", "Obstacle 3 (rejected)", "Obstacle 4"
+    ]  # fmt: skip
+    assert looks["Obstacle 1"] == looks["Obstacle 4"]
+    assert len({*looks.values()}) == 3
+    assert [fill[:2] == "00" for _, fill in looks.values()] == [False, True, True, False]
+    assert sorted(read_dataset(tmp_path / "field.kml").table("obstacles")["obstacle_no"]) == [
+        1, 2, 3, 4
+    ]  # fmt: skip
+
+
+#: Fiji: the test field, which is 120 m wide, with the 180th meridian through its middle.
+FIJI = CRS.from_epsg(32760)
+
+
+def in_fiji():
+    dataset = make_dataset(points=False)
+    x, y = Transformer.from_crs(4326, FIJI, always_xy=True).transform(180.0, -17.0)
+    moved = {}
+    for name, table in dataset.tables.items():
+        shapes = shapely.transform(
+            table.geometry.to_numpy(), lambda c: c - [X0, Y0] + [round(x) - 60, round(y)]
+        )
+        moved[name] = table.set_geometry(gpd.GeoSeries(shapes, crs=FIJI), crs=FIJI)
+    return dataclasses.replace(dataset, tables=moved, crs=FIJI, points=None, grid=None)
+
+
+@pytest.mark.parametrize(("name", "product"), [
+    ("gpkg", "field.gpkg"), ("geojson", "geojson"), ("shapefile", "shapefile"),
+    ("geoparquet", "geoparquet"), ("flatgeobuf", "flatgeobuf"), ("kml", "field.kml"),
+    ("isoxml", "isoxml"), ("isoxml-v3", "isoxml-v3"), ("agopengps", "agopengps/Fields"),
+])  # fmt: skip
+def test_a_field_across_the_180th_meridian_comes_back(tmp_path, name, product):
+    dataset = in_fiji()
+    write_dataset(dataset, tmp_path, [name])
+    done = geofield("import", tmp_path / product, "-o", tmp_path / "back.gpkg", "--overwrite")
+    assert done.returncode == 0, done.stderr
+    back = read_dataset(tmp_path / "back.gpkg")
+    ours = dataset.table("field").geometry.iloc[0]
+    theirs = back.table("field").to_crs(FIJI).geometry.iloc[0]
+    assert theirs.geom_type == "Polygon"
+    assert shapely.hausdorff_distance(ours, theirs) < 0.02
+    kept = dataset.table("obstacles").iloc[[0, 1, 3]]
+    found = back.table("obstacles").to_crs(FIJI).set_index("obstacle_no").geometry
+    for number, shape in zip(kept["obstacle_no"], kept.geometry, strict=True):
+        # AgOpenGPS has no holes in obstacles: the shed's centre moves by 6 cm.
+        assert found[number].centroid.distance(shape.centroid) < 0.07
+    lengths = back.table("tracks").to_crs(FIJI).length
+    np.testing.assert_allclose(
+        sorted(lengths),
+        sorted(dataset.table("tracks").length),
+        atol=120 if name == "agopengps" else 0.05,
+    )
+
+
+@pytest.mark.parametrize("name", ["geojson", "shapefile", "fiboa"])
+def test_shapes_are_cut_at_the_180th_meridian(tmp_path, name):
+    dataset = in_fiji()
+    write_dataset(dataset, tmp_path, [name])
+    file = {"geojson": "geojson/field.geojson", "shapefile": "shapefile/boundary.shp",
+            "fiboa": "fiboa/field.parquet"}[name]  # fmt: skip
+    read = gpd.read_parquet if name == "fiboa" else gpd.read_file
+    shape = read(tmp_path / file).geometry.iloc[0]
+    assert shape.geom_type == "MultiPolygon"
+    # Degrees squared of the field; a ring that goes round the earth has a million times more.
+    assert shape.area == pytest.approx(
+        6384 / (111_320 * 110_660 * np.cos(np.radians(17))), rel=0.01
+    )
+    assert {round(abs(x)) for x in shape.bounds[::2]} == {180}
+    assert shape.is_valid
