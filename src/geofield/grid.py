@@ -20,6 +20,7 @@ from geofield.crs import (
     LONLAT,
     WEB_MERCATOR,
     WEB_MERCATOR_MAX_LAT,
+    authority_name,
     metric_crs,
     parse_crs,
     transformer,
@@ -35,7 +36,7 @@ FloatArray = NDArray[np.float64]
 _GEOD = Geod(ellps="WGS84")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Grid:
     """Shape, affine transform and CRS of a raster.
 
@@ -61,6 +62,13 @@ class Grid:
             raise GridError(f"A grid of {self.width_px} x {self.height_px} px has no pixels.")
         if not all(map(math.isfinite, self.transform[:6])) or self.transform.determinant == 0:
             raise GridError(f"The transform {tuple(self.transform)[:6]} cannot be inverted.")
+
+    def __repr__(self) -> str:
+        lon, lat = self.centre_lonlat
+        return (
+            f"<Grid {self.width_px} x {self.height_px} px, {authority_name(self.crs)}\n"
+            f"  {self.ground_resolution_m:.3g} m per pixel around lat {lat:.5f}, lon {lon:.5f}>"
+        )
 
     @classmethod
     def web_mercator(

@@ -15,6 +15,7 @@ from geofield import __version__, schema
 from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
 from geofield.grid import Grid
+from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence, quality_from_json
 from geofield.model.field import Field
@@ -23,6 +24,7 @@ from geofield.model.tracks import Tracks
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    from matplotlib.axes import Axes
 
     from geofield.settings import Settings
     from geofield.web.html import PlanPage
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 SOFTWARE = f"geofield {__version__}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """All that is known of one field; stages that have not run are None.
 
@@ -61,6 +63,33 @@ class Plan:
     scene: Scene | None = None
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return words(f"Plan of field {self.field.name!r}", self._figures())
+
+    def _repr_html_(self) -> str:
+        drawn = [field_drawn(self.field.polygon)]
+        if self.tracks is not None:
+            drawn.append(tracks_drawn(self.tracks.segments.geometry))
+        if self.obstacles is not None:
+            drawn += obstacles_drawn(self.obstacles)
+        return card(f"Plan of {self.field.name}", self._figures(), drawn)
+
+    def _figures(self) -> dict[str, str]:
+        figures = {"area": f"{self.field.area_ha:.2f} ha"}
+        if self.field.certainty is not None:
+            figures["certainty"] = f"{self.field.certainty:.2f}"
+        if self.obstacles is None:
+            figures["obstacles"] = "not looked for"
+        else:
+            statuses = self.obstacles["status"].value_counts().sort_index()
+            figures["obstacles"] = " + ".join(f"{n} {s}" for s, n in statuses.items()) or "none"
+        if self.tracks is None:
+            figures["tracks"] = "not planned"
+        else:
+            length_m = float(self.tracks.segments["length_m"].sum())
+            figures["tracks"] = f"{len(self.tracks.lines)} of {length_m / 1000:.2f} km"
+        return figures
 
     def __eq__(self, other: object) -> bool:
         """Whether field, obstacles, tracks, settings, source, grid and evidence are the same."""
@@ -195,6 +224,25 @@ class Plan:
             timings_s=timings_s,
             inputs=inputs,
         )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the plan on its picture with matplotlib (``pip install geofield[plot]``).
+
+        >>> plan.plot()                                              # doctest: +SKIP
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            A figure of its own when not given.
+
+        Returns
+        -------
+        Axes
+            In the plan's metric CRS; the colours are those of the map and of QGIS.
+        """
+        from geofield.plotting import plot_dataset
+
+        return plot_dataset(self.to_dataset(), self.scene, ax)
 
     def explore(self, *, height_px: int = 560) -> PlanPage:
         """The plan as an interactive map in a notebook; works without a network.

@@ -167,7 +167,21 @@ class TiledPicture:
 
 
 def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, Bounds]:
-    """A scene as one image file in a metric CRS.
+    """A scene as one image file in a metric CRS; see :func:`shown_pixels`.
+
+    Returns
+    -------
+    bytes, str, (left, bottom, right, top)
+        The file, its media type, and where its edges lie.
+    """
+    pixels, bounds = shown_pixels(scene, crs, long_side_px)
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
+    return buffer.getvalue(), "image/webp", bounds
+
+
+def shown_pixels(scene: Scene, crs: CRS, long_side_px: int) -> tuple[NDArray[np.uint8], Bounds]:
+    """A scene's colours in a metric CRS, north up.
 
     Parameters
     ----------
@@ -178,8 +192,8 @@ def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, 
 
     Returns
     -------
-    bytes, str, (left, bottom, right, top)
-        The file, its media type, and where its edges lie.
+    uint8 array (rows, columns, 4), (left, bottom, right, top)
+        Red, green, blue and opacity, and where the edges lie.
     """
     bounds = left, bottom, right, top = _bounds(scene.grid, crs)
     longest = max(scene.grid.shape)
@@ -190,11 +204,8 @@ def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, 
     else:
         target = from_bounds(left, bottom, right, top, shape[1], shape[0])
         bands, valid = _reprojected(scene, target, shape, crs)
-    buffer = io.BytesIO()
     alpha = valid.astype(np.uint8)[..., None] * np.uint8(255)
-    pixels = np.concatenate([_shown(bands, scene.roles, "colour"), alpha], axis=-1)
-    Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
-    return buffer.getvalue(), "image/webp", bounds
+    return np.concatenate([_shown(bands, scene.roles, "colour"), alpha], axis=-1), bounds
 
 
 def _direct(grid: Grid, crs: CRS) -> bool:

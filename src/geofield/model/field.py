@@ -22,6 +22,7 @@ from geofield.crs import (
 )
 from geofield.errors import CRSError, FieldError
 from geofield.grid import Grid
+from geofield.model.card import card, field_drawn, words
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class FieldQuality:
     trusted: bool = True
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Field:
     """A field.
 
@@ -111,6 +112,24 @@ class Field:
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the outline, in words."""
         return () if self.quality is None else self.quality.reasons
+
+    def __repr__(self) -> str:
+        return words(f"Field {self.name!r}", self._facts())
+
+    def _repr_html_(self) -> str:
+        return card(f"Field {self.name}", self._facts(), [field_drawn(self.polygon)])
+
+    def _facts(self) -> dict[str, str]:
+        facts = {
+            "area": f"{self.area_ha:.2f} ha",
+            "perimeter": f"{self.perimeter_m:.0f} m",
+            "found by": self.method,
+            "CRS": authority_name(self.crs),
+        }
+        if self.quality is not None:
+            facts["certainty"] = f"{self.quality.score:.2f}"
+            facts["doubts"] = str(len(self.quality.reasons))
+        return facts
 
     @property
     def area_ha(self) -> float:

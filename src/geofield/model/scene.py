@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield.crs import authority_name
 from geofield.errors import ImageryError, PointOutsideError
 from geofield.grid import Grid
+from geofield.model.card import words
 
 #: What a band can show.
 ROLES = ("red", "green", "blue", "nir", "grey", "other")
@@ -47,7 +49,7 @@ class ImagerySource:
     details: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """A georeferenced picture in memory.
 
@@ -75,6 +77,16 @@ class Scene:
     source: ImagerySource = field(default_factory=ImagerySource)
     scaling: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        grid, source = self.grid, self.source
+        facts = {
+            "size": f"{grid.width_px} x {grid.height_px} px of {grid.ground_resolution_m:.3g} m",
+            "bands": " ".join(self.roles),
+            "CRS": authority_name(grid.crs),
+            "date": source.date or "unknown",
+        }
+        return words(f"Scene {source.name!r}", facts)
 
     def __post_init__(self) -> None:
         if self.bands.ndim != 3 or self.bands.shape[0] != len(self.roles) or not self.roles:

@@ -15,6 +15,7 @@ from shapely import Polygon
 from geofield import schema
 from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.grid import Grid
+from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
 
@@ -30,7 +31,7 @@ def points_per_segment(length_m: NDArray[np.float64], step_m: float) -> NDArray[
     return np.asarray(np.ceil(length_m / step_m - 1e-6).clip(min=1), dtype=np.int64) + 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tracks:
     """Planned tracks of one field.
 
@@ -76,6 +77,27 @@ class Tracks:
     headland_tracks: gpd.GeoDataFrame | None = None
     route: gpd.GeoDataFrame | None = None
     turns: gpd.GeoDataFrame | None = None
+
+    def __repr__(self) -> str:
+        return words(f"Tracks: {len(self.lines)}", self._facts())
+
+    def _repr_html_(self) -> str:
+        drawn = [tracks_drawn(self.segments.geometry)]
+        if self.outline is not None:
+            drawn.insert(0, field_drawn(self.outline))
+        return card(f"{len(self.lines)} tracks", self._facts(), drawn)
+
+    def _facts(self) -> dict[str, str]:
+        facts = {
+            "segments": str(len(self.segments)),
+            "length": f"{self.segments['length_m'].sum() / 1000:.2f} km",
+            "spacing": f"{self.spacing_m:g} m",
+            "heading": f"{self.heading_deg:.1f} degrees",
+        }
+        if self.turns is not None:
+            unfit = int((self.turns["fits"] == "no").sum())
+            facts["turns"] = f"{len(self.turns)} ({unfit} do not fit)"
+        return facts
 
     @property
     def crs(self) -> CRS:
