@@ -172,7 +172,7 @@ def test_wrong_spacing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     out = tmp_path / "out"
-    message = fails(capsys, out, simulated_tif, *point(simulated), "--spacing", spacing)
+    message = fails(capsys, out, simulated_tif, *point(simulated), "--spacing", spacing, code=2)
     assert "spacing" in message
 
 

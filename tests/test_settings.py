@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 
 from geofield.errors import SettingsError
-from geofield.settings import Settings, from_mapping, load_settings
+from geofield.settings import (
+    SECTIONS,
+    DirectionName,
+    FormatName,
+    Settings,
+    from_mapping,
+    load_settings,
+    with_values,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -43,6 +55,14 @@ def test_names_of_another_version_are_passed_over() -> None:
         ("[tracks]\nspacing = 2\n", "tracks.spacing"),
         ("[trucks]\nspacing_m = 2\n", "trucks"),
         ("[tracks\n", "not valid TOML"),
+        ("tracks = 3\n", "tracks is a section"),
+        ("[trakcs]\nspacing_m = 2\n", "Did you mean 'tracks'"),
+        ("[tracks]\nspacing_n = 2\n", "Did you mean 'spacing_m'"),
+        ('[tracks]\ndirection = "longest_edg"\n', "Did you mean 'longest_edge'"),
+        ('[tracks]\ndirection = "nan"\n', "finite heading"),
+        ('[tracks]\nroute = "shortst"\n', "Did you mean 'shortest'"),
+        ('[obstacles]\nstrategy = "study_lsting"\n', "Did you mean 'study_listing'"),
+        ('[export]\nformats = ["gpgk"]\n', "Did you mean 'gpkg'"),
     ],
 )
 def test_wrong_settings_are_named(text: str, message: str) -> None:
@@ -66,3 +86,74 @@ def test_what_may_hold_keys_is_not_recorded() -> None:
     assert "s3cret" not in repr(settings.fetch)
     assert "s3cret" not in settings.model_dump_json()
     assert "s3cret" not in repr(settings.model_dump())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "run p.tif --lat 1 --lon 1 --out o --format gpgk",
+        "run p.tif --lat 1 --lon 1 --out o --direction longest_edg",
+        "run p.tif --lat 1 --lon 1 --out o --strategy aut",
+        "run p.tif --lat 1 --lon 1 --out o --spacing 0",
+        "field p.tif --lat 1 --lon 1 -o o.gpkg --method stdy",
+        "tracks . --spacing -1 -o o.gpkg",
+    ],
+)
+def test_a_typo_is_told_before_anything_large_is_loaded(line: str) -> None:
+    code = (
+        "import sys\nfrom geofield.cli import main\n"
+        f"try: main({line.split()})\n"
+        "except SystemExit as stop: code = stop.code\n"
+        "print(code, bool({'numpy', 'rasterio', 'shapely'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2", "False"], done.stderr
+
+
+def test_the_environment_is_checked_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEOFIELD_TRACKS__ROUTE", "shortst")
+    with pytest.raises(SettingsError, match="Did you mean 'shortest'"):
+        load_settings()
+
+
+def test_any_setting_by_its_name() -> None:
+    names = [name for each in SECTIONS for name in type(getattr(Settings(), each)).model_fields]
+    assert len(set(names)) == len(names)
+    changed = with_values(Settings(tracks={"step_m": 0.5}), spacing_m=6, route="shortest")
+    assert (changed.tracks.spacing_m, changed.tracks.step_m) == (6.0, 0.5)
+    assert changed.tracks.route == "shortest"
+    with pytest.raises(SettingsError, match="Did you mean 'spacing_m'"):
+        with_values(None, spacin_m=6)
+    with pytest.raises(SettingsError, match=r"spacing_m: .*greater than 0 \(given: -1\)"):
+        with_values(None, spacing_m=-1)
+
+
+def test_names_are_those_of_the_stages() -> None:
+    from geofield.formats import FORMATS
+    from geofield.obstacles.detect import STRATEGIES
+    from geofield.tracks.direction import METHODS
+
+    strategy = type(Settings().obstacles).model_fields["strategy"]
+    assert set(get_args(FormatName)) == set(FORMATS)
+    assert set(get_args(DirectionName)) == set(METHODS)
+    assert set(get_args(strategy.annotation)) == set(STRATEGIES)
+
+
+def test_what_a_product_records_opens_no_way() -> None:
+    recorded: dict[str, Any] = {"fetch": {"allow": ["https://example.org"]}}
+    assert from_mapping(recorded).fetch.allow == ()
+
+
+def test_settings_and_stages_agree_on_defaults() -> None:
+    from geofield.obstacles import detect_obstacles
+    from geofield.tracks import plan_tracks
+
+    for section, stage in (("obstacles", detect_obstacles), ("tracks", plan_tracks)):
+        own = dict(getattr(Settings(), section))
+        given = inspect.signature(stage).parameters
+        shared = {
+            name for name in own if name in given and given[name].default is not given[name].empty
+        }
+        assert len(shared) > 5
+        own = {name: None if value == "none" else value for name, value in own.items()}
+        assert {n: own[n] for n in shared} == {n: given[n].default for n in shared}

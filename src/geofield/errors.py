@@ -18,6 +18,9 @@ class GeofieldError(Exception):
         The next step for the user.
     """
 
+    #: Of the command line: 1 for work that failed, 2 for wrong usage.
+    exit_code = 1
+
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(message)
         self.message = message
@@ -37,6 +40,8 @@ def _rebuild(cls: type[GeofieldError], message: str, hint: str | None) -> Geofie
 
 class SettingsError(GeofieldError):
     """A setting is unknown, of the wrong type or out of its range."""
+
+    exit_code = 2
 
 
 class CRSError(GeofieldError):

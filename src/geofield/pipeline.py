@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -24,7 +25,7 @@ from geofield.model.review import reconcile
 from geofield.model.scene import Scene
 from geofield.model.written import Written
 from geofield.plan import Plan, outline_digest
-from geofield.settings import Settings
+from geofield.settings import Settings, with_values
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
@@ -42,6 +43,7 @@ def plan_field(
     boundary: Field | None = None,
     progress: Progress | None = None,
     timings_s: MutableMapping[str, float] | None = None,
+    **by_name: Any,
 ) -> Plan:
     """Run all four stages.
 
@@ -61,12 +63,14 @@ def plan_field(
         Called with (done, total, what) at each stage.
     timings_s : mutable mapping, optional
         Filled with the seconds of each stage.
+    **by_name
+        Any setting by its own name, over those of `settings`: ``spacing_m=6``.
 
     Returns
     -------
     Plan
     """
-    settings = settings or Settings()
+    settings = with_values(settings, **by_name)
     tell = progress or (lambda done, total, what: None)
     timings = timings_s if timings_s is not None else {}
     with _timed("picture", timings, tell):

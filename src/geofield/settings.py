@@ -7,13 +7,17 @@ arguments of its stage, so that each figure is described once, here.
 
 from __future__ import annotations
 
+import difflib
+import math
 import os
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -25,6 +29,45 @@ from pydantic import (
 from geofield.errors import SettingsError
 
 NonNegative = Annotated[float, Field(ge=0)]
+
+#: The formats that can be written; held against the registry of formats by a test.
+FormatName = Literal[
+    "gpkg",
+    "geojson",
+    "shapefile",
+    "geoparquet",
+    "flatgeobuf",
+    "kml",
+    "gpx",
+    "csv",
+    "fiboa",
+    "dxf",
+    "isoxml",
+    "isoxml-v3",
+    "agopengps",
+    "rdf",
+    "turtle",
+    "jsonld",
+    "ntriples",
+    "rdf-study",
+    "study-xml",
+    "html",
+]
+DirectionName = Literal["longest_edge", "hough", "fewest", "fewest_turns"]
+
+
+def _direction(value: str) -> str:
+    """A way to find the direction, or a heading in degrees."""
+    names = get_args(DirectionName)
+    try:
+        heading = float(value)
+    except ValueError:
+        if value in names:
+            return value
+        raise ValueError(f"input should be a heading in degrees or {_listed(names)}") from None
+    if not math.isfinite(heading):
+        raise ValueError("input should be a finite heading")
+    return value
 
 
 class Section(BaseModel):
@@ -130,11 +173,17 @@ class FieldSettings(Section):
 class ObstacleSettings(Section):
     """Stage 3: the obstacles."""
 
-    strategy: str = Field(
+    strategy: Literal[
         "auto",
-        description="How obstacles are found: auto, single, t_range, max_of_all, dlc, consensus, "
-        "study_text, study_listing, study_dlc.",
-    )
+        "single",
+        "t_range",
+        "max_of_all",
+        "dlc",
+        "consensus",
+        "study_text",
+        "study_listing",
+        "study_dlc",
+    ] = Field("auto", description="How obstacles are found: auto, or a way of the study.")
     radius_m: tuple[PositiveFloat, PositiveFloat] = Field(
         (2.0, 9.0), description="Smallest and largest crown radius, metres."
     )
@@ -171,7 +220,7 @@ class TrackSettings(Section):
 
     spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
     step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
-    direction: str = Field(
+    direction: Annotated[str, AfterValidator(_direction)] = Field(
         "longest_edge",
         description="Of the tracks: longest_edge, hough, fewest, fewest_turns, or a heading in "
         "degrees clockwise from true north.",
@@ -222,7 +271,7 @@ class TrackSettings(Section):
 class ExportSettings(Section):
     """What is written."""
 
-    formats: tuple[str, ...] = Field(
+    formats: tuple[FormatName, ...] = Field(
         ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
     )
 
@@ -273,21 +322,68 @@ def load_settings(
             for section, settings in source.items():
                 if section not in SECTIONS:
                     raise SettingsError(
-                        f"Unknown section [{section}] in the settings.",
+                        f"Unknown section [{section}] in the settings."
+                        + _nearest(section, SECTIONS),
                         hint=f"Sections: {', '.join(SECTIONS)}.",
                     )
-                merged[section] |= {k: v for k, v in dict(settings).items() if v is not None}
+                if not isinstance(settings, Mapping):
+                    raise SettingsError(
+                        f"{section} is a section of the settings, not a value.",
+                        hint=f"Write [{section}] and its settings below.",
+                    )
+                merged[section] |= {k: v for k, v in settings.items() if v is not None}
         return Settings(**merged)
     except ValidationError as error:
         raise SettingsError(_explain(error)) from None
+
+
+def with_values(settings: Settings | None, **values: Any) -> Settings:
+    """Settings with some of them changed, each by its own name.
+
+    Parameters
+    ----------
+    settings : Settings or None
+        The defaults when None.
+    **values
+        Such as ``spacing_m=6, route="shortest"``.
+
+    Raises
+    ------
+    SettingsError
+        Naming the setting, its value and the nearest name.
+    """
+    settings = settings or Settings()
+    changed: dict[str, dict[str, Any]] = {}
+    home = {name: section for section in SECTIONS for name in _names_of(section)}
+    for name, value in values.items():
+        if name not in home:
+            raise SettingsError(f"There is no setting {name!r}.{_nearest(name, home)}")
+        changed.setdefault(home[name], {})[name] = value
+    try:
+        sections = {
+            section: type(getattr(settings, section))(
+                **{**dict(getattr(settings, section)), **given}
+            )
+            for section, given in changed.items()
+        }
+    except ValidationError as error:
+        raise SettingsError(_explain(error)) from None
+    return settings.model_copy(update=sections)
+
+
+def _names_of(section: str) -> tuple[str, ...]:
+    model: type[Section] = Settings.model_fields[section].annotation  # type: ignore[assignment]
+    return tuple(model.model_fields)
 
 
 def from_mapping(values: Mapping[str, Any]) -> Settings:
     """Settings as a product recorded them; names that are gone since are passed over."""
     known: dict[str, Any] = {}
     for section in SECTIONS[:-1]:  # what may be reached, a product does not say
-        fields = Settings.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
         recorded = values.get(section, {})
+        if not isinstance(recorded, Mapping):
+            raise SettingsError(f"The recorded settings are damaged: {section} is no section.")
+        fields = _names_of(section)
         known[section] = {name: recorded[name] for name in recorded if name in fields}
     try:
         return Settings(**known)
@@ -333,10 +429,30 @@ def _explain(error: ValidationError) -> str:
     for problem in error.errors():
         name = ".".join(str(part) for part in problem["loc"])
         # Sources hold keys; a message must not.
-        given = (
-            ""
-            if {"sources", "keys"} & set(problem["loc"])
-            else f" (given: {problem.get('input')!r})"
+        secret = {"sources", "keys"} & set(problem["loc"])
+        given = [] if secret else [f"given: {problem.get('input')!r}"]
+        message = problem["msg"].removeprefix("Value error, ")
+        near = ""
+        if problem["type"] == "extra_forbidden":
+            message = "there is no such setting"
+            section = str(problem["loc"][0])
+            within = _names_of(section) if section in SECTIONS and len(problem["loc"]) == 2 else ()
+            near = _nearest(str(problem["loc"][-1]), within)
+        elif problem["type"] in ("literal_error", "value_error"):
+            choices = re.findall(r"'([^']+)'", message) or get_args(DirectionName)
+            near = _nearest(str(problem.get("input")), choices)
+        words = "; ".join([*given, *([near.strip()] if near else [])])
+        lines.append(
+            f"{name}: {message[:1].lower()}{message[1:]}" + (f" ({words})" if words else "")
         )
-        lines.append(f"{name}: {problem['msg'].lower()}{given}")
     return "Settings are not valid: " + "; ".join(lines) + "."
+
+
+def _nearest(given: str, names: Iterable[str]) -> str:
+    """A sentence with the nearest of some names, or nothing."""
+    close = difflib.get_close_matches(given.lower(), list(names), n=1, cutoff=0.5)
+    return f" Did you mean {close[0]!r}?" if close else ""
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(repr(name) for name in names)

@@ -81,15 +81,17 @@ def field(
     IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline
     touches the window's edge, the window grows as far as the picture reaches.
     """
+    # Before the large imports: a typo is told at once.
+    from geofield.settings import load_settings
+
+    settings = load_settings(settings_file, section_values(options))
     from geofield.cli.imagery_tools import as_picture
     from geofield.pipeline import open_scene
-    from geofield.settings import load_settings
 
     if boundary is not None and (regions or list_regions):
         raise click.UsageError("--boundary takes a parcel as it is: leave --list and --region out.")
     if not list_regions and output is None:
         raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
-    settings = load_settings(settings_file, section_values(options))
     with (
         progress_bar(quiet=as_json) as progress,
         as_picture(imagery, settings, lat=lat, lon=lon, progress=progress) as picture,

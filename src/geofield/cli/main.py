@@ -119,7 +119,7 @@ def main(args: list[str] | None = None) -> None:
             sys.exit(1)
         except GeofieldError as error:
             say_error(error.message, error.hint)
-            sys.exit(1)
+            sys.exit(error.exit_code)
         except BrokenPipeError:
             # The reader of our output (head, less) has gone: not our failure.
             sys.stderr.close()

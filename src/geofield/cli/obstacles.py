@@ -49,12 +49,14 @@ def obstacles(
     rejected or drew in FIELD.gpkg stay as they are; the tracks are removed, for they no
     longer fit: run `geofield tracks` next.
     """
-    from geofield.pipeline import run_obstacles, scene_of_plan
-    from geofield.plan import read_plan
-    from geofield.plan_files import save_plan
+    # Before the large imports: a typo is told at once.
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.pipeline import run_obstacles, scene_of_plan
+    from geofield.plan import read_plan
+    from geofield.plan_files import save_plan
+
     plan = read_plan(plan_file)
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
     save_plan(plan, output, read_from=plan_file, overwrite=overwrite)

@@ -6,6 +6,7 @@ section into click options with the same types, defaults and help.
 
 from __future__ import annotations
 
+import difflib
 import math
 import types
 import typing
@@ -37,6 +38,19 @@ class Degrees(click.FloatRange):
         if not math.isfinite(angle):
             self.fail(f"{value!r} is not an angle.", param, ctx)
         return angle
+
+
+class NearestChoice(click.Choice[str]):
+    """A choice whose refusal names the nearest one."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The choice as it is spelt."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            close = difflib.get_close_matches(str(value).lower(), self.choices, n=1, cutoff=0.5)
+            near = f" Did you mean {close[0]!r}?" if close else ""
+            raise click.BadParameter(error.message + near, ctx, param) from None
 
 
 def point_options(command: Command) -> Command:
@@ -122,7 +136,7 @@ def _click_type(annotation: Any) -> dict[str, Any]:
         plain = [each for each in arguments if each is not type(None)]
         return _click_type(plain[0]) if len(plain) == 1 else {"type": str}
     if origin is Literal:
-        return {"type": click.Choice([str(each) for each in arguments])}
+        return {"type": NearestChoice([str(each) for each in arguments])}
     if origin is tuple:
         inner = _click_type(arguments[0])
         if len(arguments) == 2 and arguments[1] is Ellipsis:

@@ -77,11 +77,13 @@ def run(
     Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
     Shapefiles, RDF, a map picture and report.json.
     """
-    from geofield.cli.imagery_tools import as_picture
-    from geofield.pipeline import plan_field
+    # Before the large imports: a typo is told at once.
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.cli.imagery_tools import as_picture
+    from geofield.pipeline import plan_field
+
     _refuse_occupied(out, settings, overwrite=overwrite)
     previous = None if fresh else _previous(out)
     timings: dict[str, float] = {}

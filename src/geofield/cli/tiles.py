@@ -130,6 +130,11 @@ def tiles(
     is exact. Tiles are kept in a cache where the source's terms allow it: an interrupted
     download goes on where it stopped.
     """
+    # Before the large imports: a typo is told at once.
+    from geofield.settings import load_settings
+
+    allow = section_values({"fetch__allow": place.pop("fetch__allow")})
+    settings = load_settings(settings_file, allow)
     from geofield.cli.imagery_tools import (
         cache_dir_of,
         describe,
@@ -138,11 +143,8 @@ def tiles(
         where_json,
     )
     from geofield.imagery import acquire
-    from geofield.settings import load_settings
 
-    allow = section_values({"fetch__allow": place.pop("fetch__allow")})
     where = _where(lat, lon, area, place)
-    settings = load_settings(settings_file, allow)
     folder = None if no_cache else cache_dir_of(settings, cache_dir)
     options = replace(
         fetch_options(settings, folder),

@@ -58,13 +58,15 @@ def tracks(
     all that a person changed; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...),
     each of which is a field.
     """
+    # Before the large imports: a typo is told at once.
+    from geofield.settings import load_settings
+
+    settings = load_settings(settings_file, section_values(options))
     from geofield.cli.polygon_files import obstacles_of, plans_of, with_obstacles
     from geofield.errors import GeofieldError, TrackError
     from geofield.pipeline import run_tracks
     from geofield.plan_files import save_plan
-    from geofield.settings import load_settings
 
-    settings = load_settings(settings_file, section_values(options))
     plans, is_plan = plans_of(file, crs=crs)
     standing = None if obstacle_file is None else obstacles_of(obstacle_file, crs=crs)
     several = len(plans) > 1
