@@ -37,28 +37,30 @@ print(turtle.name, f"{turtle.stat().st_size / 1024:.0f} kB")
 # %% [markdown]
 # ## What it looks like
 #
-# One node per feature; its address is built from the field's place and its number, so it is the
-# same after every run. (Set a base address of your own before you publish.)
+# One node per feature; its address is built from the field's place, a digest of the survey or plan
+# it belongs to, and its number: the same after every run of the same work, and never shared with
+# another picture's or spacing's. (Set a base address of your own before you publish.)
 
 # %%
 text = turtle.read_text(encoding="utf-8")
-start = text.index("/obstacle/1>\n") if "/obstacle/1>\n" in text else text.index("gf:Obstacle")
-block = text[text.rindex("\n\n", 0, start) + 2 :].split("\n\n")[0]
+start = text.index("/obstacle/1> a ")
+block = text[text.rindex("\n", 0, start) + 1 :].split(" .\n")[0]
 print("\n".join(line if len(line) < 110 else line[:107] + "..." for line in block.splitlines()))
 
 # %% [markdown]
 # ## Questions
 #
-# Counts per class:
+# The plan is a graph of rdflib, too: what any program gets from the file. Counts per class:
 
 # %%
-graph = rdflib.Graph().parse(turtle)
+graph = plan.to_graph()
+assert isinstance(graph, rdflib.Graph)
 PREFIXES = """
 PREFIX gf: <https://w3id.org/geofield#>
 PREFIX geo: <http://www.opengis.net/ont/geosparql#>
 PREFIX prov: <http://www.w3.org/ns/prov#>
 PREFIX dcat: <http://www.w3.org/ns/dcat#>
-PREFIX dcterms: <http://purl.org/dc/terms/>
+PREFIX dc: <http://purl.org/dc/elements/1.1/>
 PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#>
 """
 
@@ -89,8 +91,8 @@ print(counts.to_string(index=False))
 # %%
 large = ask(
     """
-    SELECT ?obstacle ?radius WHERE {
-      ?obstacle a gf:Obstacle ; gf:radiusInMetres ?radius .
+    SELECT ?number ?radius WHERE {
+      ?obstacle a gf:Obstacle ; gf:radiusInMetres ?radius ; gf:obstacleNo ?number .
     } ORDER BY DESC(?radius) LIMIT 5
     """
 )
@@ -102,10 +104,10 @@ print(large.to_string(index=False))
 # %%
 gaps = ask(
     """
-    SELECT ?obstacle (COUNT(?gap) AS ?gaps) (SUM(?length) AS ?metres) WHERE {
+    SELECT ?number (COUNT(?gap) AS ?gaps) (SUM(?length) AS ?metres) WHERE {
       ?gap a gf:Gap ; gf:causedBy ?obstacle ; geo:hasMetricLength ?length .
-      ?obstacle a gf:Obstacle .
-    } GROUP BY ?obstacle ORDER BY DESC(?metres) LIMIT 5
+      ?obstacle a gf:Obstacle ; gf:obstacleNo ?number .
+    } GROUP BY ?number ORDER BY DESC(?metres) LIMIT 5
     """
 )
 print(gaps.to_string(index=False))
@@ -119,7 +121,7 @@ print(
         """
         SELECT ?picture ?rights ?software WHERE {
           ?data a dcat:Dataset ; prov:wasDerivedFrom ?image ; prov:wasGeneratedBy ?run .
-          ?image rdfs:label ?picture . OPTIONAL { ?image dcterms:rights ?rights }
+          ?image rdfs:label ?picture . OPTIONAL { ?image dc:rights ?rights }
           ?run prov:wasAssociatedWith ?agent . ?agent rdfs:label ?software .
         }
         """

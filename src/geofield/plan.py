@@ -24,6 +24,7 @@ from geofield.model.tracks import Tracks
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    import rdflib
     from matplotlib.axes import Axes
 
     from geofield.settings import Settings
@@ -182,6 +183,7 @@ class Plan:
         formats: Sequence[str] | None = None,
         overwrite: bool = False,
         options: Mapping[str, Any] | None = None,
+        points: bool | None = None,
         timings_s: Mapping[str, float] | None = None,
         inputs: Sequence[str | Path] = (),
     ) -> list[Path]:
@@ -197,6 +199,9 @@ class Plan:
             Replace products that are there already.
         options : mapping, optional
             Options of single formats, by format name.
+        points : bool, optional
+            Track points in linked data, too, of which they are most of the bytes; as the
+            settings say when not given. Other formats have them anyway.
         timings_s : mapping, optional
             Seconds per stage, for the report.
         inputs : sequence of path
@@ -207,13 +212,15 @@ class Plan:
         list of Path
             The files, in the order written.
         """
+        from geofield.formats import format_named
         from geofield.products import write_products
+        from geofield.settings import ExportSettings
 
-        if formats is None:
-            from geofield.settings import ExportSettings
-
-            export = self.settings.export if self.settings else ExportSettings()
-            formats = export.formats
+        export = self.settings.export if self.settings else ExportSettings()
+        formats = export.formats if formats is None else formats
+        wanted = export.points if points is None else points
+        if wanted and any("points" in format_named(name).options for name in formats):
+            options = {"points": True, **(options or {})}
         return write_products(
             self.to_dataset(),
             self.scene,
@@ -243,6 +250,22 @@ class Plan:
         from geofield.plotting import plot_dataset
 
         return plot_dataset(self.to_dataset(), self.scene, ax)
+
+    def to_graph(self, *, base_iri: str | None = None, points: bool = False) -> rdflib.Graph:
+        """The plan as a graph of rdflib, prefixes bound: what the RDF files hold.
+
+        >>> len(plan.to_graph().query("SELECT ?o { ?o a gf:Obstacle }"))  # doctest: +SKIP
+
+        Parameters
+        ----------
+        base_iri : str, optional
+            Under which features are named; an address you control.
+        points : bool
+            Track points, too.
+        """
+        from geofield.formats.rdf.write import to_graph
+
+        return to_graph(self.to_dataset(), {"base_iri": base_iri, "points": points})
 
     def explore(self, *, height_px: int = 560) -> PlanPage:
         """The plan as an interactive map in a notebook; works without a network.

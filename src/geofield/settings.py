@@ -274,6 +274,7 @@ class ExportSettings(Section):
     formats: tuple[FormatName, ...] = Field(
         ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
     )
+    points: bool = Field(False, description="Track points in linked data, too: most of its bytes.")
 
 
 class Settings(Section):

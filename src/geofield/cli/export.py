@@ -40,7 +40,11 @@ Examples:
     help="Names and columns of Shapefiles.",
 )
 @click.option("--zip", "zipped", is_flag=True, help="Shapefiles or ISOXML in one archive.")
-@click.option("--points/--no-points", default=None, help="Track points in the GeoPackage.")
+@click.option(
+    "--points/--no-points",
+    default=None,
+    help="Track points: by default in the GeoPackage and the study's files, not in other RDF.",
+)
 @click.option(
     "--option", "further", multiple=True, metavar="NAME=VALUE", help="Further option of a format."
 )

@@ -56,6 +56,13 @@ Examples (on the project's own sample):
 @click.option(
     "--format", "export__formats", multiple=True, help="Format to write; repeat for several."
 )
+@click.option(
+    "--points",
+    "export__points",
+    is_flag=True,
+    default=None,
+    help="Track points in linked data, too: most of its bytes.",
+)
 def run(
     imagery: str,
     lat: float,

@@ -13,261 +13,187 @@ from pyproj import CRS
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
-from geofield.formats.rdf.namespaces import GEO, GF, GML, STUDY_POINT, expand
-from geofield.formats.rdf.parse import Graph
-from geofield.formats.rdf.problem import Problem
+from geofield.formats.rdf.namespaces import GML, STUDY_POINT, expand
+from geofield.formats.rdf.parse import Graph, Problem
 from geofield.formats.rdf.scope import track_of
 from geofield.formats.rdf.wkt import geometry_of
 
 #: Farther than this from its field, in degrees (about 10 km), nothing belongs to it.
 _FAR_DEG = 0.1
+#: A position may lie this far from its geometry, in degrees (about 100 m).
+_NEAR_DEG = 0.001
 #: A geometry in the metric CRS may differ from the same in CRS84 by this.
 _SAME_PLACE_M = 1.0
+#: Links and the class of what they point to.
+_LINKS = {
+    "gf:onTrack": "gf:Track", "gf:onSegment": "gf:Segment", "gf:causedBy": "gf:Obstacle",
+    "gf:fromTrack": "gf:Track", "gf:toTrack": "gf:Track", "gf:inField": "gf:Field",
+    "gf:inSurvey": "gf:Survey", "gf:basedOn": "gf:Survey", "geo:hasGeometry": "geo:Geometry",
+    "geo:hasDefaultGeometry": "geo:Geometry",
+}  # fmt: skip
+_AXES = "In CRS84 the longitude comes first."
+
+Bounds = tuple[float, float, float, float]
 
 
 def check_graph(graph: Graph) -> Iterator[Problem]:
-    """Everything that is wrong with the graph as a whole.
-
-    Parameters
-    ----------
-    graph : Graph
-        Of one file, or of the files of one plan together.
-    """
-    yield from _unnamed(graph)
+    """Everything that is wrong with a graph as a whole: one file, or the files of one plan."""
     yield from _double_numbers(graph)
     yield from _dangling(graph)
-    shapes = _Geometries(graph)
-    yield from shapes.problems
-    yield from _positions(graph, shapes)
-    yield from _places(graph, shapes)
-
-
-def _unnamed(graph: Graph) -> Iterator[Problem]:
-    for layer in layer_maps():
-        for iri in graph.of_type(*classes(layer)):
-            if ":" not in iri:
-                yield Problem(
-                    f"A {layer.cls} has no IRI.",
-                    f"_:{iri}",
-                    hint="Name it, or it cannot be merged with other data.",
-                    rule="no-blank-nodes",
-                )
+    bounds: dict[str, Bounds] = {}
+    for iri, node in graph.nodes.items():
+        for text in node.get(expand("geo:asWKT"), ())[:1]:
+            yield from _geometry(iri, text, bounds)
+    yield from _positions(graph, bounds)
+    yield from _places(graph, bounds)
 
 
 def _double_numbers(graph: Graph) -> Iterator[Problem]:
-    """Numbers that must be unique: in the field, in the plan, on the track."""
+    """Numbers that must be unique: in the survey, in the plan, on the track."""
+    seen: dict[tuple[Any, ...], str] = {}
     for layer in layer_maps():
-        if not layer.layer.key or layer.layer.name == "field":
-            continue
-        seen: dict[tuple[Any, ...], str] = {}
-        for iri in graph.of_type(*classes(layer)):
-            key = _key(graph, layer, iri)
-            if key is None:
-                continue
-            first = seen.setdefault(key, iri)
-            if first != iri:
-                title = layer.layer.column(layer.layer.key[-1]).title.lower()
-                yield Problem(
-                    f"Has the same {title} number {key[-1]} as <{first}>.",
-                    f"<{iri}>",
-                    hint="Give each its own number.",
-                    rule="unique-number",
-                )
-    yield from _double_study_points(graph)
-
-
-def _double_study_points(graph: Graph) -> Iterator[Problem]:
-    seen: dict[str, str] = {}
+        title = layer.layer.column(layer.layer.key[-1]).title.lower()
+        for iri in graph.of_type(*classes(layer)) if layer.layer.name != "field" else ():
+            yield from _double(seen, iri, title, _key(graph, layer, iri))
     for iri in graph.of_type(GML + "point"):
         number = graph.value(iri, STUDY_POINT + "no")
-        if number is not None and seen.setdefault(number, iri) != iri:
-            yield Problem(
-                f"Has the same point number {number} as <{seen[number]}>.",
-                f"<{iri}>",
-                hint="Give each its own number.",
-                rule="unique-number",
-            )
+        yield from _double(seen, iri, "point", number and (GML, number))
+
+
+def _double(
+    seen: dict[tuple[Any, ...], str], iri: str, title: str, key: tuple[Any, ...] | Any
+) -> Iterator[Problem]:
+    if key and seen.setdefault(key, iri) != iri:
+        message = f"Has the same {title} number {key[-1]} as <{seen[key]}>."
+        yield Problem(message, f"<{iri}>", None, "Give each its own number.", "unique-number")
 
 
 def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
-    """What must be unique: the owner, then the layer's own key numbers."""
-    owners = ("gf:onTrack", "gf:inPlan", "gf:inSurvey", "gf:inField")
+    """What must be unique: layer and owner, then the layer's own key numbers."""
+    owners = ["gf:onTrack", "gf:inPlan", "gf:inSurvey", "gf:inField"]
     owner = next(filter(None, (graph.value(iri, name) for name in owners)), None)
-    linked = {link.column for link in layer.links}
     if layer.layer.name == "track_points":
         # Points are numbered through the whole plan, not per track.
         owner = graph.value(track_of(graph, iri), "gf:inPlan")
     elif layer.layer.name == "route":
         owner = graph.value(iri, "gf:inPlan")
     names = {column.name: name for column, name in layer.properties()}
-    numbers = [graph.value(iri, expand(names[key])) for key in layer.layer.key if key not in linked]
-    if any(number is None for number in numbers):
-        return None
-    return (owner, *numbers)
+    numbers = [graph.value(iri, names[key]) for key in layer.layer.key if key in names]
+    return None if None in numbers else (layer.layer.name, owner, *numbers)
 
 
 def _dangling(graph: Graph) -> Iterator[Problem]:
     """Links to things of a class of which the file has some, but not this one."""
     present = {each.cls: set(graph.of_type(*classes(each))) for each in layer_maps()}
     present["gf:Field"] = set(graph.of_type("gf:Field"))
-    present["geo:Geometry"] = {iri for iri, node in graph.nodes.items() if GEO + "asWKT" in node}
-    links = {
-        GF + "onTrack": "gf:Track", GF + "onSegment": "gf:Segment", GF + "causedBy": "gf:Obstacle",
-        GF + "fromTrack": "gf:Track", GF + "toTrack": "gf:Track", GF + "inField": "gf:Field",
-        GF + "inSurvey": "gf:Survey", GF + "basedOn": "gf:Survey",
-        GEO + "hasDefaultGeometry": "geo:Geometry", GEO + "hasGeometry": "geo:Geometry",
-    }  # fmt: skip
+    wkt = expand("geo:asWKT")
+    present["geo:Geometry"] = {iri for iri, node in graph.nodes.items() if wkt in node}
+    links = [(expand(name), cls, present[cls]) for name, cls in _LINKS.items()]
     for iri, node in graph.nodes.items():
-        for predicate, cls in links.items():
+        for predicate, cls, known in links:
             for target in dict.fromkeys(node.get(predicate, ())):
-                known = present[cls]
-                own_geometry = cls == "geo:Geometry" and target not in known
-                if own_geometry or (known and target not in known):
-                    yield Problem(
-                        f"Points to <{target}>, which is no {cls} of this file.",
-                        f"<{iri}>",
-                        rule="dangling-link",
-                    )
+                if target not in known and (known or cls == "geo:Geometry"):
+                    message = f"Points to <{target}>, which is no {cls} of this file."
+                    yield Problem(message, f"<{iri}>", rule="dangling-link")
 
 
-class _Geometries:
-    """Every literal, parsed once; lon/lat bounds for the checks of place."""
-
-    def __init__(self, graph: Graph) -> None:
-        self.shapes: dict[str, tuple[Any, CRS]] = {}
-        self.problems: list[Problem] = []
-        for iri, node in graph.nodes.items():
-            for text in node.get(GEO + "asWKT", ())[:1]:
-                try:
-                    self.shapes[iri] = geometry_of(text, iri)
-                except FormatError as error:
-                    message = error.message.split(">: ", 1)[-1]
-                    self.problems.append(
-                        Problem(
-                            message[0].upper() + message[1:],
-                            f"<{iri}>",
-                            hint=error.hint or "",
-                            rule="wkt",
-                        )
-                    )
-        for iri, (shape, crs) in self.shapes.items():
-            if crs.is_geographic and not _on_earth(shape):
-                self.problems.append(
-                    Problem(
-                        "Its coordinates are not longitudes and latitudes on earth "
-                        f"({_first_pair(shape)}).",
-                        f"<{iri}>",
-                        hint="Are they metres, or latitude before longitude?",
-                        rule="lonlat-range",
-                    )
-                )
-            elif not shapely.is_valid(shape):
-                self.problems.append(
-                    Problem(
-                        f"Its shape is not valid: {shapely.is_valid_reason(shape)}.",
-                        f"<{iri}>",
-                        rule="valid-shape",
-                    )
-                )
-
-    def bounds_lonlat(self, iri: str) -> tuple[float, float, float, float] | None:
-        """West, south, east, north of a geometry; None where nobody can say."""
-        if iri not in self.shapes:
-            return None
-        shape, crs = self.shapes[iri]
-        west, south, east, north = shapely.bounds(shape).tolist()
-        if not crs.is_geographic:
-            project = transformer(crs, LONLAT)
-            (west, east), (south, north) = project.transform([west, east], [south, north])
-        bounds = (west, south, east, north)
-        return bounds if all(map(math.isfinite, bounds)) else None
-
-
-def _positions(graph: Graph, shapes: _Geometries) -> Iterator[Problem]:
-    """Positions against geometries, and a feature's geometries against each other."""
-    for iri, node in graph.nodes.items():
-        default = node.get(GEO + "hasDefaultGeometry", [None])[0]
-        bounds = shapes.bounds_lonlat(default) if default else None
-        if bounds is None:
-            continue
-        lat = _float(node.get(expand("wgs84:lat"), [""])[0])
-        lon = _float(node.get(expand("wgs84:long"), [""])[0])
-        if lat is not None and lon is not None:
-            if not _near(bounds, lon, lat, 0.001) and _near(bounds, lat, lon, 0.001):
-                yield Problem(
-                    f"Its geometry has latitude and longitude swapped (lat {lat}, long {lon}).",
-                    f"<{iri}>",
-                    hint="In CRS84 the longitude comes first.",
-                    rule="swapped-axes",
-                )
-            elif not _near(bounds, lon, lat, 0.001):
-                yield Problem(
-                    f"Its geometry is not at its position (lat {lat}, long {lon}).",
-                    f"<{iri}>",
-                    rule="position",
-                )
-        for other in dict.fromkeys(node.get(GEO + "hasGeometry", ())):
-            theirs = shapes.bounds_lonlat(other) if other != default else None
-            if theirs is not None and not _same(bounds, theirs):
-                yield Problem(
-                    f"Its geometries <{default}> and <{other}> are not the same place.",
-                    f"<{iri}>",
-                    hint="Check CRS and axis order of the second.",
-                    rule="geometries-agree",
-                )
-
-
-def _places(graph: Graph, shapes: _Geometries) -> Iterator[Problem]:
-    """Features far outside their field."""
-    fields = {}
-    for iri in graph.of_type(GF + "Field"):
-        bounds = shapes.bounds_lonlat(graph.value(iri, GEO + "hasDefaultGeometry") or "")
-        if bounds is not None:
-            fields[iri] = bounds
-    if len(fields) != 1:
+def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Problem]:
+    """What is wrong with a literal; its bounds in longitude and latitude go into `bounds`."""
+    try:
+        shape, crs = geometry_of(text, iri)
+    except FormatError as error:
+        message = error.message.split(">: ", 1)[-1]
+        yield Problem(message, f"<{iri}>", None, error.hint or "", "wkt").capital()
         return
-    ((field, home),) = fields.items()
+    box = _lonlat_bounds(shape, crs)
+    if box is not None:
+        bounds[iri] = box
+    if crs.is_geographic and (box is None or not _inside((-180, -90, 180, 90), *box)):
+        pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
+        message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
+        hint = "Are they metres, or latitude before longitude?"
+        yield Problem(message, f"<{iri}>", None, hint, "lonlat-range")
+    elif not shapely.is_valid(shape):
+        message = f"Its shape is not valid: {shapely.is_valid_reason(shape)}."
+        yield Problem(message, f"<{iri}>", rule="valid-shape")
+
+
+def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
+    west, south, east, north = shapely.bounds(shape).tolist()
+    if not crs.is_geographic:
+        project = transformer(crs, LONLAT)
+        (west, east), (south, north) = project.transform([west, east], [south, north])
+    return (
+        (west, south, east, north) if all(map(math.isfinite, (west, south, east, north))) else None
+    )
+
+
+def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
+    """Positions against geometries, and a feature's geometries against each other."""
+    for iri in graph.nodes:
+        default = graph.value(iri, "geo:hasDefaultGeometry")
+        box = bounds.get(default or "")
+        if box is None:
+            continue
+        lat, lon = (_float(graph.value(iri, f"wgs84:{name}")) for name in ("lat", "long"))
+        if lat is not None and lon is not None and not _near(box, lon, lat, _NEAR_DEG):
+            swapped = _near(box, lat, lon, _NEAR_DEG)
+            words = "has latitude and longitude swapped" if swapped else "is not at its position"
+            message = f"Its geometry {words} (lat {lat}, long {lon})."
+            rule = "swapped-axes" if swapped else "position"
+            yield Problem(message, f"<{iri}>", None, _AXES if swapped else "", rule)
+        for other in graph.values(iri, "geo:hasGeometry"):
+            if other in bounds and not _same(box, bounds[other]) and _of_one(default, other):
+                message = f"Its geometries <{default}> and <{other}> are not the same place."
+                hint = "Check CRS and axis order of the second."
+                yield Problem(message, f"<{iri}>", None, hint, "geometries-agree")
+
+
+def _of_one(default: str | None, other: str) -> bool:
+    """Whether two geometries should be one place: a field has one for each of its surveys."""
+    return "/survey/" not in other or other.startswith(default or "")
+
+
+def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
+    """Features far outside their field."""
+
+    def place(iri: str) -> Bounds | None:
+        return bounds.get(graph.value(iri, "geo:hasDefaultGeometry") or "")
+
+    homes = [box for box in map(place, graph.of_type("gf:Field")) if box is not None]
+    if len(homes) != 1:
+        return
     for layer in layer_maps():
         for iri in graph.of_type(*classes(layer)):
-            bounds = shapes.bounds_lonlat(graph.value(iri, GEO + "hasDefaultGeometry") or "")
-            if bounds is None or iri == field or _near(home, bounds[0], bounds[1], _FAR_DEG):
+            box = place(iri)
+            if box is None or _near(homes[0], box[0], box[1], _FAR_DEG):
                 continue
-            swapped = _near(home, bounds[1], bounds[0], _FAR_DEG)
-            yield Problem(
-                "Has latitude and longitude swapped." if swapped else "Lies far outside its field.",
-                f"<{iri}>",
-                hint="In CRS84 the longitude comes first." if swapped else "",
-                rule="swapped-axes" if swapped else "far-outside",
-            )
+            if _near(homes[0], box[1], box[0], _FAR_DEG):
+                message = "Has latitude and longitude swapped."
+                yield Problem(message, f"<{iri}>", None, _AXES, "swapped-axes")
+            else:
+                yield Problem("Lies far outside its field.", f"<{iri}>", rule="far-outside")
 
 
-def _near(bounds: tuple[float, float, float, float], lon: float, lat: float, margin: float) -> bool:
-    west, south, east, north = bounds
+def _inside(outer: Bounds | tuple[int, ...], *inner: float) -> bool:
+    west, south, east, north = inner
+    return bool(west >= outer[0] and south >= outer[1] and east <= outer[2] and north <= outer[3])
+
+
+def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:
+    west, south, east, north = box
     return west - margin <= lon <= east + margin and south - margin <= lat <= north + margin
 
 
-def _same(
-    mine: tuple[float, float, float, float], theirs: tuple[float, float, float, float]
-) -> bool:
+def _same(mine: Bounds, theirs: Bounds) -> bool:
     # Bounds of a reprojected box differ by the grid's rotation: a tenth of its size.
     size = max(mine[2] - mine[0], mine[3] - mine[1])
-    slack = _SAME_PLACE_M / 111_000.0 + 0.1 * size
-    return bool(np.allclose(mine, theirs, rtol=0.0, atol=slack))
+    return bool(np.allclose(mine, theirs, rtol=0.0, atol=_SAME_PLACE_M / 111_000.0 + 0.1 * size))
 
 
-def _on_earth(shape: Any) -> bool:
-    west, south, east, north = shapely.bounds(shape).tolist()
-    return bool(west >= -180 and east <= 180 and south >= -90 and north <= 90)
-
-
-def _first_pair(shape: Any) -> str:
-    x, y = shapely.get_coordinates(shape)[0].tolist()
-    return f"{x:g} {y:g}"
-
-
-def _float(text: str) -> float | None:
+def _float(text: str | None) -> float | None:
     try:
-        value = float(text)
+        value = float(text or "")
     except ValueError:
         return None
     return value if math.isfinite(value) else None

@@ -9,25 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from geofield import schema
 from geofield.formats.rdf.namespaces import expand
 
 #: Columns whose property is not simply their own name in camel case.
-_COLUMN_TERMS: dict[str, str] = {
-    "field_id": "dcterms:identifier",
-    "name": "rdfs:label",
-    "perimeter_m": "geo:hasMetricPerimeterLength",
-    "method": "gf:outlineMethod",
-    "imagery": "gf:imageryName",
-    "licence": "dc:rights",
-    "x_px": "gf:pixelX",
-    "y_px": "gf:pixelY",
-    "radius_px": "gf:pixelRadius",
-    "lat": "wgs84:lat",
-    "lon": "wgs84:long",
-    "length_m": "geo:hasMetricLength",
-}
+_COLUMN_TERMS = {
+    "field_id": "dcterms:identifier", "name": "rdfs:label", "method": "gf:outlineMethod",
+    "perimeter_m": "geo:hasMetricPerimeterLength", "length_m": "geo:hasMetricLength",
+    "imagery": "gf:imageryName", "licence": "dc:rights", "x_px": "gf:pixelX", "y_px": "gf:pixelY",
+    "radius_px": "gf:pixelRadius", "lat": "wgs84:lat", "lon": "wgs84:long",
+}  # fmt: skip
 #: Endings of column names and the words that tell the unit in a property's name.
 _UNIT_WORDS = {"_m": "InMetres", "_deg": "InDegrees", "_ha": "InHectares", "_px": "InPixels"}
 #: Columns whose values are things of a code list.
@@ -50,19 +43,14 @@ class Link:
         Prefixed name.
     target : str
         The other layer; the link is made from its key columns.
-    key : str
-        The key column that the number is, where it has another name there.
+    target_key : str
+        The key column of the other layer that the number is.
     """
 
     column: str
     predicate: str
     target: str
-    key: str = ""
-
-    @property
-    def target_key(self) -> str:
-        """The key column of the other layer that the number is."""
-        return self.key or self.column
+    target_key: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +71,8 @@ class LayerMap:
     label : str
         `rdfs:label` of the rows, with columns in braces; empty for none.
     links : tuple of Link
-    terms : tuple of (str, str)
-        Columns whose property differs from the one of that name elsewhere.
-    metric_geometry : bool
-        Whether rows have a second geometry in the metric CRS (points have coordinates).
+    terms : dict of str to str
+        Properties of columns that mean something else than elsewhere.
     says_plan : bool
         Whether rows link to their plan; parts of a track do so through the track.
     """
@@ -98,94 +84,67 @@ class LayerMap:
     in_plan: bool = True
     label: str = ""
     links: tuple[Link, ...] = ()
-    terms: tuple[tuple[str, str], ...] = ()
-    metric_geometry: bool = True
+    terms: dict[str, str] | None = None
     says_plan: bool = True
 
     def properties(self) -> list[tuple[schema.Column, str]]:
         """The columns that are properties, with prefixed names, in the layer's order."""
-        own = dict(self.terms)
         linked = {link.column for link in self.links}
         return [
-            (column, own.get(column.name) or column_term(column))
+            (column, (self.terms or {}).get(column.name) or column_term(column))
             for column in self.layer.columns
             if column.name not in linked
         ]
 
 
-_ON_TRACK = Link("track_no", "gf:onTrack", "tracks")
-_ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments")
+_ON_TRACK = Link("track_no", "gf:onTrack", "tracks", "track_no")
+_ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments", "segment_no")
+_OF_TRACK: dict[str, Any] = {"links": (_ON_TRACK,), "says_plan": False}
 
-_MAPS: dict[str, dict[str, object]] = {
+_MAPS: dict[str, dict[str, Any]] = {
     "field": {"cls": "gf:Survey", "path": "", "product": "field", "in_plan": False},
     "obstacles": {
-        "cls": "gf:Obstacle",
-        "path": "obstacle/{obstacle_no}",
-        "product": "obstacles",
-        "in_plan": False,
-        "label": "Obstacle {obstacle_no}",
+        "cls": "gf:Obstacle", "path": "obstacle/{obstacle_no}", "product": "obstacles",
+        "in_plan": False, "label": "Obstacle {obstacle_no}",
     },
     "tracks": {"cls": "gf:Track", "path": "track/{track_no}", "label": "Track {track_no}"},
-    "segments": {
-        "cls": "gf:Segment",
-        "path": "track/{track_no}/segment/{segment_no}",
-        "links": (_ON_TRACK,),
-        "says_plan": False,
-    },
+    "segments": {"cls": "gf:Segment", "path": "track/{track_no}/segment/{segment_no}", **_OF_TRACK},
     "gaps": {
-        "cls": "gf:Gap",
-        "path": "track/{track_no}/gap/{gap_no}",
-        "links": (_ON_TRACK,),
-        "terms": (("obstacle_no", "gf:causingObstacleNo"),),
-        "says_plan": False,
+        "cls": "gf:Gap", "path": "track/{track_no}/gap/{gap_no}", **_OF_TRACK,
+        "terms": {"obstacle_no": "gf:causingObstacleNo"},
     },
     "track_points": {
-        "cls": "gf:TrackPoint",
-        "path": "point/{point_no}",
+        "cls": "gf:TrackPoint", "path": "point/{point_no}", "says_plan": False,
         "links": (_ON_TRACK, _ON_SEGMENT),
-        "metric_geometry": False,
-        "says_plan": False,
     },
     "headland": {"cls": "gf:Headland", "path": "headland/{headland_no}"},
     "headland_tracks": {
-        "cls": "gf:HeadlandTrack",
-        "path": "headland-track/{pass_no}/segment/{segment_no}",
+        "cls": "gf:HeadlandTrack", "path": "headland-track/{pass_no}/segment/{segment_no}",
     },
     "route": {
-        "cls": "gf:RouteStep",
-        "path": "route/{sequence}",
-        "links": (_ON_TRACK, _ON_SEGMENT),
-        "terms": (("kind", "gf:stepKind"), ("direction", "gf:drivingDirection")),
+        "cls": "gf:RouteStep", "path": "route/{sequence}", "links": (_ON_TRACK, _ON_SEGMENT),
+        "terms": {"kind": "gf:stepKind", "direction": "gf:drivingDirection"},
     },
     "turns": {
-        "cls": "gf:Turn",
-        "path": "turn/{turn_no}",
+        "cls": "gf:Turn", "path": "turn/{turn_no}",
         "links": (
             Link("from_track", "gf:fromTrack", "tracks", "track_no"),
             Link("to_track", "gf:toTrack", "tracks", "track_no"),
         ),
-        "terms": (
-            ("kind", "gf:turnKind"),
-            ("direction", "gf:turnDirection"),
-            ("radius_m", "gf:turningRadiusInMetres"),
-        ),
+        "terms": {
+            "kind": "gf:turnKind", "direction": "gf:turnDirection",
+            "radius_m": "gf:turningRadiusInMetres",
+        },
     },
-}
+}  # fmt: skip
 
 
 @cache
 def layer_map(name: str) -> LayerMap:
     """How a layer becomes RDF: its entry, or the default for its schema."""
-    layer = schema.layer(name)
-    entry = _MAPS.get(name)
-    if entry is None:
-        single = name.removesuffix("s")
-        entry = {
-            "cls": f"gf:{camel('_' + single)}",
-            "path": "/".join([single.replace("_", "-"), *(f"{{{key}}}" for key in layer.key)]),
-            "metric_geometry": layer.geometry != "Point",
-        }
-    return LayerMap(layer, **entry)  # type: ignore[arg-type]
+    layer, single = schema.layer(name), name.removesuffix("s")
+    path = "/".join([single.replace("_", "-"), *(f"{{{key}}}" for key in layer.key)])
+    return LayerMap(layer, **_MAPS.get(name, {"cls": value_iri(single), "path": path}))
 
 
 def layer_maps() -> list[LayerMap]:
@@ -195,18 +154,11 @@ def layer_maps() -> list[LayerMap]:
 
 def column_term(column: schema.Column) -> str:
     """The prefixed name of a column's property."""
-    if column.name in _COLUMN_TERMS:
-        return _COLUMN_TERMS[column.name]
-    for ending, word in _UNIT_WORDS.items():
-        if column.name.endswith(ending):
-            return f"gf:{camel(column.name.removesuffix(ending))}{word}"
-    return f"gf:{camel(column.name)}"
-
-
-def camel(name: str) -> str:
-    """``some_column`` as ``someColumn``."""
-    head, *tail = name.split("_")
-    return head + "".join(part.capitalize() for part in tail)
+    name, words = column.name, ""
+    for ending, unit in _UNIT_WORDS.items():
+        if name.endswith(ending):
+            name, words = name.removesuffix(ending), unit
+    return _COLUMN_TERMS.get(column.name) or f"gf:{_camel(name)}{words}"
 
 
 def classes(layer: LayerMap) -> list[str]:
@@ -217,4 +169,9 @@ def classes(layer: LayerMap) -> list[str]:
 
 def value_iri(value: str) -> str:
     """A value of a code list (`kind`, `status`) as a prefixed name."""
-    return "gf:" + camel("_" + value)
+    return "gf:" + _camel("_" + value)
+
+
+def _camel(name: str) -> str:
+    head, *tail = name.split("_")
+    return head + "".join(part.capitalize() for part in tail)

@@ -1,9 +1,9 @@
-"""Parse: a file of any of the syntaxes as triples, strictly, without network."""
+"""Parse: a file of any of the syntaxes as triples, strictly, without network; what is wrong."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pyoxigraph as ox
@@ -100,3 +100,45 @@ class Graph:
             values = node.get(expand(predicate)) if node else None
             subject = values[0] if values else None
         return subject
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What a validator found.
+
+    Attributes
+    ----------
+    message : str
+        What is wrong, in plain words.
+    subject : str
+        What it is wrong with: an IRI in angle brackets, or the file.
+    line : int or None
+        At which the subject is described first, where that is known.
+    hint : str
+        What to do about it; empty where it is obvious.
+    rule : str
+        The rule that is broken, for programs: a shape's constraint and property, or a check.
+    """
+
+    message: str
+    subject: str = ""
+    line: int | None = None
+    hint: str = ""
+    rule: str = ""
+
+    @property
+    def place(self) -> str:
+        """The line and the subject."""
+        return ", ".join(filter(None, (f"line {self.line}" if self.line else "", self.subject)))
+
+    @property
+    def words(self) -> str:
+        """The message and what to do."""
+        return f"{self.message} {self.hint}".strip()
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.words}" if self.place else self.words
+
+    def capital(self) -> Problem:
+        """The same with a message that begins as a sentence."""
+        return replace(self, message=self.message[0].upper() + self.message[1:])

@@ -12,7 +12,7 @@ from geofield.errors import FormatError
 from geofield.formats.rdf.describe import PRODUCTS, Description
 from geofield.formats.rdf.jsonld import write_jsonld as write_json
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import PREFIXES, STUDY_PREFIXES
+from geofield.formats.rdf.namespaces import PREFIXES, STRING, STUDY_PREFIXES
 from geofield.formats.rdf.study import StudyDescription
 from geofield.formats.rdf.triples import Group, triples
 from geofield.model.dataset import Dataset
@@ -89,9 +89,24 @@ def product_name(stem: str, product: str) -> str:
 
 def to_graph(dataset: Dataset, options: Mapping[str, Any]) -> rdflib.Graph:
     """The dataset as an rdflib graph, prefixes bound; options as in :func:`write_rdfxml`."""
-    from geofield.formats.rdf.graph import as_rdflib
+    import rdflib
 
-    return as_rdflib(triples(describe(dataset, options).everything()), _prefixes(options))
+    graph = rdflib.Graph()
+    for prefix, namespace in _prefixes(options).items():
+        graph.bind(prefix, namespace, replace=True)
+    for each in triples(describe(dataset, options).everything()):
+        graph.add(tuple(map(_in_rdflib, each)))
+    return graph
+
+
+def _in_rdflib(term: Any) -> Any:
+    import rdflib
+
+    if isinstance(term, ox.NamedNode):
+        return rdflib.URIRef(term.value)
+    # A plain text is untyped in rdflib.
+    kind = None if term.datatype.value == STRING else rdflib.URIRef(term.datatype.value)
+    return rdflib.Literal(term.value, datatype=kind)
 
 
 def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
