@@ -2,7 +2,8 @@
 
 Products are written into a hidden folder inside the target folder (the same file system, so
 that `os.replace` is one step of the operating system) and moved when everything is there.
-When a move fails, files replaced before it are put back.
+When a move fails, files replaced before it are put back. Leftovers of runs that were killed
+are swept by the next one (see `leftovers`).
 """
 
 from __future__ import annotations
@@ -11,15 +12,16 @@ import errno
 import os
 import shutil
 import sqlite3
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 from geofield.errors import FormatError, OutputExistsError
+from geofield.leftovers import MOVING, PREFIX, alive, alone, sweep
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
-_STAGING_PREFIX = ".geofield-"
 
 
 @contextmanager
@@ -52,25 +54,46 @@ def staged_folder(
     """
     target, inputs = Path(folder), tuple(inputs)
     made = _make_folder(target)
+    sweep(target)
+    before = _seen(target)
     try:
-        staging = Path(tempfile.mkdtemp(prefix=_STAGING_PREFIX, dir=target))
+        staging = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
     except OSError as error:
         _remove_made(made)
         raise _cannot_write(target, error) from error
     done = False
     try:
-        work = staging / "new"
-        work.mkdir()
-        try:
-            yield work
-            _publish(work, target, staging / "old", overwrite, inputs)
-        except OSError as error:
-            raise _cannot_write(target, error) from error
-        done = True
+        with alive(staging):
+            work = staging / "new"
+            work.mkdir()
+            try:
+                yield work
+                with alone(target):
+                    _publish(work, target, staging, overwrite, inputs, before)
+            except OSError as error:
+                raise _cannot_write(target, error) from error
+            done = True
     finally:
         shutil.rmtree(staging, ignore_errors=True)
         if not done:
             _remove_made(made)
+
+
+#: Inode and time of change of files, by path.
+_Seen = dict[Path, tuple[int, int]]
+
+
+def _seen(target: Path) -> _Seen:
+    """What lies in a folder and one below, as far as it could be a product."""
+    found = {}
+    for place in (*target.glob("*"), *target.glob("*/*")):
+        try:
+            facts = place.stat()
+        except OSError:
+            continue
+        if not place.name.startswith(PREFIX) and stat.S_ISREG(facts.st_mode):
+            found[place] = (facts.st_ino, facts.st_mtime_ns)
+    return found
 
 
 @contextmanager
@@ -113,13 +136,32 @@ def _remove_made(made: list[Path]) -> None:
 
 
 def _publish(
-    work: Path, target: Path, old: Path, overwrite: bool, inputs: Iterable[Path | str]
+    work: Path,
+    target: Path,
+    staging: Path,
+    overwrite: bool,
+    inputs: Iterable[Path | str],
+    before: _Seen,
 ) -> None:
+    old = staging / "old"
     files = sorted(path for path in work.rglob("*") if path.is_file())
     pairs = [(path, target / path.relative_to(work)) for path in files]
+    now = _seen(target)
     for _, place in pairs:
+        if now.get(place) not in (None, before.get(place)):
+            raise OutputExistsError(
+                f"{place} was written by another program while this one worked: it is left as "
+                "it is now.",
+                hint="Repeat when the other one has finished.",
+            )
+        if not place.parent.resolve().is_relative_to(target.resolve()):
+            raise FormatError(
+                f"{place.parent} is a link that leads out of {target}: nothing was written.",
+                hint="Remove the link, or write to another folder.",
+            )
         _refuse(place, overwrite, inputs)
     moved: list[tuple[Path, Path | None]] = []
+    (staging / MOVING).touch()
     try:
         for source, place in pairs:
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -137,6 +179,7 @@ def _publish(
                 place.unlink(missing_ok=True)
             else:
                 kept.replace(place)
+        (staging / MOVING).unlink()
         raise
 
 

@@ -1,0 +1,203 @@
+"""Kills, leftovers and several processes on one folder: products are whole, or not there."""
+
+from __future__ import annotations
+
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from geofield.errors import FormatError, OutputExistsError
+from geofield.plan import read_plan
+from geofield.simulate import SimulatedField
+from geofield.staging import staged_folder
+
+GEOFIELD = Path(sys.executable).with_name("geofield")
+
+#: Writes two files that must agree, as often as it is asked to.
+WRITER = """
+import sys, time
+from pathlib import Path
+from geofield.errors import GeofieldError
+from geofield.staging import staged_folder
+target, mark, pause = Path(sys.argv[1]), sys.argv[2], float(sys.argv[3])
+try:
+    with staged_folder(target, overwrite=True) as folder:
+        (folder / "sub").mkdir()
+        for name in ("a.txt", "sub/b.txt"):
+            (folder / name).write_text(mark * 1000)
+            print("staged", flush=True)
+            time.sleep(pause)
+except GeofieldError as error:
+    sys.exit(str(error))
+"""
+
+
+def writer(target: Path, mark: str, pause_s: float) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(target), mark, str(pause_s)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    process.kill()
+    process.communicate()
+
+
+def leftovers(folder: Path) -> list[str]:
+    return [path.name for path in folder.glob(".geofield-*")]
+
+
+def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path: Path) -> None:
+    dead, living = writer(tmp_path, "d", 60), writer(tmp_path, "l", 60)
+    for each in (dead, living):
+        assert each.stdout is not None
+        each.stdout.readline()
+    kill(dead)
+    assert len(leftovers(tmp_path)) == 2
+    with staged_folder(tmp_path) as folder:
+        (folder / "mine.txt").write_text("mine")
+        assert len(leftovers(tmp_path)) == 2
+    (left,) = leftovers(tmp_path)
+    assert (tmp_path / left / "new" / "a.txt").read_text() == "l" * 1000
+    kill(living)
+    with staged_folder(tmp_path):
+        pass
+    assert leftovers(tmp_path) == []
+
+
+def test_a_move_that_a_kill_cut_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a.txt", "b.txt"):
+        (tmp_path / name).write_text("old")
+    code = WRITER.replace('"sub/b.txt"', '"b.txt"').replace(
+        "try:",
+        "import os, signal\nreplace = Path.replace\n"
+        "def once(self, place):\n    replace(self, place)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\nPath.replace = once\ntry:",
+        1,
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path, "n", "0"], check=False)
+    assert {(tmp_path / n).read_text()[:3] for n in ("a.txt", "b.txt")} == {"nnn", "old"}
+    with staged_folder(tmp_path):
+        pass
+    assert {(tmp_path / n).read_text()[:3] for n in ("a.txt", "b.txt")} == {"nnn"}
+    assert leftovers(tmp_path) == []
+
+
+def test_of_many_writers_one_wins_and_the_others_say_so(tmp_path: Path) -> None:
+    writers = [writer(tmp_path, mark, 0.5) for mark in "abcdef"]
+    told = [each.communicate(timeout=120)[1] for each in writers]
+    codes = [each.returncode for each in writers]
+    assert codes.count(0) >= 1
+    assert all("another program" in text for text, code in zip(told, codes, strict=True) if code)
+    assert (tmp_path / "a.txt").read_text() == (tmp_path / "sub/b.txt").read_text()
+    assert leftovers(tmp_path) == []
+
+
+def test_an_edit_made_meanwhile_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("first")
+
+    def overwrite() -> None:
+        with staged_folder(tmp_path, overwrite=True) as folder:
+            (folder / "a.txt").write_text("ours")
+            (tmp_path / "a.txt").write_text("a person's")
+
+    with pytest.raises(OutputExistsError, match="another program"):
+        overwrite()
+    assert (tmp_path / "a.txt").read_text() == "a person's"
+
+
+def test_links_in_the_output_folder_lead_nowhere(tmp_path: Path) -> None:
+    outside, target = tmp_path / "outside", tmp_path / "target"
+    for folder in (outside, target):
+        folder.mkdir()
+    (outside / "precious").write_text("mine")
+    (target / "a.txt").symlink_to(outside / "precious")
+    with staged_folder(target, overwrite=True) as folder:
+        (folder / "a.txt").write_text("new")
+    assert (outside / "precious").read_text() == "mine"
+    assert (target / "a.txt").read_text() == "new"
+    (target / "geojson").symlink_to(outside)
+
+    def through_the_link() -> None:
+        with staged_folder(target, overwrite=True) as folder:
+            (folder / "geojson").mkdir()
+            (folder / "geojson/precious").write_text("new")
+
+    with pytest.raises(FormatError, match="leads out of"):
+        through_the_link()
+    assert (outside / "precious").read_text() == "mine"
+
+
+@pytest.fixture(scope="module")
+def plan(
+    simulated: SimulatedField, simulated_tif: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    out = tmp_path_factory.mktemp("kills") / "out"
+    line = ["run", simulated_tif, "--lat", simulated.lat, "--lon", simulated.lon, "--out", out]
+    subprocess.run([GEOFIELD, *map(str, line), "--spacing", "8"], check=True, capture_output=True)
+    return out / "field.gpkg"
+
+
+def whole(plan: Path) -> None:
+    """A GeoPackage that opens, and whose tracks are of one planning."""
+    found = read_plan(plan)
+    assert found.tracks is not None
+    with sqlite3.connect(plan) as file:
+        assert file.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+
+
+@pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
+def test_a_stop_at_any_moment_leaves_products_whole(plan: Path, kind: signal.Signals) -> None:
+    dice = random.Random(int(kind))
+    for spacing in (5, 6, 7):
+        line = [GEOFIELD, "tracks", plan, "--spacing", str(spacing), "-o", plan]
+        with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as process:
+            time.sleep(dice.uniform(0.3, 2.5))
+            process.send_signal(kind)
+            _, told = process.communicate(timeout=60)
+        assert "Traceback" not in told
+        whole(plan)
+        if kind != signal.SIGKILL:
+            assert leftovers(plan.parent) == []
+    subprocess.run([GEOFIELD, "tracks", plan, "--spacing", "8", "-o", plan], check=True)
+    assert leftovers(plan.parent) == []
+
+
+def test_a_geopackage_that_another_program_edits_is_left_alone(plan: Path) -> None:
+    before = plan.read_bytes()
+    holder = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import sqlite3, sys, time; db = sqlite3.connect(sys.argv[1], isolation_level=None); "
+            "db.execute('BEGIN IMMEDIATE'); print('held', flush=True); time.sleep(300)",
+            plan,
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert holder.stdout is not None
+        holder.stdout.readline()
+        done = subprocess.run(
+            [GEOFIELD, "tracks", plan, "--spacing", "4", "-o", plan],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    finally:
+        kill(holder)
+    assert done.returncode == 1
+    assert "open in another program" in done.stderr
+    assert plan.read_bytes() == before
