@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geofield.mapping import OUTLINE, STATUS_COLOURS, draw_map
+from geofield import theme
+from geofield.mapping import draw_map
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import load_settings
@@ -43,11 +44,11 @@ def test_outline_and_circles_lie_where_the_grid_says(plan: Plan, simulated: Simu
     ring = np.array(simulated.field.polygon_px(grid).exterior.coords)
     for a, b in itertools.pairwise(ring):
         x, y = (a + b) / 2 * scale
-        assert near(picture, x, y, OUTLINE)
+        assert near(picture, x, y, theme.rgb(theme.OUTLINE))
     assert plan.obstacles is not None
     hits = []
     for row in plan.obstacles.itertuples():
-        colour = STATUS_COLOURS[row.status]
+        colour = theme.rgb(theme.STATUS[row.status].color)
         angles = np.radians(np.arange(0, 360, 10))
         x = (row.x_px + row.radius_px * np.cos(angles)) * scale
         y = (row.y_px + row.radius_px * np.sin(angles)) * scale
@@ -66,7 +67,7 @@ def test_the_map_is_the_same_twice_and_needs_no_picture(
     plain = draw_map(plan.to_dataset(), None, long_side_px=500)
     assert min(plain.size) > 300
     colours = np.asarray(plain).reshape(-1, 3)
-    assert (np.abs(colours.astype(int) - OUTLINE[:3]).max(axis=1) < 40).sum() > 200
+    assert (np.abs(colours.astype(int) - theme.rgb(theme.OUTLINE)).max(axis=1) < 40).sum() > 200
 
 
 def test_a_field_alone_is_drawn_too(simulated: SimulatedField) -> None:

@@ -8,36 +8,30 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from geofield import schema
+from geofield import schema, theme
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset
+from geofield.model.frame import along_frame
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-Colour = tuple[int, int, int, int]
+#: Red, green and blue; a fourth number is the opacity.
+Colour = tuple[int, ...]
 
-OUTLINE: Colour = (255, 221, 51, 255)
-TRACK: Colour = (90, 225, 255, 235)
-GAP: Colour = (255, 120, 60, 220)
-HEADLAND: Colour = (255, 170, 230, 220)
-STATUS_COLOURS: dict[str, Colour] = {
-    "possible": (255, 170, 0, 255),
-    "detected": (255, 60, 60, 255),
-    "confirmed": (60, 255, 110, 255),
-    "added": (190, 120, 255, 255),
-    "rejected": (190, 190, 190, 200),
-}
 _CASING: Colour = (0, 0, 0, 150)
+#: Line and space where an outline is the picture's frame, pixels.
+_FRAME_DASH = (9.0, 7.0)
 _INK: Colour = (255, 255, 255, 255)
 _PANEL: Colour = (20, 24, 28, 215)
 
@@ -45,6 +39,7 @@ _PANEL: Colour = (20, 24, 28, 215)
 LONG_SIDE_PX = 1400
 #: Drawn this much larger, then reduced: smooth lines.
 _OVERSAMPLING = 2
+_DOUBT_SIZE = 14
 #: At most this many numbers along the tracks' starts.
 _MAX_LABELS = 40
 
@@ -67,12 +62,13 @@ def draw_map(
     PIL.Image.Image
         RGB; the map with a panel below: legend, scale, north, figures, attribution.
     """
-    grid = scene.grid if scene is not None else _plain_grid(dataset)
+    margin_px = 0 if scene is None else _margin_px(dataset, scene.grid)
+    grid = _plain_grid(dataset) if scene is None else _widened(scene.grid, margin_px)
     scale = long_side_px / max(grid.width_px, grid.height_px)
     size = (max(1, round(grid.width_px * scale)), max(1, round(grid.height_px * scale)))
     canvas = _Canvas(grid, size, dataset)
     if scene is not None:
-        canvas.picture(scene)
+        canvas.picture(scene, margin_px)
     canvas.tables()
     picture = canvas.finish()
     return _with_panel(picture, dataset, grid, scale)
@@ -90,6 +86,27 @@ def _plain_grid(dataset: Dataset) -> Grid:
     return Grid(width, height, Affine(resolution, 0, x0, 0, -resolution, y1), dataset.crs)
 
 
+def _margin_px(dataset: Dataset, grid: Grid) -> int:
+    """What must be added around a picture to show what goes on outside it, picture pixels."""
+    shapes = [dataset.table(name).geometry for name in ("field", "turns", "route")]
+    xy = np.concatenate([shapely.get_coordinates(shape.to_numpy()) for shape in shapes])
+    x, y = grid.from_crs(xy[:, 0], xy[:, 1], dataset.crs)
+    past = (-x.min(), -y.min(), x.max() - grid.width_px, y.max() - grid.height_px)
+    beyond = float(max(past))
+    side = max(grid.width_px, grid.height_px)
+    if beyond < -0.02 * side:
+        return 0
+    return math.ceil(min(beyond + 0.03 * side, 0.2 * side))
+
+
+def _widened(grid: Grid, margin_px: int) -> Grid:
+    from affine import Affine
+
+    width, height = grid.width_px + 2 * margin_px, grid.height_px + 2 * margin_px
+    corner = Affine.translation(-margin_px, -margin_px)
+    return Grid(width, height, grid.transform * corner, grid.crs)
+
+
 class _Canvas:
     """An oversampled picture with the transform from the metric CRS to it."""
 
@@ -101,26 +118,40 @@ class _Canvas:
         self.draw = ImageDraw.Draw(self.image, "RGBA")
         self.labels: list[tuple[float, float, str]] = []
 
-    def picture(self, scene: Scene) -> None:
+    def picture(self, scene: Scene, margin_px: int) -> None:
         rgb = scene.rgb.copy()
         rgb[~scene.valid] = 70
-        self.image.paste(Image.fromarray(rgb).resize(self.large, Image.Resampling.BICUBIC))
+        width, height = (
+            round(n * self.factor) for n in (scene.grid.width_px, scene.grid.height_px)
+        )
+        picture = Image.fromarray(rgb).resize((width, height), Image.Resampling.BICUBIC)
+        corner = round(margin_px * self.factor)
+        self.image.paste(picture, (corner, corner))
 
     def tables(self) -> None:
         line = 1.1 * _OVERSAMPLING
         segments = self.dataset.table("segments")
-        self.lines(self.dataset.table("gaps"), GAP, line, dash=(5.0, 5.0))
-        self.lines(segments, TRACK, line, dash=(9.0, 4.0))
-        for name in ("headland_tracks", "route", "turns"):
-            if name in self.dataset.tables:
-                self.lines(self.dataset.tables[name], HEADLAND, line)
+        gaps, around = self.dataset.table("gaps"), self.dataset.table("headland_tracks")
+        turns, route = self.dataset.table("turns"), self.dataset.table("route")
+        self.lines(gaps.geometry, theme.GAP, line, dash=(5.0, 5.0))
+        self.lines(segments.geometry, theme.TRACK, line, dash=(9.0, 4.0))
+        self.lines(around.geometry, theme.HEADLAND, line)
+        self.lines(route[route["kind"] != "work"].geometry, theme.TURN, line)
+        self.lines(turns.geometry, theme.TURN, line)
+        self.lines(turns[turns["fits"] == "no"].geometry, theme.UNFIT, 2 * line)
         obstacles = self.dataset.table("obstacles")
-        for status, colour in STATUS_COLOURS.items():
+        for status, look in theme.STATUS.items():
             part = obstacles[obstacles["status"] == status]
-            dash = {"rejected": (6.0, 4.0), "possible": (1.5, 4.0)}.get(status)
-            self.outlines(part, colour, 1.6 * _OVERSAMPLING, dash=dash)
-        self.outlines(self.dataset.table("field"), OUTLINE, 2.4 * _OVERSAMPLING)
+            self.outlines(part.geometry, look.color, 1.6 * _OVERSAMPLING, dash=look.dash)
+        outline = self.dataset.table("field").geometry
+        self.outlines(outline, theme.OUTLINE, 2.4 * _OVERSAMPLING)
+        self.lines(self.frame_lines(), "#000000", 3.2 * _OVERSAMPLING)
+        self.lines(self.frame_lines(), theme.DOUBT, 2.8 * _OVERSAMPLING, dash=_FRAME_DASH)
         self.numbers(obstacles, segments)
+
+    def frame_lines(self) -> list[shapely.LineString]:
+        """Where the outline is the picture's frame: a little inside it, to be seen."""
+        return _frame_lines(self.dataset)
 
     def pixels(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y = self.grid.from_crs(coordinates[:, 0], coordinates[:, 1], self.dataset.crs)
@@ -128,12 +159,13 @@ class _Canvas:
 
     def lines(
         self,
-        table: gpd.GeoDataFrame,
-        colour: Colour,
+        shapes: Iterable[Any],
+        color: str,
         width: float,
         dash: tuple[float, float] | None = None,
     ) -> None:
-        for part in shapely.get_parts(table.geometry.to_numpy()):
+        colour = theme.rgb(color)
+        for part in shapely.get_parts(np.array(list(shapes), dtype=object)):
             points = self.pixels(shapely.get_coordinates(part))
             if dash is None:
                 self.draw.line(points.ravel().tolist(), fill=colour, width=round(width))
@@ -143,13 +175,14 @@ class _Canvas:
 
     def outlines(
         self,
-        table: gpd.GeoDataFrame,
-        colour: Colour,
+        shapes: gpd.GeoSeries,
+        color: str,
         width: float,
         *,
         dash: tuple[float, float] | None = None,
     ) -> None:
-        rings = shapely.get_rings(shapely.get_parts(table.geometry.to_numpy()))
+        colour = theme.rgb(color)
+        rings = shapely.get_rings(shapely.get_parts(shapes.to_numpy()))
         for ring in rings:
             points = self.pixels(shapely.get_coordinates(ring))
             flat = points.ravel().tolist()
@@ -211,7 +244,8 @@ def _dashes(
 
 def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float) -> Image.Image:
     """The picture with a panel below it."""
-    panel_height = 104
+    doubts = _doubt_lines(dataset, picture.width)
+    panel_height = 106 + 18 * len(doubts)
     image = Image.new("RGB", (picture.width, picture.height + panel_height), _PANEL[:3])
     image.paste(picture)
     draw = ImageDraw.Draw(image)
@@ -220,6 +254,10 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
     _figures(draw, dataset, top, image.width)
     _scale_bar(draw, grid, scale, picture.width - 30, picture.height - 22)
     _north_arrow(draw, grid, picture.width - 42, 46)
+    for number, line in enumerate(doubts):
+        place = (16, top + 92 + 18 * number)
+        font = ImageFont.load_default(_DOUBT_SIZE)
+        draw.text(place, line, font=font, fill=theme.rgb(theme.DOUBT), anchor="ls")
     source = dataset.provenance.source
     credit = "  ".join(t for t in (source.attribution or source.name, source.licence) if t)
     if source.date:
@@ -237,15 +275,29 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
 def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) -> None:
     font = ImageFont.load_default(14)
     statuses = list(dict.fromkeys(dataset.table("obstacles")["status"].tolist()))
-    entries: list[tuple[Colour, str]] = [(OUTLINE, "field")]
-    entries += [(STATUS_COLOURS.get(s, GAP), f"obstacle, {s}") for s in statuses]
+    dashed: tuple[float, float] = (5.0, 5.0)
+    entries: list[tuple[str, str, tuple[float, float] | None]] = [(theme.OUTLINE, "field", None)]
+    if _frame_lines(dataset):
+        entries.append((theme.DOUBT, "goes on outside", _FRAME_DASH))
+    for status, look in theme.STATUS.items():
+        if status in statuses:
+            entries.append((look.color, f"obstacle, {status}", look.dash))
     if dataset.has("segments"):
-        entries.append((TRACK, "track"))
+        entries.append((theme.TRACK, "track", (9.0, 4.0)))
     if dataset.has("gaps"):
-        entries.append((GAP, "gap"))
-    for index, (colour, text) in enumerate(entries):
-        x, y = left + 170 * (index % 3), top + 24 * (index // 3)
-        draw.line([x, y, x + 26, y], fill=colour[:3], width=3)
+        entries.append((theme.GAP, "gap", dashed))
+    if dataset.has("headland_tracks"):
+        entries.append((theme.HEADLAND, "headland", None))
+    turns = dataset.table("turns")
+    unfit = int((turns["fits"] == "no").sum())
+    if len(turns) > unfit:
+        entries.append((theme.TURN, "turn", None))
+    if unfit:
+        entries.append((theme.UNFIT, f"turn that does not fit ({unfit})", None))
+    for index, (color, text, dash) in enumerate(entries):
+        x, y = left + 190 * (index // 3), top + 22 * (index % 3)
+        for a, b in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
+            draw.line([*a, *b], fill=theme.rgb(color), width=3)
         draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
 
 
@@ -256,14 +308,17 @@ def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) 
     count = len(active(obstacles))
     idle = {s: int((obstacles["status"] == s).sum()) for s in schema.NOT_AVOIDED}
     others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
-    lines.append(f"{count} obstacles" + (f" ({others})" if others else ""))
+    lines.append(_counted(count, "obstacle") + (f" ({others})" if others else ""))
     if len(tracks):
         length = tracks["length_m"].sum() / 1000
         lines.append(
-            f"{len(tracks)} tracks, {int(tracks['segment_count'].sum())} segments, "
+            f"{_counted(len(tracks), 'track')}, "
+            f"{_counted(int(tracks['segment_count'].sum()), 'segment')}, "
             f"{length:.2f} km, heading {field['heading_deg']:.1f}°"
         )
-    warning = dict(dataset.provenance.evidence.get("field", {})).get("reasons", [])
+    certainty = field["certainty"]
+    if math.isfinite(certainty):
+        lines[0] += f"   outline {certainty:.0%} certain"
     for index, line in enumerate(lines):
         draw.text(
             (width - 16, top + 14 + 22 * index),
@@ -272,14 +327,35 @@ def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) 
             fill=_INK[:3],
             anchor="rm",
         )
-    if warning:
-        draw.text(
-            (width - 16, top + 92),
-            "Check the outline: " + "; ".join(warning)[:110],
-            font=ImageFont.load_default(13),
-            fill=(255, 190, 90),
-            anchor="rs",
-        )
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
+    """What speaks against the outline, in lines that fit a width in pixels."""
+    doubts = dataset.table("field")["doubts"].iloc[0]
+    if not isinstance(doubts, str) or not doubts:
+        return []
+    font = ImageFont.load_default(_DOUBT_SIZE)
+    lines, line = [], "Check the outline:"
+    for word in doubts.split():
+        longer = f"{line} {word}"
+        if font.getlength(longer) > width - 32:
+            lines.append(line)
+            longer = f"    {word}"
+        line = longer
+    return [*lines, line]
+
+
+def _frame_lines(dataset: Dataset) -> list[shapely.LineString]:
+    """Where the outline is the picture's frame; a parcel of the user's own is whole."""
+    field = dataset.table("field")
+    polygons = shapely.get_parts(field.geometry.to_numpy())
+    if not len(polygons) or field["method"].iloc[0] == "boundary":
+        return []
+    return [line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid)]
 
 
 def _scale_bar(

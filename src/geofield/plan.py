@@ -19,6 +19,7 @@ from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence, quality_from_json
 from geofield.model.field import Field
+from geofield.model.frame import along_frame, outside_in_words
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
 
@@ -126,6 +127,17 @@ class Plan:
         """Whether a person moved the outline since a stage wrote it."""
         recorded = self.evidence.outline
         return recorded is not None and recorded != outline_digest(self.field)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the outline, in words; that it goes on outside is always told."""
+        one = self.field
+        told = () if self.outline_edited else one.doubts
+        along = [] if one.method == "boundary" else along_frame(one.polygon, one.crs, self.grid)
+        if not along or any("outside the picture" in reason for reason in told):
+            return told
+        share = sum(line.length for line in along) / one.polygon.exterior.length
+        return (*told, outside_in_words(share))
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
@@ -309,8 +321,8 @@ class Plan:
                 "imagery": [one.imagery or None],
                 "imagery_date": [one.imagery_date],
                 "licence": [one.licence or None],
-                "certainty": [one.certainty],
-                "doubts": ["; ".join(one.doubts) or None],
+                "certainty": [None if self.outline_edited else one.certainty],
+                "doubts": ["; ".join(self.doubts) or None],
             },
             [one.polygon],
             one.crs,

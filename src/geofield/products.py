@@ -115,6 +115,8 @@ def make_report(
             "longest_edge_m": _rounded(field["longest_edge_m"], 2),
             "heading_deg": _rounded(field["heading_deg"], 3),
             "method": field["method"],
+            "certainty": _rounded(field["certainty"], 4),
+            "doubts": _parts(field["doubts"]),
         },
         "obstacles": {"count": len(obstacles), **{str(k): int(v) for k, v in status.items()}},
         "tracks": {
@@ -123,14 +125,28 @@ def make_report(
             "gaps": len(gaps),
             "points": int(tracks["point_count"].sum()),
             "length_m": _rounded(segments["length_m"].sum(), 3),
+            **_turns(dataset),
         },
         "formats": {name: {"leaves_out": dropped(dataset, format_named(name))} for name in formats},
-        "evidence": dict(provenance.evidence),
+        # The rows of the obstacles' record are in the GeoPackage, for geofield alone.
+        "evidence": {k: v for k, v in provenance.evidence.items() if k != "written"},
         "source": asdict(provenance.source),
         "settings": dict(provenance.settings),
         "timings_s": {stage: round(seconds, 3) for stage, seconds in timings_s.items()},
         "versions": versions(),
     }
+
+
+def _turns(dataset: Dataset) -> dict[str, int]:
+    """How many turns there are, and how many of them the machine cannot drive."""
+    if "turns" not in dataset.tables:
+        return {}
+    turns = dataset.table("turns")
+    return {"turns": len(turns), "turns_that_do_not_fit": int((turns["fits"] == "no").sum())}
+
+
+def _parts(doubts: Any) -> list[str]:
+    return doubts.split("; ") if isinstance(doubts, str) and doubts else []
 
 
 def versions() -> dict[str, str]:

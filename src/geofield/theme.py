@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 OUTLINE = "#ffd54f"
-#: An outline that a person should look at.
+#: An outline that a person should look at, and where it is the picture's frame.
 DOUBT = "#ff8f00"
 TRACK = "#ffffff"
 GAP = "#ff80ab"
@@ -33,7 +33,7 @@ class Look:
     """
 
     color: str
-    dash: tuple[int, ...] | None = None
+    dash: tuple[int, int] | None = None
 
 
 #: By the status of an obstacle.

@@ -50,6 +50,12 @@ def layer_facts(layer):
                 field.name(): layer.editorWidgetSetup(index).type()
                 for index, field in enumerate(layer.fields())
             },
+            "read_only": layer.readOnly(),
+            "editable": [
+                field.name()
+                for index, field in enumerate(layer.fields())
+                if not layer.editFormConfig().readOnly(index)
+            ],
             "encoding": layer.dataProvider().encoding(),
         }
         if "status" in facts["fields"]:

@@ -73,6 +73,31 @@ def test_status_from_the_list(plan_file, qgis):
     assert crossing(after, table.geometry.loc[3].buffer(-0.1)) == 0
 
 
+def test_shapes_sizes_and_deletions(plan_file, qgis):
+    before = read_dataset(plan_file).table("obstacles").set_index("obstacle_no")
+    larger = shapely.to_wkt(before.geometry[1].buffer(3), rounding_precision=-1)
+    done = qgis(
+        "edit",
+        path=str(plan_file),
+        changes=[
+            {"layer": "obstacles", "where": "obstacle_no = 1", "wkt": larger},
+            {"layer": "obstacles", "where": "obstacle_no = 2", "values": {"buffer_m": 5.0}},
+            {"layer": "obstacles", "where": "obstacle_no = 4", "delete": True},
+        ],
+    )
+    assert done == {"done": 3}
+    for _ in range(2):
+        after = plan_again(plan_file)
+        table = after.table("obstacles").set_index("obstacle_no")
+        assert list(table.index) == [1, 2, 3]
+        assert table.geometry.area[1] == pytest.approx(before.geometry[1].buffer(3).area, rel=1e-6)
+        assert table["status"][1] == "confirmed"
+        assert table["buffer_m"][2] == 5.0
+        assert table.geometry.area[2] > before.geometry.area[2] * 1.2
+        assert crossing(after, table.geometry[1].buffer(-0.1)) == 0
+        assert table.geometry[3].equals(before.geometry[3])
+
+
 def test_a_drawn_obstacle_is_avoided_and_numbered(plan_file, qgis):
     drawn = placed((20, 28), (26, 28), (26, 33), (20, 33))
     done = qgis("edit", path=str(plan_file), changes=[{"layer": "obstacles", "wkt": drawn}])

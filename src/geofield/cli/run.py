@@ -154,12 +154,8 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
     """A short account of a plan for the person at the terminal."""
     field = plan.field
     say(f"Field      {field.area_ha:.2f} ha, perimeter {field.perimeter_m:.0f} m ({field.method})")
-    if field.quality is not None and not field.quality.trusted:
-        click.secho(
-            "           check this outline: " + "; ".join(field.quality.reasons),
-            fg="yellow",
-            err=True,
-        )
+    for doubt in plan.doubts:
+        click.secho(f"           check this outline: {doubt}", fg="yellow", err=True)
     if plan.obstacles is not None:
         counts = plan.obstacles["status"].value_counts().sort_index()
         parts = ", ".join(f"{count} {status}" for status, count in counts.items())
@@ -171,6 +167,8 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
             f"{segments['length_m'].sum() / 1000:.2f} km, "
             f"heading {plan.tracks.heading_deg:.1f} degrees"
         )
+        if plan.tracks.turns is not None:
+            _say_turns(plan.tracks.turns)
         for note in plan.tracks.notes:
             say(f"           {note}")
     if timings:
@@ -180,3 +178,15 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
     for name, text in (("map.png", "look at this first"), ("field.gpkg", "open this in QGIS")):
         if folder / name in files:
             say(f"           {folder / name}  ({text})")
+
+
+def _say_turns(turns: Any) -> None:
+    unfit = int((turns["fits"] == "no").sum())
+    say(f"Turns      {len(turns)}")
+    if unfit:
+        click.secho(
+            f"           {unfit} of them do not fit: the machine cannot drive them there (red on "
+            "the map; a smaller turning radius, a margin or a headland helps)",
+            fg="yellow",
+            err=True,
+        )

@@ -9,6 +9,7 @@ from shapely import Polygon
 
 from geofield.field.plausible import doubts
 from geofield.model import FieldQuality, Scene
+from geofield.model.frame import outside_in_words
 from geofield.model.segmentation import Segmentation
 
 BoolArray = NDArray[np.bool_]
@@ -49,12 +50,9 @@ def judge(
     measured = dict(found.figures)
     score = measured.get("certainty", 1.0) - 0.55 * len(strange)
     reasons.extend(strange)
-    if touching > 0.02:
-        reasons.append(
-            f"it touches the picture's edge along {touching:.0%} of its length, so the field "
-            "may go on outside"
-        )
-        score -= min(0.1, touching)
+    if touching > 0.0:
+        reasons.append(outside_in_words(touching))
+        score -= min(0.1, touching) if touching > 0.02 else 0.0
     if covered > 0.95:
         reasons.append("it fills the whole picture")
         score -= 0.6

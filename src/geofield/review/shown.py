@@ -35,7 +35,7 @@ def tracks_of(plan: Plan, notes: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def field_of(plan: Plan) -> dict[str, Any]:
-    """The outline; what a person drew is in no doubt."""
+    """The outline; of what a person drew nothing is in doubt but where the picture ends."""
     field = plan.field
     drawn = plan.outline_edited or field.method in ("drawn", "boundary")
     quality = None if drawn else field.quality
@@ -45,5 +45,5 @@ def field_of(plan: Plan) -> dict[str, Any]:
         plan.grid,
         method="drawn" if drawn else field.method,
         certainty=None if quality is None else quality.score,
-        doubts=() if quality is None else quality.reasons,
+        doubts=plan.doubts,
     )

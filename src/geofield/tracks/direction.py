@@ -19,6 +19,7 @@ from geofield.crs import grid_north_deg, ground_scale
 from geofield.errors import TrackError
 from geofield.grid import Grid
 from geofield.methods import LONGEST_EDGE, method
+from geofield.model.frame import picture_frame
 from geofield.tracks.fewest import fewest_direction
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 
@@ -105,13 +106,6 @@ def find_baseline(
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
     return _from_ab(direction, north)
-
-
-def picture_frame(grid: Grid, crs: CRS) -> Polygon:
-    """The four sides of a picture, in a CRS."""
-    w, h = grid.width_px, grid.height_px
-    x, y = grid.to_crs([0.0, w, w, 0.0], [0.0, 0.0, h, h], crs)
-    return Polygon(np.column_stack([x, y]))
 
 
 def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:

@@ -16,15 +16,13 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
-from geofield.tracks.direction import picture_frame
+from geofield.model.frame import along_frame
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
     from geofield.model.tracks import Tracks
 
-#: An outline this near to the picture's frame goes on outside, pixels.
-_FRAME_PX = 1.5
 _DIGITS = 3
 
 
@@ -77,7 +75,7 @@ def outline_view(
         "method": method,
         "certainty": _number(certainty),
         "doubts": list(doubts),
-        "frame": _along_frame(polygon, crs, grid),
+        "frame": _lines(along_frame(polygon, crs, grid)),
     }
 
 
@@ -145,16 +143,6 @@ def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:
         "turns": None if turns is None else len(turns),
         "turns_that_do_not_fit": None if turns is None else int((turns["fits"] == "no").sum()),
     }
-
-
-def _along_frame(polygon: shapely.Polygon, crs: CRS, grid: Grid | None) -> list[list[list[float]]]:
-    """The stretches of an outline where the field goes on outside the picture."""
-    if grid is None:
-        return []
-    near_m = _FRAME_PX * grid.ground_resolution_m
-    near = shapely.buffer(picture_frame(grid, crs).exterior, near_m)
-    along = shapely.line_merge(shapely.intersection(polygon.exterior, near))
-    return _lines([line for line in shapely.get_parts(along) if shapely.length(line) > 2 * near_m])
 
 
 def _ends(lines: gpd.GeoDataFrame) -> list[list[float]]:

@@ -39,6 +39,8 @@ from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
 _GEOD = Geod(ellps="WGS84")
+#: Behind the name of a boundary that a person should look at first.
+_DOUBTED = " (check)"
 
 
 def write_v4(
@@ -110,7 +112,11 @@ def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET
 def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:
     outline = to_lonlat(np.array([polygon], dtype=object), dataset.crs)[0]
     area_m2 = float(ground_areas_m2([polygon], dataset.crs)[0])
-    _add_polygon(part, PolygonType.BOUNDARY, dataset.name, area_m2, outline)
+    doubts = dataset.table(schema.FIELD.name)["doubts"].iloc[0]
+    # A designator has no room for reasons; that there are some must be seen on the terminal.
+    mark = _DOUBTED if isinstance(doubts, str) and doubts else ""
+    name = cut_name(dataset.name, DESIGNATOR - len(mark)) + mark
+    _add_polygon(part, PolygonType.BOUNDARY, name, area_m2, outline)
     obstacles = avoided(dataset)
     shapes = exact_geometry(schema.OBSTACLES, obstacles)
     placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as ET
 
-from geofield.formats.qgis.looks import LOOKS, Look
+from geofield.formats.qgis.looks import LOOKS, Look, field_rules
 from geofield.formats.qgis.symbols import QGIS_VERSION, rule_labels, rule_renderer
 from geofield.schema import Column, Layer
 
@@ -19,6 +19,12 @@ _GEOMETRY = {
 }
 #: What a person's newly drawn row starts with.
 _DEFAULTS = {("obstacles", "status"): "'added'", ("obstacles", "kind"): "'other'"}
+
+#: What a person may change, by layer: all that the next run honours.
+EDITABLE = {
+    "field": ("field_id", "name"),
+    "obstacles": ("kind", "status", "radius_m", "buffer_m"),
+}
 
 _LAT = "round(y(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
 _LON = "round(x(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
@@ -42,10 +48,14 @@ def look_of(layer: Layer) -> Look:
     )
 
 
-def style_elements(layer: Layer) -> list[ET.Element]:
-    """The elements that a QML file and a project's layer have in common."""
+def style_elements(layer: Layer, frame: str = "") -> list[ET.Element]:
+    """The elements that a QML file and a project's layer have in common.
+
+    `frame` is the picture's, as :func:`geofield.formats.qgis.looks.field_rules` takes it.
+    """
     look = look_of(layer)
-    elements = [rule_renderer(look.rules, layer.name)]
+    rules = field_rules(frame) if layer.name == "field" else look.rules
+    elements = [rule_renderer(rules, layer.name)]
     if look.labels:
         elements.append(rule_labels(look.labels, layer.name))
     elements.append(_element("blendMode", "0"))
@@ -65,6 +75,11 @@ def style_elements(layer: Layer) -> list[ET.Element]:
             applyOnUpdate="0",
         )
     elements.append(defaults)
+    editable = ET.Element("editable")
+    for column in layer.columns:
+        is_editable = column.name in EDITABLE.get(layer.name, ())
+        ET.SubElement(editable, "field", name=column.name, editable=str(int(is_editable)))
+    elements.append(editable)
     elements.append(_actions())
     elements.append(_element("previewExpression", _preview(layer)))
     elements.append(_element("mapTip", map_tip(layer)))
@@ -81,14 +96,15 @@ def style_attributes(layer: Layer) -> dict[str, str]:
         "minScale": str(look.max_scale or 100_000_000),
         "maxScale": "0",
         "labelsEnabled": "1" if look.labels else "0",
-        "readOnly": "0",
+        # The next planning makes the other layers anew: nothing typed there could stand.
+        "readOnly": "0" if layer.name in EDITABLE else "1",
     }
 
 
-def qml(layer: Layer) -> str:
+def qml(layer: Layer, frame: str = "") -> str:
     """The style of a layer as a QML document."""
     root = ET.Element("qgis", {"styleCategories": "AllStyleCategories"} | style_attributes(layer))
-    root.extend(style_elements(layer))
+    root.extend(style_elements(layer, frame))
     root.append(_element("layerGeometryType", _GEOMETRY[layer.geometry]))
     return (
         "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"

@@ -1,29 +1,40 @@
 """What each layer looks like: on a dark or light picture, at field and at region scale.
 
-Yellow is the field's edge, cyan where the machine drives, dashed where it does not, red what
-it must not touch; magenta is a person's own addition, grey a rejected detection. Doubtful
-detections are lighter and dashed, so that the eye goes there first.
+Colours and dashes are those of `geofield.theme`. Where the outline is the picture's frame it is
+dashed: the field goes on outside.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geofield.formats.qgis.symbols import Label, Rule, arrows, at_centre, fill, line, marker
+from geofield import theme
+from geofield.formats.qgis.symbols import (
+    Label,
+    Rule,
+    SymbolLayer,
+    arrows,
+    at_centre,
+    fill,
+    generated,
+    line,
+    marker,
+)
 
 _NONE = "0,0,0,0"
 _BLACK = "0,0,0,190"
 _WHITE = "255,255,255,255"
 _DARK = "20,20,20,255"
-_FIELD = "255,214,10,255"
-_DRIVE = "0,229,255,255"
-_GAP = "255,120,0,255"
-_AVOID = "226,26,28,255"
-_ADDED = "230,0,190,255"
-_POSSIBLE = "255,170,0,255"
 
-#: Below this confidence a detection is drawn as doubtful.
-DOUBTFUL = 0.5
+
+def _rgba(color: str, opacity: int = 255) -> str:
+    return ",".join(map(str, (*theme.rgb(color), opacity)))
+
+
+_FIELD, _DRIVE, _GAP = _rgba(theme.OUTLINE), _rgba(theme.TRACK), _rgba(theme.GAP)
+_TURN, _UNFIT, _HEADLAND = _rgba(theme.TURN), _rgba(theme.UNFIT), _rgba(theme.HEADLAND)
+#: Millimetres of a pixel of the theme's dashes.
+_DASH_MM = 0.2
 #: Scale denominator from which a field is a name on the map, not a shape.
 REGION_SCALE = 30_000
 
@@ -55,25 +66,66 @@ def _is(status: str) -> str:
     return f"\"status\" = '{status}'"
 
 
-_SURE = f'coalesce("confidence", 1) >= {DOUBTFUL}'
+#: Legends of the rules of obstacles, from top to bottom, and their statuses.
+OBSTACLE_RULES = {
+    "Confirmed": "confirmed",
+    "Detected": "detected",
+    "Possible, not avoided": "possible",
+    "Added by a person": "added",
+    "Rejected by a person": "rejected",
+}
+
+
+def _obstacle_rule(label: str, status: str) -> Rule:
+    look = theme.STATUS[status]
+    colour, condition = _rgba(look.color), _is(status)
+    if status == "added":
+        condition += ' OR "status" IS NULL'
+    if look.dash is None:
+        width = 0.4 if status == "detected" else 0.6
+        return Rule(label, "fill", (fill(_rgba(look.color, 90), colour, width),), condition)
+    dash = ";".join(f"{_DASH_MM * part:g}" for part in look.dash)
+    return Rule(
+        label, "fill", (line(_BLACK, 0.6, dash=dash), line(colour, 0.4, dash=dash)), condition
+    )
+
+
+def field_rules(frame: str) -> tuple[Rule, ...]:
+    """The rules of the layer `field`.
+
+    Parameters
+    ----------
+    frame : str
+        The picture's frame in the layer's CRS as a strip, WKT; empty where there is none.
+    """
+    layers: tuple[SymbolLayer, ...] = (line(_BLACK, 1.3), line(_FIELD, 0.8))
+    if frame:
+        along = f"intersection(boundary($geometry), geom_from_wkt('{frame}'))"
+        layers += (
+            generated(along, line(_BLACK, 1.3)),
+            generated(along, line(_rgba(theme.DOUBT), 1.0, dash="2;2")),
+        )
+    return (
+        Rule("Outline", "fill", layers, max_scale=REGION_SCALE),
+        Rule(
+            "Field",
+            "fill",
+            (
+                fill(_rgba(theme.OUTLINE, 110), _FIELD, 0.5),
+                at_centre(marker("circle", _FIELD, _BLACK, 3)),
+            ),
+            min_scale=REGION_SCALE,
+        ),
+    )
+
+
 _FIRST = "start_point(extend(geometry_n($geometry, 1), {0}, 0))"
 _LAST = "end_point(extend(geometry_n($geometry, num_geometries($geometry)), 0, {0}))"
 _END_OFFSET_M = 2.5
 
 LOOKS: dict[str, Look] = {
     "field": Look(
-        (
-            Rule("Outline", "fill", (line(_BLACK, 1.3), line(_FIELD, 0.8)), max_scale=REGION_SCALE),
-            Rule(
-                "Field",
-                "fill",
-                (
-                    fill("255,214,10,110", _FIELD, 0.5),
-                    at_centre(marker("circle", _FIELD, _BLACK, 3)),
-                ),
-                min_scale=REGION_SCALE,
-            ),
-        ),
+        field_rules(""),
         (
             # Above the outline, where it hides neither tracks nor obstacles.
             Label(
@@ -98,47 +150,13 @@ LOOKS: dict[str, Look] = {
             ),
         ),
         tip='<b>[% "name" %]</b><br>[% format_number("area_ha", 2) %] ha, '
-        '[% format_number("perimeter_m", 0) %] m around, imagery of [% "imagery_date" %]',
+        '[% format_number("perimeter_m", 0) %] m around, imagery of [% "imagery_date" %]'
+        "[% if(\"certainty\" IS NULL, '', "
+        "'<br>outline ' || round(100 * \"certainty\") || ' % certain') %]"
+        "[% if(\"doubts\" IS NULL, '', '<br><b>Check the outline:</b> ' || \"doubts\") %]",
     ),
     "obstacles": Look(
-        (
-            Rule(
-                "Confirmed",
-                "fill",
-                (fill("226,26,28,150", _AVOID, 0.5),),
-                _is("confirmed"),
-            ),
-            Rule(
-                "Detected",
-                "fill",
-                (fill("226,26,28,60", _AVOID, 0.4),),
-                f"{_is('detected')} AND {_SURE}",
-            ),
-            Rule(
-                "Detected, doubtful",
-                "fill",
-                (fill("255,200,0,50", _NONE, 0), line("255,170,0,255", 0.5, dash="1.4;1")),
-                f"{_is('detected')} AND NOT {_SURE}",
-            ),
-            Rule(
-                "Possible, not avoided",
-                "fill",
-                (line("60,40,0,150", 0.5, dash="0.2;1.2"), line(_POSSIBLE, 0.4, dash="0.2;1.2")),
-                _is("possible"),
-            ),
-            Rule(
-                "Added by a person",
-                "fill",
-                (fill("230,0,190,80", _ADDED, 0.5),),
-                f'{_is("added")} OR "status" IS NULL',
-            ),
-            Rule(
-                "Rejected by a person",
-                "fill",
-                (line("60,60,60,150", 0.35), line("245,245,245,255", 0.25, dash="0.6;0.9")),
-                _is("rejected"),
-            ),
-        ),
+        tuple(_obstacle_rule(label, status) for label, status in OBSTACLE_RULES.items()),
         (
             Label(
                 'to_string("obstacle_no")',
@@ -158,7 +176,7 @@ LOOKS: dict[str, Look] = {
     ),
     "tracks": Look(
         (
-            Rule("Track", "line", (line(_DRIVE, 0.22),), min_scale=1000),
+            Rule("Track", "line", (line(_BLACK, 0.4), line(_DRIVE, 0.22)), min_scale=1000),
             Rule(
                 "Track with direction",
                 "line",
@@ -221,19 +239,19 @@ LOOKS: dict[str, Look] = {
         tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
     ),
     "headland": Look(
-        (Rule("Headland", "fill", (fill("255,214,10,40", "255,214,10,200", 0.25),)),),
+        (Rule("Headland", "fill", (fill(_rgba(theme.HEADLAND, 40), _HEADLAND, 0.25),)),),
         max_scale=REGION_SCALE,
         tip='<b>Headland</b>, [% round("width_m", 1) %] m wide',
     ),
     "headland_tracks": Look(
-        (Rule("Headland track", "line", (line("40,190,100,255", 0.35),)),),
+        (Rule("Headland track", "line", (line(_HEADLAND, 0.35),)),),
         max_scale=REGION_SCALE,
         tip='<b>Headland pass [% "pass_no" %]</b>: [% round("length_m", 1) %] m',
     ),
     "turns": Look(
         (
-            Rule("Turn", "line", (line(_BLACK, 0.45), line(_WHITE, 0.25)), "\"fits\" = 'yes'"),
-            Rule("Turn that does not fit", "line", (line(_AVOID, 0.5),), "\"fits\" = 'no'"),
+            Rule("Turn", "line", (line(_BLACK, 0.45), line(_TURN, 0.25)), "\"fits\" = 'yes'"),
+            Rule("Turn that does not fit", "line", (line(_UNFIT, 0.6),), "\"fits\" = 'no'"),
         ),
         max_scale=5000,
         tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
@@ -244,7 +262,7 @@ LOOKS: dict[str, Look] = {
             Rule(
                 "Route",
                 "line",
-                (line(_BLACK, 0.45), line(_WHITE, 0.25), arrows(_WHITE, every_m=30, size_m=1.6)),
+                (line(_BLACK, 0.45), line(_TURN, 0.25), arrows(_TURN, every_m=30, size_m=1.6)),
             ),
         ),
         max_scale=REGION_SCALE,

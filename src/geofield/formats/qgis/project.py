@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import shapely
 from pyproj import CRS
 
 from geofield import schema
@@ -16,6 +17,7 @@ from geofield.formats.qgis.layer_style import look_of, style_attributes, style_e
 from geofield.formats.qgis.looks import ORDER
 from geofield.formats.qgis.symbols import QGIS_VERSION
 from geofield.model import Dataset
+from geofield.model.frame import NEAR_PX, picture_frame
 
 #: White space around the field in the first view, as a share of its size.
 MARGIN = 0.08
@@ -80,6 +82,16 @@ def qgz_bytes(xml: str, stem: str, timestamp: str) -> bytes:
     return buffer.getvalue()
 
 
+def frame_strip(dataset: Dataset) -> str:
+    """A narrow strip along the picture's frame, WKT; empty where the outline is not of it."""
+    field, grid = dataset.table(schema.FIELD.name), dataset.grid
+    if grid is None or not len(field) or field["method"].iloc[0] == "boundary":
+        return ""
+    frame = picture_frame(grid, dataset.crs)
+    strip = shapely.buffer(frame.exterior, NEAR_PX * grid.ground_resolution_m, join_style="mitre")
+    return str(shapely.to_wkt(strip, rounding_precision=3))
+
+
 def _place(name: str) -> int:
     return ORDER.index(name) if name in ORDER else len(ORDER)
 
@@ -142,7 +154,7 @@ def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str) -> ET.E
     _text(root, "abstract", layer.description)
     root.append(_crs_element("srs", dataset.crs))
     _text(root, "provider", "ogr").set("encoding", "UTF-8")
-    root.extend(style_elements(layer))
+    root.extend(style_elements(layer, frame_strip(dataset)))
     return root
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.layer_style import look_of
-from geofield.formats.qgis.looks import DOUBTFUL
+from geofield.formats.qgis.looks import OBSTACLE_RULES
 from geofield.formats.qgis.symbols import Rule, SymbolLayer
 from geofield.schema import Layer
 
@@ -62,35 +62,18 @@ def _add_rule(style: ET.Element, rule: Rule) -> None:
             _sub(graphic, "Size", f"{float(each.values['size']) / PIXEL_MM:.1f}")
 
 
-_EQUAL, _LESS, _NOT_LESS = (
-    "PropertyIsEqualTo",
-    "PropertyIsLessThan",
-    "PropertyIsGreaterThanOrEqualTo",
-)
 #: The filters of the rules by their legend: what QGIS's expressions say.
-_CONDITIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
-    "Confirmed": ((_EQUAL, "status", "confirmed"),),
-    "Detected": ((_EQUAL, "status", "detected"), (_NOT_LESS, "confidence", str(DOUBTFUL))),
-    "Detected, doubtful": ((_EQUAL, "status", "detected"), (_LESS, "confidence", str(DOUBTFUL))),
-    "Possible, not avoided": ((_EQUAL, "status", "possible"),),
-    "Added by a person": ((_EQUAL, "status", "added"),),
-    "Rejected by a person": ((_EQUAL, "status", "rejected"),),
-    "Turn": ((_EQUAL, "fits", "yes"),),
-    "Turn that does not fit": ((_EQUAL, "fits", "no"),),
+_CONDITIONS: dict[str, tuple[str, str]] = {
+    **{label: ("status", status) for label, status in OBSTACLE_RULES.items()},
+    "Turn": ("fits", "yes"),
+    "Turn that does not fit": ("fits", "no"),
 }
 
 
 def _add_filter(element: ET.Element, label: str) -> None:
     root = ET.SubElement(element, f"{{{OGC}}}Filter")
-    conditions = _CONDITIONS[label]
-    if len(conditions) > 1:
-        root = ET.SubElement(root, f"{{{OGC}}}And")
-    for condition in conditions:
-        _compare(root, *condition)
-
-
-def _compare(parent: ET.Element, kind: str, name: str, value: str) -> None:
-    element = ET.SubElement(parent, f"{{{OGC}}}{kind}")
+    name, value = _CONDITIONS[label]
+    element = ET.SubElement(root, f"{{{OGC}}}PropertyIsEqualTo")
     ET.SubElement(element, f"{{{OGC}}}PropertyName").text = name
     ET.SubElement(element, f"{{{OGC}}}Literal").text = value
 

@@ -29,7 +29,9 @@ CREATE TABLE layer_styles (
 _PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, content BLOB);"
 
 
-def add_styles(connection: sqlite3.Connection, layers: list[Layer], timestamp: str) -> None:
+def add_styles(
+    connection: sqlite3.Connection, layers: list[Layer], timestamp: str, frame: str = ""
+) -> None:
     """The table `layer_styles`: one default style per layer, as QML and SLD."""
     connection.execute(_STYLES)
     for layer in layers:
@@ -40,7 +42,7 @@ def add_styles(connection: sqlite3.Connection, layers: list[Layer], timestamp: s
             (
                 layer.name,
                 layer.title[:30],
-                qml(layer),
+                qml(layer, frame),
                 sld(layer),
                 layer.description,
                 timestamp,

@@ -36,7 +36,8 @@ def symbol(kind: str, name: str, layers: Sequence[SymbolLayer]) -> ET.Element:
         )
         layer.append(option_map(each.values))
         if each.marker is not None:
-            layer.append(symbol("marker", f"@{name}@{position}", [each.marker]))
+            sub = "line" if each.kind == "GeometryGenerator" else "marker"
+            layer.append(symbol(sub, f"@{name}@{position}", [each.marker]))
     return root
 
 
@@ -108,6 +109,12 @@ def arrows(colour: str, *, every_m: float, size_m: float) -> SymbolLayer:
         },
         marker("filled_arrowhead", colour, "0,0,0,160", size_m, unit="MapUnit", stroke=0.1),
     )
+
+
+def generated(expression: str, shape: SymbolLayer) -> SymbolLayer:
+    """A line where an expression says, in the shape's own units."""
+    values = {"SymbolType": "Line", "geometryModifier": expression, "units": "MapUnit"}
+    return SymbolLayer("GeometryGenerator", values, shape)
 
 
 @dataclass(frozen=True, slots=True)

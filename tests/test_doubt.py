@@ -1,0 +1,113 @@
+"""What speaks against a plan is told: on the terminal, in the report, on maps and in files."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from geofield import theme
+from geofield.imagery import write_scene
+from geofield.model.field import FieldQuality
+from geofield.model.frame import along_frame
+from geofield.pipeline import run_tracks
+from geofield.plan import Plan, read_plan
+from geofield.settings import load_settings
+from geofield.simulate import SimulatedField
+
+OUTSIDE = "outside the picture"
+
+
+@pytest.fixture(scope="module")
+def out(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A run on a picture that ends in the middle of the field, and what it told."""
+    folder = tmp_path_factory.mktemp("doubt")
+    x, _ = simulated.scene.pixel_of(lat=simulated.lat, lon=simulated.lon)
+    cut = simulated.scene.crop(0, 0, int(x) + 30, simulated.scene.grid.height_px)
+    write_scene(cut, folder / "half.tif")
+    command = ["run", folder / "half.tif", "--lat", simulated.lat, "--lon", simulated.lon]
+    command += ["--out", folder / "out", "--spacing", 6, "--route", "boustrophedon"]
+    command += ["--turning-radius", 8]
+    for name in ("gpkg", "geojson", "shapefile", "isoxml", "rdf", "kml"):
+        command += ["--format", name]
+    done = subprocess.run(
+        [sys.executable, "-m", "geofield", *map(str, command)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder / "out", done.stderr
+
+
+def test_the_terminal_and_the_report_tell(out: tuple[Path, str]) -> None:
+    folder, told = out
+    assert OUTSIDE in told
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    assert any(OUTSIDE in doubt for doubt in report["field"]["doubts"])
+    assert 0 <= report["field"]["certainty"] <= 1
+    turns = read_plan(folder / "field.gpkg").tracks.turns  # type: ignore[union-attr]
+    assert turns is not None
+    unfit = int((turns["fits"] == "no").sum())
+    assert unfit > 0
+    assert report["tracks"]["turns_that_do_not_fit"] == unfit
+    assert f"{unfit} of them do not fit" in told
+
+
+def test_files_carry_it(out: tuple[Path, str]) -> None:
+    folder, _ = out
+    for file in ("field.gpkg", "geojson/field.geojson", "shapefile/boundary.shp"):
+        layer = {"layer": "field"} if file.endswith("gpkg") else {}
+        row = gpd.read_file(folder / file, **layer).iloc[0]
+        assert OUTSIDE in row["doubts"], file
+        assert 0 <= row["certainty"] <= 1
+    assert OUTSIDE in (folder / "field.rdf").read_text(encoding="utf-8")
+    task = ET.parse(folder / "isoxml/TASKDATA/TASKDATA.XML").getroot()
+    (name,) = (plan.get("B") for plan in task.iter("PLN") if plan.get("A") == "1")
+    assert name is not None
+    assert name.endswith("(check)")
+    assert len(name) <= 32
+
+
+def test_the_map_shows_it(out: tuple[Path, str]) -> None:
+    folder, _ = out
+    with Image.open(folder / "map.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).astype(int)
+
+    def count(color: str) -> int:
+        return int((np.abs(pixels - theme.rgb(color)).max(axis=2) < 40).sum())
+
+    # The words in the panel and the dashes along the frame; turns that do not fit.
+    assert count(theme.DOUBT) > 1500
+    assert count(theme.UNFIT) > 200
+
+
+def test_an_outline_within_the_picture_is_in_no_such_doubt(simulated: SimulatedField) -> None:
+    field, grid = simulated.field, simulated.scene.grid
+    assert along_frame(field.polygon, field.crs, grid) == []
+    assert Plan(field, grid=grid).doubts == ()
+    doubted = replace(field, quality=FieldQuality(0.4, ("borders are weak",), (), False))
+    assert Plan(doubted, grid=grid).doubts == ("borders are weak",)
+
+
+def test_a_drawn_outline_at_the_frame_is_told_too(simulated: SimulatedField) -> None:
+    grid, crs = simulated.scene.grid, simulated.field.crs
+    x, y = grid.to_crs([0.0, 120.0, 120.0, 0.0], [40.0, 40.0, 200.0, 200.0], crs)
+    drawn = shapely.Polygon(np.column_stack([x, y]))
+    field = replace(simulated.field, polygon=drawn, method="drawn", quality=None)
+    plan = run_tracks(
+        Plan(field, grid=grid), settings=load_settings(None, {"tracks": {"spacing_m": 8.0}})
+    )
+    (doubt,) = plan.doubts
+    assert OUTSIDE in doubt
+    parcel = replace(plan, field=replace(field, method="boundary"))
+    assert parcel.doubts == ()
