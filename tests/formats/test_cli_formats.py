@@ -45,7 +45,7 @@ def test_export_and_import_and_validate(plan_file, tmp_path):
     out = tmp_path / "export"
     done = run(export, plan_file, "-f", "isoxml,kml", "-f", "agopengps", "--out", out, "--json")
     files = json.loads(done.stdout)["files"]
-    assert len(files) == 6
+    assert len(files) == 7
     for product in ("isoxml", "field.kml", "agopengps/Fields"):
         run(validate, out / product)
         back = tmp_path / f"back-{product.replace('/', '-')}.gpkg"

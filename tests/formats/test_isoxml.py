@@ -45,7 +45,7 @@ def test_a_second_reader_understands_it(files, version):
     area, _ = Geod(ellps="WGS84").geometry_area_perimeter(shapely.orient_polygons(outline))
     assert field.area == round(area)
     kinds = [polygon.type.value for polygon in field.polygons]
-    assert sorted(map(int, kinds)) == [1, 6, 6, 6]
+    assert sorted(map(int, kinds)) == [1, 6, 6, 6, 6]
     boundary = field.polygons[0]
     assert [int(line.type.value) for line in boundary.line_strings] == [1, 2]
     ring = [(float(p.east), float(p.north)) for p in boundary.line_strings[0].points]

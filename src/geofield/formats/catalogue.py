@@ -145,7 +145,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.isoxml:read",
         drops=_TERMINAL_DROPS,
         precision_m=0.0002,
-        options=("customer", "farm", "zip"),
+        options=("customer", "farm", "zip", "headland"),
         validator="geofield.formats.checks.isoxml:check",
         reads_folders=True,
     ),
@@ -167,9 +167,9 @@ CATALOGUE: tuple[Format, ...] = (
         "AgOpenGPS field folder",
         tuple(
             f"agopengps/Fields/<name>/{file}.txt"
-            for file in ("Field", "Boundary", "TrackLines", "Flags")
+            for file in ("Field", "Boundary", "Headland", "TrackLines", "Flags")
         ),
-        ("field", "obstacles", "tracks"),
+        ("field", "obstacles", "tracks", "headland"),
         "geofield.formats.agopengps:write",
         "geofield.formats.agopengps:read",
         drops=(

@@ -186,11 +186,17 @@ def _numbers_in_names(frame: gpd.GeoDataFrame) -> np.ndarray:
 
 
 def _whole_numbers(values: np.ndarray) -> list[int]:
-    """Obstacle numbers: those of the file where they are whole and unique, else 1, 2, ..."""
+    """Obstacle numbers: those of the file where they are whole; the next free ones for others."""
+    numbers: list[int] = []
     whole = np.isfinite(values) & (values == np.round(values))
-    if whole.all() and len(np.unique(values)) == len(values):
-        return [int(value) for value in values]
-    return list(range(1, len(values) + 1))
+    free = int(np.max(values, where=whole, initial=0)) + 1
+    taken: set[int] = set()
+    for value, good in zip(values, whole, strict=True):
+        number = int(value) if good and int(value) not in taken else free
+        free += number == free
+        taken.add(number)
+        numbers.append(number)
+    return numbers
 
 
 def _one_of(

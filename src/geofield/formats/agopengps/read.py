@@ -101,13 +101,14 @@ def _sorted_rings(
     rings: list[Any], flags: list[tuple[Any, int]]
 ) -> tuple[list[Any], list[dict[str, Any]]]:
     """Holes of the field, and obstacles with their numbers."""
-    numbered = {}
+    numbered: dict[int, int] = {}
     for point, number in flags:
         around = [index for index, ring in enumerate(rings) if ring.covers(point)]
         if around:
             # An obstacle may stand in a hole of the field: its own ring is centred on its flag.
             nearest = min(around, key=lambda index: rings[index].centroid.distance(point))
-            numbered[nearest] = number
+            # A ring around several has the lowest of their numbers.
+            numbered[nearest] = min(number, numbered.get(nearest, number))
     if not numbered:
         return [], [{"geometry": ring} for ring in rings]
     holes = [ring for index, ring in enumerate(rings) if index not in numbered]

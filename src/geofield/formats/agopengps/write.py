@@ -17,6 +17,7 @@ from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
 from geofield.formats.origin import imagery_day
+from geofield.formats.terminal import main_field, terminal_obstacles
 from geofield.model import Dataset
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
@@ -27,7 +28,7 @@ _NAME_CHARACTERS = 60
 
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write the four text files of ``agopengps/Fields/<name>/``."""
+    """Write the text files of ``agopengps/Fields/<name>/``."""
     field = dataset.table(schema.FIELD.name)
     if len(field) != 1:
         raise FormatError(f"AgOpenGPS needs one field; there are {len(field)}.")
@@ -37,9 +38,14 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     plane = LocalPlane(round(start.y, 7), round(start.x, 7))
     name = safe_name(dataset.name, length=_NAME_CHARACTERS)
     out = folder / "agopengps" / "Fields" / name
+    area_ha = float(ground_areas_m2([polygon], dataset.crs)[0]) / 10_000.0
+    step = next(step for limit, step in _STEPS if area_ha < limit)
+    rings = [polygon.exterior, *polygon.interiors]
+    rings += [each.shape.exterior for each in terminal_obstacles(dataset, polygon)]
     files = {
         "Field.txt": _field(dataset.name, plane, imagery_day(dataset)),
-        "Boundary.txt": _boundary(dataset, polygon, plane),
+        "Boundary.txt": _boundary(_on_plane(rings, dataset, plane), step),
+        "Headland.txt": _headland(main_field(dataset, polygon), rings, dataset, plane, step),
         "TrackLines.txt": _track_lines(dataset, plane),
         "Flags.txt": _flags(dataset, plane),
     }
@@ -67,19 +73,38 @@ def _field(name: str, plane: LocalPlane, day: str | None) -> list[str]:
     ]
 
 
-def _boundary(dataset: Dataset, polygon: Any, plane: LocalPlane) -> list[str]:
-    area_ha = float(ground_areas_m2([polygon], dataset.crs)[0]) / 10_000.0
-    step = next(step for limit, step in _STEPS if area_ha < limit)
-    obstacles = avoided(dataset)
-    rings = [polygon.exterior, *polygon.interiors]
-    rings += [shape.exterior for shape in exact_geometry(schema.OBSTACLES, obstacles)]
-    outer, *inner = to_lonlat(np.array(rings, dtype=object), dataset.crs)
+def _boundary(rings: list[FloatArray], step: float) -> list[str]:
     lines = ["$Boundary"]
-    # The outer ring runs clockwise, inner rings the other way, as the program itself has them.
-    lines += _ring(_plane_ring(outer, plane, clockwise=True), step)
-    for ring in inner:
-        lines += _ring(_plane_ring(ring, plane, clockwise=False), step / 2)
+    for number, ring in enumerate(rings):
+        # False: nothing drives through this ring.
+        lines += ["False", *_ring(ring, step if number == 0 else step / 2)]
     return lines
+
+
+def _headland(
+    parts: list[Any], rings: list[Any], dataset: Dataset, plane: LocalPlane, step: float
+) -> list[str]:
+    """The line at which machines turn, for each ring of the boundary; 0 where there is none."""
+    lines = ["$Headland"]
+    if not parts:
+        return lines
+    main = parts[0]
+    placed = _on_plane([main.exterior, *main.interiors], dataset, plane)
+    lines += _ring(placed[0], step)
+    for ring in rings[1:]:
+        around = [
+            edge
+            for inner, edge in zip(main.interiors, placed[1:], strict=True)
+            if shapely.Polygon(inner).covers(ring)
+        ]
+        lines += _ring(around[0], step / 2) if around else ["0"]
+    return lines
+
+
+def _on_plane(rings: list[Any], dataset: Dataset, plane: LocalPlane) -> list[FloatArray]:
+    """Open rings (n, 2) in the plane; the first clockwise, the others not, as in the program."""
+    placed = to_lonlat(np.array(rings, dtype=object), dataset.crs)
+    return [_plane_ring(ring, plane, clockwise=n == 0) for n, ring in enumerate(placed)]
 
 
 def _plane_ring(ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
@@ -93,8 +118,7 @@ def _plane_ring(ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
 def _ring(ring: FloatArray, step: float) -> list[str]:
     vertices = np.round(densified(ring, step), 3)
     headings = ring_headings(vertices)
-    # False: nothing drives through this ring.
-    return ["False", str(len(vertices))] + [
+    return [str(len(vertices))] + [
         f"{east:.3f},{north:.3f},{heading:.5f}"
         for (east, north), heading in zip(vertices, headings, strict=True)
     ]

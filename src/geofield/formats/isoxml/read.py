@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -15,12 +17,21 @@ from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
+from geofield.formats.isoxml.guidance import guidance_lines, position
 from geofield.formats.xml import read_xml
 from geofield.model import Dataset
 
-#: Polygons that no vehicle may enter: obstacle, and the boundary's own holes stay holes.
-_OBSTACLE_POLYGONS = (PolygonType.OBSTACLE,)
-_NUMBERS = re.compile(r"^(?:Obstacle|Track) (\d+)(?:-(\d+))?$")
+#: What no vehicle may enter; a boundary's own holes stay holes.
+_STANDING = {
+    PolygonType.OBSTACLE: "obstacle",
+    PolygonType.WATER: "water",
+    PolygonType.BUILDING: "building",
+    PolygonType.ROAD: "road",
+    PolygonType.WINDBREAK: "windbreak",
+}
+_NUMBERS = re.compile(r"^Obstacle (\d+)(?:\+[\d+]*…?)?$")
+#: How much of an obstacle's area may differ from a hole that it stands for.
+_SAME_AREA = 1e-4
 
 
 def read(path: Path) -> Dataset:
@@ -42,13 +53,17 @@ def read(path: Path) -> Dataset:
         )
     field = fields[0]
     _unwrap(field)
+    boundaries = list(_boundaries(field))
+    outline = shapely.union_all([row["geometry"] for row in boundaries])
+    lines, lines_told = guidance_lines(field, outline)
     layers = [
-        _layer("boundary", list(_boundaries(field))),
-        _layer("obstacles", list(_obstacles(field))),
-        _layer("guidance", list(_guidance(field))),
+        _layer("boundary", boundaries),
+        _layer("obstacles", list(_obstacles(field, outline))),
+        _layer("guidance", lines),
     ]
     found = [layer for layer in layers if layer is not None]
-    return read_foreign(found, file, name=field.get("C") or file.parent.name)
+    dataset = read_foreign(found, file, name=field.get("C") or file.parent.name)
+    return replace(dataset, notes=(*_told(field), *lines_told))
 
 
 def task_file(path: Path) -> Path:
@@ -78,7 +93,7 @@ def _external(root: ET.Element, folder: Path) -> list[ET.Element]:
 def _unwrap(field: ET.Element) -> None:
     """Give the positions of a field across 180 degrees longitudes that go on beyond."""
     points = list(field.iter("PNT"))
-    lons = np.array([_position(point)[0] for point in points])
+    lons = np.array([position(point)[0] for point in points])
     if len(lons) and np.ptp(lons) > 180.0:
         for point, lon in zip(points, lons, strict=True):
             point.set("D", repr(float(lon % 360.0)))
@@ -93,74 +108,70 @@ def _layer(name: str, rows: list[dict[str, Any]]) -> RawLayer | None:
 
 
 def _boundaries(field: ET.Element) -> Iterable[dict[str, Any]]:
-    for element in field.iter("PLN"):
+    for element in field.findall("PLN"):
         if element.get("A") == PolygonType.BOUNDARY:
             for shape in _polygons(element):
                 yield {"name": field.get("C"), "geometry": shape}
 
 
-def _obstacles(field: ET.Element) -> Iterable[dict[str, Any]]:
-    """Obstacle polygons, and obstacle points where no polygon has the same name."""
+def _told(field: ET.Element) -> Iterable[str]:
+    """What was taken for obstacles without the name, and what is left out, for people."""
+    found = Counter(str(element.get("A")) for element in field.findall("PLN"))
+    for code, count in sorted(found.items()):
+        if code in _STANDING and code != PolygonType.OBSTACLE:
+            yield f"{count} of type {_STANDING[PolygonType(code)]} taken as obstacles"
+        elif code not in (*_STANDING, PolygonType.BOUNDARY):
+            names = {each.value: each.name.lower().replace("_", " ") for each in PolygonType}
+            yield f"{count} polygons left out: {names.get(code, f'type {code}')}"
+    zones = len(field.findall("TZN"))
+    if zones:
+        yield f"{zones} treatment zones left out"
+
+
+def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
+    """Obstacle polygons, and obstacle points where no polygon has the same number."""
     points = {
         point.get("B", f"#{index}"): point
         for index, point in enumerate(field.findall("PNT"))
         if point.get("A") == PointType.OBSTACLE
     }
-    for element in field.iter("PLN"):
-        if element.get("A") not in _OBSTACLE_POLYGONS:
+    holes = [
+        shapely.Polygon(ring) for part in shapely.get_parts(outline) for ring in part.interiors
+    ]
+    for element in field.findall("PLN"):
+        if element.get("A") not in _STANDING:
             continue
         name = element.get("B", "")
-        tree = points.pop(name, None) is not None
+        inside = {name, *(f"Obstacle {number}" for number in re.findall(r"\d+", name))}
+        here = [points.pop(each) for each in inside & points.keys()]
         for shape in _polygons(element):
+            if any(_same(shape, hole) for hole in holes):
+                continue
             yield {
-                "obstacle_no": _number(name, 1),
-                "kind": "tree" if tree else "other",
+                "obstacle_no": _number_in(name),
+                "kind": "tree" if here else "other",
                 "geometry": shape,
             }
     for name, point in points.items():
         yield {
-            "obstacle_no": _number(name, 1),
+            "obstacle_no": _number_in(name),
             "kind": "tree",
-            "geometry": shapely.Point(_position(point)),
+            "geometry": shapely.Point(position(point)),
         }
 
 
-def _guidance(field: ET.Element) -> Iterable[dict[str, Any]]:
-    """Lines of guidance patterns (version 4) and of the field itself (version 3).
-
-    The one line that a terminal is to repeat is left out where explicit lines are there.
-    """
-    rows: list[dict[str, Any] | None] = []
-    references: list[dict[str, Any] | None] = []
-    for pattern in field.iter("GPN"):
-        for line in pattern.findall("LSG"):
-            row = _line(line, pattern.get("B") or "")
-            (references if pattern.get("E", "4") != "4" else rows).append(row)
-    rows += [
-        _line(line, line.get("B") or "")
-        for line in field.findall("LSG")
-        if line.get("A") == LineType.GUIDANCE
-    ]
-    return [row for row in rows or references if row is not None]
-
-
-def _line(element: ET.Element, name: str) -> dict[str, Any] | None:
-    positions = [_position(point) for point in element.findall("PNT")]
-    if len(positions) < 2:
-        return None
-    return {
-        "name": name,
-        "track_no": _number(name, 1),
-        "segment_no": _number(name, 2, default=1),
-        "geometry": shapely.LineString(positions),
-    }
-
-
-def _number(name: str, group: int, default: int | None = None) -> int | None:
+def _number_in(name: str) -> int | None:
+    """The first number of an obstacle's name."""
     match = _NUMBERS.match(name)
-    if match is None:
-        return None
-    return int(match.group(group)) if match.group(group) else default
+    return None if match is None else int(match.group(1))
+
+
+def _same(shape: Any, hole: Any) -> bool:
+    """Whether an obstacle is there for readers that pass over the holes of a boundary."""
+    return bool(
+        shapely.intersects(shape, hole)
+        and shapely.symmetric_difference(shape, hole).area < _SAME_AREA * hole.area
+    )
 
 
 def _polygons(element: ET.Element) -> Iterable[Any]:
@@ -168,20 +179,10 @@ def _polygons(element: ET.Element) -> Iterable[Any]:
     outer: list[Any] = []
     inner: list[Any] = []
     for line in element.findall("LSG"):
-        positions = [_position(point) for point in line.findall("PNT")]
+        positions = [position(point) for point in line.findall("PNT")]
         if len(positions) >= 3:
             (inner if line.get("A") == LineType.INTERIOR else outer).append(positions)
     for positions in outer:
         shell = shapely.Polygon(positions)
         holes = [hole for hole in inner if shell.covers(shapely.Point(hole[0]))]
         yield shapely.Polygon(positions, holes)
-
-
-def _position(point: ET.Element) -> tuple[float, float]:
-    """Longitude and latitude."""
-    try:
-        return float(point.get("D", "")), float(point.get("C", ""))
-    except ValueError as error:
-        raise FormatError(
-            f"A point's position is not two numbers: C={point.get('C')!r}, D={point.get('D')!r}."
-        ) from error

@@ -19,7 +19,6 @@ from geofield import schema
 from geofield.crs import ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry, to_lonlat
-from geofield.formats.avoided import avoided
 from geofield.formats.isoxml.codes import (
     DECIMALS,
     DESIGNATOR,
@@ -34,6 +33,7 @@ from geofield.formats.isoxml.codes import (
 )
 from geofield.formats.names import cut_name, line_names
 from geofield.formats.origin import imagery_day
+from geofield.formats.terminal import main_field, terminal_obstacles
 from geofield.formats.xml import write_xml
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
@@ -49,7 +49,8 @@ def write_v4(
     """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3.
 
     Options: ``customer`` and ``farm``, names for the terminal; ``zip`` (true: the folder
-    TASKDATA in one archive).
+    TASKDATA in one archive); ``headland`` (``line``: its inner edge as AgOpenGPS reads it, or
+    ``strip``: the area).
     """
     return _written(dataset, folder, f"{stem}_isoxml", 4, options)
 
@@ -101,7 +102,7 @@ def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET
         E="CTR1",
         F="FRM1",
     )
-    _add_polygons(part, dataset, polygon, version)
+    _add_polygons(part, dataset, polygon, version, options)
     if version == 4:
         _add_guidance_groups(part, dataset)
     else:
@@ -109,36 +110,47 @@ def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET
     return root
 
 
-def _add_polygons(part: ET.Element, dataset: Dataset, polygon: Any, version: int) -> None:
-    outline = to_lonlat(np.array([polygon], dtype=object), dataset.crs)[0]
-    area_m2 = float(ground_areas_m2([polygon], dataset.crs)[0])
+def _add_polygons(
+    part: ET.Element, dataset: Dataset, polygon: Any, version: int, options: Mapping[str, Any]
+) -> None:
     doubts = dataset.table(schema.FIELD.name)["doubts"].iloc[0]
     # A designator has no room for reasons; that there are some must be seen on the terminal.
     mark = _DOUBTED if isinstance(doubts, str) and doubts else ""
     name = cut_name(dataset.name, DESIGNATOR - len(mark)) + mark
-    _add_polygon(part, PolygonType.BOUNDARY, name, area_m2, outline)
-    obstacles = avoided(dataset)
-    shapes = exact_geometry(schema.OBSTACLES, obstacles)
-    placed = to_lonlat(shapes, dataset.crs) if len(shapes) else shapes
-    names = [f"Obstacle {number}" for number in obstacles["obstacle_no"]]
-    # Some readers pass over the holes of a boundary: an obstacle is a polygon of its own.
-    areas_m2 = ground_areas_m2(shapes, dataset.crs)
-    for name, each_m2, lonlat in zip(names, areas_m2, placed, strict=True):
-        _add_polygon(part, PolygonType.OBSTACLE, name, each_m2, lonlat)
-    if version < 4:
-        return
-    if dataset.has("headland"):
-        rows = dataset.table("headland").explode(ignore_index=True)
-        shapes = np.asarray(rows.geometry.to_numpy(), dtype=object)
-        areas_m2 = ground_areas_m2(shapes, dataset.crs)
-        for number, (each_m2, lonlat) in enumerate(
-            zip(areas_m2, to_lonlat(shapes, dataset.crs), strict=True), start=1
-        ):
-            _add_polygon(part, PolygonType.HEADLAND, f"Headland {number}", each_m2, lonlat)
-    trees = obstacles["kind"].to_numpy() == "tree"
-    for name, shape in zip(np.array(names)[trees], placed[trees], strict=True):
-        centre = shape.centroid
-        _add_point(part, PointType.OBSTACLE, centre.x, centre.y, name=str(name))
+    obstacles = terminal_obstacles(dataset, polygon)
+    # Some readers pass over the holes of a boundary: each is an obstacle of its own, too.
+    holes = [shapely.orient_polygons(shapely.Polygon(ring)) for ring in polygon.interiors]
+    shapes = [(PolygonType.BOUNDARY, name, polygon)]
+    shapes += [(PolygonType.OBSTACLE, each.name, each.shape) for each in obstacles]
+    shapes += [
+        (PolygonType.OBSTACLE, f"Hole {number}", hole) for number, hole in enumerate(holes, start=1)
+    ]
+    if version == 4:
+        shapes += [
+            (PolygonType.HEADLAND, f"Headland {number}", shape)
+            for number, shape in enumerate(_headland(dataset, polygon, options), start=1)
+        ]
+    placed = np.array([shape for _, _, shape in shapes], dtype=object)
+    areas_m2 = ground_areas_m2(placed, dataset.crs)
+    for (kind, each, _), area_m2, lonlat in zip(
+        shapes, areas_m2, to_lonlat(placed, dataset.crs), strict=True
+    ):
+        _add_polygon(part, kind, each, area_m2, lonlat)
+    trees = [tree for each in obstacles for tree in each.trees] if version == 4 else []
+    centres = to_lonlat(np.array([centre for _, centre in trees], dtype=object), dataset.crs)
+    for (number, _), centre in zip(trees, centres, strict=True):
+        _add_point(part, PointType.OBSTACLE, centre.x, centre.y, name=f"Obstacle {number}")
+
+
+def _headland(dataset: Dataset, polygon: Any, options: Mapping[str, Any]) -> list[Any]:
+    """The polygons that stand for the headland.
+
+    AgOpenGPS, the one program known to read them, takes the exterior ring for the line at which
+    machines turn: the headland's inner edge. As the standard's words have it, the strip itself.
+    """
+    if str(options.get("headland", "line")) == "strip":
+        return list(dataset.table("headland").explode(ignore_index=True).geometry)
+    return [shapely.Polygon(part.exterior) for part in main_field(dataset, polygon)]
 
 
 def _add_polygon(

@@ -1,0 +1,165 @@
+"""Guidance lines of ISOXML: patterns of version 4, and lines of the field itself.
+
+AB lines and curves are lines as they stand. An A+ line has one point and a heading: it is drawn
+through the field. A pivot has a centre and a radius: it is an arc or a circle.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import shapely
+from pyproj import Geod
+
+from geofield.errors import FormatError
+from geofield.formats.isoxml.codes import (
+    CLOCKWISE,
+    COUNTER_CLOCKWISE,
+    REPEAT_NONE,
+    Guidance,
+    LineType,
+    PointType,
+)
+
+_GEOD = Geod(ellps="WGS84")
+_NUMBERS = re.compile(r"^Track (\d+)(?:-(\d+))?$")
+#: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
+_ARC_STEP_DEG = 1.0
+#: Half the length of an A+ line where there is no field to draw it through, metres.
+_REACH_M = 500.0
+
+
+def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]], list[str]]:
+    """The lines to drive in a field.
+
+    A line that a terminal is to repeat is left out where explicit lines are there.
+
+    Parameters
+    ----------
+    field : ET.Element
+        A PFD.
+    outline : shapely geometry
+        The field's, degrees.
+
+    Returns
+    -------
+    list of dict
+        A row each, geometry in degrees.
+    list of str
+        What was drawn or left out, for people.
+    """
+    rows: list[dict[str, Any]] = []
+    repeated: list[dict[str, Any]] = []
+    notes: list[str] = []
+    for pattern in field.iter("GPN"):
+        name = pattern.get("B") or ""
+        for line in pattern.findall("LSG"):
+            shape, note = _pattern_line(pattern, line, outline)
+            if shape is None:
+                notes.append(f"guidance {name!r} left out: {note}")
+                continue
+            notes += [f"guidance {name!r}: {note}"] if note else []
+            into = rows if pattern.get("E", REPEAT_NONE) == REPEAT_NONE else repeated
+            into.append(_row(name, shape))
+    for line in field.findall("LSG"):
+        shape = _polyline(line)
+        if line.get("A") == LineType.GUIDANCE and shape is not None:
+            rows.append(_row(line.get("B") or "", shape))
+    if rows and repeated:
+        names = ", ".join(row["name"] for row in repeated[:3])
+        notes.append(f"{len(repeated)} lines to be repeated left out, others being there: {names}")
+    return rows or repeated, notes
+
+
+def position(point: ET.Element) -> tuple[float, float]:
+    """Longitude and latitude of a PNT.
+
+    Raises
+    ------
+    FormatError
+        When they are no numbers.
+    """
+    try:
+        return float(point.get("D", "")), float(point.get("C", ""))
+    except ValueError as error:
+        raise FormatError(
+            f"A point's position is not two numbers: C={point.get('C')!r}, D={point.get('D')!r}."
+        ) from error
+
+
+def _row(name: str, shape: Any) -> dict[str, Any]:
+    match = _NUMBERS.match(name)
+    return {
+        "name": name,
+        "track_no": None if match is None else int(match.group(1)),
+        "segment_no": None if match is None else int(match.group(2) or 1),
+        "geometry": shape,
+    }
+
+
+def _pattern_line(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[Any, str]:
+    """The shape of a pattern, and what to tell of it; None where it cannot be drawn."""
+    kind = pattern.get("C")
+    if kind == Guidance.PIVOT:
+        return _pivot(pattern, line)
+    shape = _polyline(line)
+    if kind == Guidance.A_PLUS and shape is None:
+        return _through(line, pattern.get("G"), outline)
+    return shape, "" if shape is not None else "fewer than two points"
+
+
+def _polyline(line: ET.Element) -> Any:
+    positions = [position(point) for point in line.findall("PNT")]
+    return shapely.LineString(positions) if len(positions) >= 2 else None
+
+
+def _through(line: ET.Element, heading: str | None, outline: Any) -> tuple[Any, str]:
+    """A line through one point along a heading, as far as the field reaches."""
+    points = line.findall("PNT")
+    if not points or heading is None:
+        return None, "an A+ line without a point or heading"
+    lon, lat = position(points[0])
+    reach_m = _REACH_M
+    if not outline.is_empty:
+        corners = shapely.get_coordinates(outline)
+        start = np.full(len(corners), lon), np.full(len(corners), lat)
+        reach_m = float(np.max(_GEOD.inv(*start, corners[:, 0], corners[:, 1])[2]))
+    ends = [_GEOD.fwd(lon, lat, float(heading) + turn, reach_m)[:2] for turn in (180.0, 0.0)]
+    whole = shapely.LineString([ends[0], (lon, lat), ends[1]])
+    parts = shapely.get_parts(shapely.intersection(whole, outline))
+    inside = [part for part in parts if part.geom_type == "LineString"]
+    if inside:
+        xy = shapely.get_coordinates(inside)
+        return shapely.LineString([xy[0], xy[-1]]), "an A+ line, drawn through the field"
+    return shapely.LineString(ends), "an A+ line, drawn as far as the field reaches"
+
+
+def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
+    """The arc that a pivot's outer end draws, or its circle."""
+    by_kind = {point.get("A"): position(point) for point in line.findall("PNT")}
+    centre = by_kind.get(PointType.GUIDANCE_CENTRE)
+    ends = [by_kind.get(kind) for kind in (PointType.GUIDANCE_A, PointType.GUIDANCE_B)]
+    if centre is None:
+        return None, "a pivot without a centre"
+    azimuths, distances = [], []
+    for end in ends:
+        if end is not None:
+            azimuth, _, distance = _GEOD.inv(*centre, *end)
+            azimuths.append(azimuth)
+            distances.append(distance)
+    # H is in millimetres; without it the first point lies on the arc.
+    radius_m = float(pattern.get("H", "0")) / 1000.0 or (distances[0] if distances else 0.0)
+    if radius_m <= 0.0:
+        return None, "a pivot without a radius"
+    start, turn = (azimuths[0] if azimuths else 0.0), 360.0
+    direction = pattern.get("D")
+    if len(azimuths) == 2 and direction in (CLOCKWISE, COUNTER_CLOCKWISE):
+        turn = (azimuths[1] - azimuths[0]) % 360.0 or 360.0
+        turn = turn if direction == CLOCKWISE else turn - 360.0
+    angles = start + np.linspace(0.0, turn, max(int(abs(turn) / _ARC_STEP_DEG), 8) + 1)
+    here = np.full(len(angles), centre[0]), np.full(len(angles), centre[1])
+    lon, lat, _ = _GEOD.fwd(here[0], here[1], angles, np.full(len(angles), radius_m))
+    return shapely.LineString(np.column_stack([lon, lat])), f"a pivot of {radius_m:.1f} m"

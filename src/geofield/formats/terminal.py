@@ -1,0 +1,94 @@
+"""What terminals are told of a field: its main part, and obstacles that do not overlap.
+
+A terminal subtracts each obstacle from the field's area, and some refuse shapes that overlap or
+leave the field: obstacles are joined where they meet and clipped to the field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from geofield import schema
+from geofield.formats.arrow import exact_geometry
+from geofield.formats.avoided import avoided
+from geofield.model import Dataset
+
+#: Smaller pieces are left over from clipping, square metres.
+_SLIVER_M2 = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class TerminalObstacle:
+    """An area that no machine may enter.
+
+    Attributes
+    ----------
+    name : str
+        With the numbers of all obstacles in it: ``Obstacle 3``, ``Obstacle 3+7``.
+    shape : shapely.Polygon
+        In the dataset's CRS, inside the field.
+    trees : tuple of (int, shapely.Point)
+        Numbers and centres of the trees in it.
+    """
+
+    name: str
+    shape: shapely.Polygon
+    trees: tuple[tuple[int, shapely.Point], ...]
+
+
+def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[TerminalObstacle]:
+    """The obstacles that tracks go around, joined where they meet and clipped to the field."""
+    table = avoided(dataset)
+    shapes = exact_geometry(schema.OBSTACLES, table)
+    if not len(shapes):
+        return []
+    numbers = table["obstacle_no"].to_numpy(dtype=np.int64)
+    is_tree = table["kind"].to_numpy() == "tree"
+    centres = shapely.centroid(shapes)
+    group = _groups(shapes)
+    found = []
+    for each in np.unique(group):
+        rows = np.flatnonzero(group == each)
+        whole = shapes[rows[0]] if len(rows) == 1 else shapely.union_all(shapes[rows])
+        if not shapely.covers(field, whole):
+            whole = shapely.intersection(whole, field)
+        name = "Obstacle " + "+".join(str(number) for number in sorted(numbers[rows]))
+        pieces = [
+            piece
+            for piece in shapely.orient_polygons(shapely.get_parts(whole))
+            if piece.geom_type == "Polygon" and piece.area > _SLIVER_M2
+        ]
+        for position, piece in enumerate(pieces, start=1):
+            trees = tuple(
+                (int(numbers[row]), centres[row])
+                for row in rows
+                if is_tree[row] and piece.covers(centres[row])
+            )
+            tail = f" part {position}" if position > 1 else ""
+            found.append(TerminalObstacle(f"{name}{tail}", piece, trees))
+    return found
+
+
+def main_field(dataset: Dataset, field: shapely.Polygon) -> list[shapely.Polygon]:
+    """What the headland leaves of the field, largest first; empty without a headland."""
+    if not dataset.has(schema.HEADLAND.name):
+        return []
+    strip = shapely.union_all(dataset.table(schema.HEADLAND.name).geometry.to_numpy())
+    rest = shapely.get_parts(shapely.orient_polygons(shapely.difference(field, strip)))
+    parts = [part for part in rest if part.geom_type == "Polygon" and part.area > _SLIVER_M2]
+    return sorted(parts, key=lambda part: -float(part.area))
+
+
+def _groups(shapes: NDArray[np.object_]) -> Any:
+    """A number for each shape, the same for shapes that hang together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    one, other = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    links = coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(len(shapes),) * 2)
+    return connected_components(links, directed=False)[1]
