@@ -150,6 +150,7 @@ def run_field(
             field, scene = _find(picture, scene, lat, lon, settings, regions)
         else:
             field = boundary
+            _refuse_elsewhere(boundary, scene)
         field = replace(
             field,
             imagery=scene.source.name,
@@ -257,6 +258,20 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         tracks=tracks,
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence=evidence,
+    )
+
+
+def _refuse_elsewhere(boundary: Field, scene: Scene) -> None:
+    """A boundary that the picture does not show is a slip, often in the order of coordinates."""
+    frame = shapely.Polygon(scene.grid.corners_lonlat())
+    outline = boundary.polygon_lonlat
+    if frame.intersects(outline):
+        return
+    swapped = shapely.transform(outline, lambda xy: xy[:, ::-1])
+    raise FieldError(
+        f"The boundary {boundary.name} lies outside the picture."
+        + (" Its latitude and longitude look swapped." if frame.intersects(swapped) else ""),
+        hint="Check the file's CRS and the order of its coordinates (`ogrinfo -al FILE`).",
     )
 
 

@@ -110,9 +110,21 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
         mine = mine.set_geometry(strips)
     # Points are wider than they look: their radius is only known further on.
     near = mine.geometry.intersects(plan.field.polygon.buffer(100.0))
+    if not near.any() and _swapped_here(standing, plan):
+        raise TrackError(
+            f"The obstacles lie at {plan.field.name} only with latitude and longitude swapped.",
+            hint="Exchange them in the file of obstacles: ogr2ogr -swapXY right.gpkg FILE",
+        )
     table = obstacle_table(mine[near].reset_index(drop=True), plan.field.crs, Path("obstacles"))
     reach = table.geometry.intersects(plan.field.polygon)
     return replace(plan, obstacles=table[reach].reset_index(drop=True))
+
+
+def _swapped_here(standing: gpd.GeoDataFrame, plan: Plan) -> bool:
+    """Whether obstacles would stand in the field with their latitude and longitude exchanged."""
+    lonlat = standing.to_crs(4326).geometry.to_numpy()
+    swapped = shapely.transform(lonlat, lambda xy: xy[:, ::-1])
+    return bool(shapely.intersects(swapped, plan.field.polygon_lonlat).any())
 
 
 def _vector(path: Path, crs: str | None, layer: str | None) -> gpd.GeoDataFrame:

@@ -63,6 +63,15 @@ def field_from_boundary(
         x, y = transformer(LONLAT, own).transform(lon, lat)
         chosen = rows[rows.geometry.intersects(shapely.Point(x, y))]
         what = f"contains lat {lat}, lon {lon}"
+    if chosen.empty and name is None:
+        there = transformer(LONLAT, own).transform(lat, lon) if abs(lon) <= 90 else (np.inf, np.inf)
+        if rows.geometry.intersects(shapely.Point(there)).any():
+            raise FieldError(
+                f"None of the {len(rows)} polygons in the boundary file {what}, but one does with "
+                "latitude and longitude swapped.",
+                hint="Exchange them in the file (`ogr2ogr -swapXY`), or in --lat and --lon where "
+                "the point is wrong.",
+            )
     if chosen.empty:
         raise FieldError(
             f"None of the {len(rows)} polygons in the boundary file {what}.",

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import shapely
 from pyproj import CRS
 from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import LONLAT, transformer
+from geofield.errors import TrackError
 from geofield.grid import Grid
 from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
 from geofield.tracks.outline import metric
 from geofield.tracks.planner import plan_tracks
+
+#: A place given for a field is not farther from it, metres.
+_NEAR_M = 20_000.0
 
 
 def plan_with_settings(
@@ -36,7 +43,7 @@ def plan_with_settings(
     direction: Any = settings.direction
     if settings.ab_lonlat is not None:
         a_b = settings.ab_lonlat
-        direction = [_place(a_b[:2], metric_crs), _place(a_b[2:], metric_crs)]
+        direction = [_place(end, metric_crs, polygon, "A-B line") for end in (a_b[:2], a_b[2:])]
     through = settings.through_lonlat
     tracks = plan_tracks(
         polygon,
@@ -45,7 +52,9 @@ def plan_with_settings(
         spacing_m=settings.spacing_m,
         direction=direction,
         offset_m=settings.offset_m,
-        through=None if through is None else _place(through, metric_crs),
+        through=None
+        if through is None
+        else _place(through, metric_crs, polygon, "place to pass through"),
         last_strip=settings.last_strip,
         headland_m=settings.headland_m,
         headland_holes=settings.headland_holes,
@@ -67,10 +76,30 @@ def plan_with_settings(
         turning_radius_m=settings.turning_radius_m,
         curve=settings.curve,
         margin_m=settings.margin_m,
-        start=None if start is None else _place(start, metric_crs),
+        start=None if start is None else _place(start, metric_crs, polygon, "start"),
     )
 
 
-def _place(lonlat: tuple[float, ...], crs: CRS) -> tuple[float, float]:
-    x, y = transformer(LONLAT, crs).transform(lonlat[0], lonlat[1])
+def _place(
+    lonlat: tuple[float, ...], crs: CRS, polygon: BaseGeometry, what: str
+) -> tuple[float, float]:
+    """A place in the CRS; refused where only its exchanged coordinates are near the field.
+
+    Raises
+    ------
+    TrackError
+        When latitude and longitude are swapped.
+    """
+    project, (lon, lat) = transformer(LONLAT, crs), lonlat[:2]
+    x, y = project.transform(lon, lat)
+    if not _near(polygon, x, y) and abs(lon) <= 90 and _near(polygon, *project.transform(lat, lon)):
+        raise TrackError(
+            f"The {what} at longitude {lon}, latitude {lat} is far from the field; with the two "
+            "swapped it is there.",
+            hint=f"Longitude comes first: {lat} {lon}.",
+        )
     return float(x), float(y)
+
+
+def _near(polygon: BaseGeometry, x: float, y: float) -> bool:
+    return bool(np.isfinite([x, y]).all() and polygon.distance(shapely.Point(x, y)) < _NEAR_M)
