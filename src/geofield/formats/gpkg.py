@@ -7,6 +7,7 @@ stamped with a time gets the date of the imagery, so that a second run is byte-i
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Mapping
 from contextlib import closing
@@ -77,7 +78,9 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     path = folder / f"{stem}.gpkg"
     with_points = bool(options.get("points", True))
     stamp = origin.timestamp(dataset)
-    with gdal_config(OGR_CURRENT_DATE=stamp):
+    # The file comes into place when it is whole: waiting for the disk after every layer and
+    # statement would take most of the time. It is waited for once, at the end.
+    with gdal_config(OGR_CURRENT_DATE=stamp, OGR_SQLITE_SYNCHRONOUS="OFF"):
         for layer in dataset.layers():
             if layer.name == schema.TRACK_POINTS.name:
                 chunks = dataset.point_chunks() if with_points else iter(())
@@ -99,11 +102,14 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
                 },
             )
     with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("PRAGMA synchronous = OFF")
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
         add_styles(connection, dataset.layers(), stamp, frame_strip(dataset))
         project = qgz_bytes(project_xml(dataset, path.name), stem, stamp)
         add_project(connection, stem, project, stamp)
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
     if not options.get("project", True):
         return [path]
     beside = path.with_suffix(".qgz")
