@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import geopandas as gpd
+import numpy as np
 import pyogrio
 import pytest
 import shapely
@@ -13,6 +14,9 @@ from click.testing import CliRunner
 
 from geofield import schema
 from geofield.cli.main import cli
+from geofield.errors import TrackError
+from geofield.tracks import plan_tracks
+from geofield.tracks.fewest import candidate_angles
 
 CRS = 32633
 
@@ -98,3 +102,30 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
         tmp_path / "bare.shp", "--crs", "EPSG:32633", "--spacing", "8", "-o", tmp_path / "x.gpkg"
     )
     assert len(report["fields"]) == 1  # type: ignore[arg-type]
+
+
+def test_a_spacing_that_would_fill_the_memory_is_refused_at_once(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.shp")
+    result = CliRunner().invoke(
+        cli,
+        ["tracks", str(tmp_path / "parcel.shp"), "--spacing", "1e-9", "--direction", "fewest",
+         "-o", str(tmp_path / "plan.gpkg")],
+    )  # fmt: skip
+    assert isinstance(result.exception, TrackError)
+    assert "2e+11 pieces of track; 10,000,000 are the most" in str(result.exception)
+    assert not (tmp_path / "plan.gpkg").exists()
+
+
+def test_a_spacing_of_a_centimetre_is_planned() -> None:
+    (outline,) = outlines(1).geometry
+    trees = list(shapely.points([(500050, 5600030), (500120, 5600050)]))
+    tracks = plan_tracks(outline, trees, crs=CRS, spacing_m=0.01, clearance_m=5.0)
+    assert len(tracks.lines) == 8003  # 80 m of the zone are 80.032 m on the ground
+    assert len(tracks.segments) == 8003 + len(tracks.gaps)
+
+
+def test_ever_more_edges_do_not_make_ever_more_directions() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 4000, endpoint=False)
+    reach = 400.0 + np.where(np.arange(4000) % 2, 5.0, -5.0)
+    saw = shapely.Polygon(np.column_stack((reach * np.cos(angle), reach * np.sin(angle))))
+    assert len(candidate_angles(saw)) <= 600

@@ -18,6 +18,9 @@ from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.layout import track_positions
 from geofield.tracks.shapes import FIELD, Edges, polygon_edges
 
+#: Directions tried at most before those of the shorter edges are passed over.
+_MOST_ANGLES = 600
+
 
 def fewest_direction(
     polygon: Polygon, spacing: float, *, turns: bool = False, tolerance: float = 1.0
@@ -72,7 +75,14 @@ def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
     # Edges first: of equals the first wins, and a driver would rather follow an edge.
     angles = np.concatenate((angles, np.deg2rad(np.arange(180.0))))
     _, first = np.unique(angles.round(9), return_index=True)
-    return np.asarray(angles[np.sort(first)])
+    angles = angles[np.sort(first)]
+    if len(angles) <= _MOST_ANGLES:
+        return np.asarray(angles)
+    # Of ever more edges the longest in each half degree says enough.
+    lengths = np.append(np.hypot(*edges.T), np.zeros(180))[np.sort(first)]
+    by_length = np.argsort(-lengths, kind="stable")
+    _, longest = np.unique((angles[by_length] * (360.0 / np.pi)).astype(int), return_index=True)
+    return np.asarray(angles[by_length[np.sort(longest)]])
 
 
 def _turned(edges: Edges, angle: float) -> Edges:

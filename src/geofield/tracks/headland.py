@@ -108,21 +108,12 @@ def headland_track_table(
     cuts stays closed.
     """
     passes = max(1, int(np.floor(width_m / spacing_m + 1e-9)))
-    blocked = shapely.union_all(
-        [
-            *shapely.buffer(
-                shapely.points(shapes.circles[:, :2]),
-                shapes.circles[:, 2] / np.cos(np.pi / (8 * QUARTER_SEGMENTS)),
-                quad_segs=2 * QUARTER_SEGMENTS,
-            ),
-            *shapes.polygons,
-        ]
-    )
+    offsets_m = [min((index + 0.5) * spacing_m, width_m) for index in range(passes)]
+    areas = [inset(outline, offset_m * scale, holes=holes) for offset_m in offsets_m]
+    blocked = _blocked(shapes, shapely.union_all(shapely.boundary(areas)))
     rows: list[tuple[int, int, float]] = []
     lines: list[BaseGeometry] = []
-    for index in range(passes):
-        offset = min((index + 0.5) * spacing_m, width_m)
-        area = inset(outline, offset * scale, holes=holes)
+    for index, (offset, area) in enumerate(zip(offsets_m, areas, strict=True)):
         rings: list[BaseGeometry] = []
         for part in shapely.get_parts(area):
             rings.append(shapely.LineString(part.exterior.coords))
@@ -151,3 +142,18 @@ def headland_track_table(
         lines,
         crs,
     )
+
+
+def _blocked(shapes: ObstacleShapes, rings: BaseGeometry) -> BaseGeometry:
+    """Those obstacles that stand in the way of the rings, as one geometry."""
+    shapely.prepare(rings)
+    places = np.asarray(shapely.points(shapes.circles[:, :2]), dtype=object)
+    radius = shapes.circles[:, 2]
+    met = shapely.dwithin(rings, places, radius)  # type: ignore[call-overload]
+    discs = shapely.buffer(
+        places[met],
+        radius[met] / np.cos(np.pi / (8 * QUARTER_SEGMENTS)),
+        quad_segs=2 * QUARTER_SEGMENTS,
+    )
+    other = shapes.polygons[shapely.intersects(rings, shapes.polygons)]
+    return shapely.union_all(np.concatenate((discs, other)))

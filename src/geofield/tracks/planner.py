@@ -6,6 +6,7 @@ import warnings
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -31,6 +32,8 @@ from geofield.tracks.tables import (
     segment_ends,
     segment_table,
 )
+
+MOST_PIECES = 10_000_000
 
 
 def plan_tracks(
@@ -110,6 +113,10 @@ def plan_tracks(
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
     wanted_m = spacing_m
+    shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
+    centre = outline.centroid
+    scale = ground_scale(metric_crs, centre.x, centre.y)
+    _refuse_too_many(outline, shapes, spacing_m * scale)
     baseline = find_baseline(
         outline,
         direction,
@@ -118,8 +125,6 @@ def plan_tracks(
         tolerance_m=straight_tolerance_m,
         grid=grid,
     )
-    centre = outline.centroid
-    scale = ground_scale(metric_crs, centre.x, centre.y)
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left, scale=scale)
     inner: BaseGeometry = outline
     if headland_m != 0.0:
@@ -135,7 +140,6 @@ def plan_tracks(
         through=through,
         last_strip=last_strip,
     )
-    shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
     pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
@@ -193,6 +197,23 @@ def _check_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
         if not (np.isfinite(value) and value > 0.0):
             raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
+
+
+def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float) -> None:
+    """Refuse a spacing that would fill the memory, before anything is made.
+
+    Lines a spacing apart meet a curve 2 L / (pi spacing) times on average over all directions
+    (Crofton); a piece of the field has two ends, and an obstacle cuts one piece into two.
+    """
+    length = outline.length + 2.0 * np.pi * shapes.circles[:, 2].sum()
+    length += shapely.length(shapes.polygons).sum()
+    count = float(length / (np.pi * spacing))
+    if count > MOST_PIECES:
+        raise TrackError(
+            f"So narrow a spacing would give about {count:.1g} pieces of track; "
+            f"{MOST_PIECES:,} are the most.",
+            hint="Give the spacing in metres, for instance 3, or plan parts of the field.",
+        )
 
 
 def _positions(
