@@ -65,6 +65,7 @@ class Page:
 
     def __init__(self, driver: webdriver.Chrome, address: str) -> None:
         self.driver = driver
+        driver.get_log("browser")  # what earlier pages said is theirs
         driver.get(address)
         self.wait(lambda: self.run("return document.body.dataset.ready"))
         time.sleep(0.3)
@@ -148,9 +149,13 @@ class Page:
         return self.driver.find_element(By.ID, name).text
 
     def complaints(self) -> list[str]:
-        """What the browser complained of: scripts that failed, rules that were broken."""
+        """What the browser complained of: scripts that failed, rules that were broken.
+
+        Refusals in words (status 4xx) are wanted, and so is the question before leaving.
+        """
+        wanted = ("status of 4", "confirmation panel")
         return [
             entry["message"]
             for entry in self.driver.get_log("browser")
-            if entry["level"] == "SEVERE" and "status of 4" not in entry["message"]
+            if entry["level"] == "SEVERE" and not any(each in entry["message"] for each in wanted)
         ]

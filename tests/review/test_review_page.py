@@ -313,3 +313,39 @@ def test_a_port_in_use_and_a_file_that_is_no_plan(plan_path: Path) -> None:
     other = shutil.copy(plan_path.with_name("scene.tif"), plan_path.with_name("x.gpkg"))
     with served(Path(other)) as (nothing, process):
         assert process.wait(20) == 1
+
+
+def test_a_folder_of_plans_is_reviewed_in_one_session(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    folder = plan_path.parent
+    (folder / "second").mkdir()
+    for name in ("field.gpkg", "scene.tif"):
+        shutil.copy(folder / name, folder / "second" / name)
+    (folder / "notes.gpkg").write_bytes(b"no plan")
+    with served(folder) as (address, _):
+        page = Page(driver, address)
+        options = page.driver.find_elements(By.CSS_SELECTOR, "#plans option")
+        assert [option.text for option in options] == ["field.gpkg", "second/field.gpkg"]
+        page.press("j", "r")
+        page.wait(lambda: "20 of 21" in page.text("left"))
+        page.run("document.body.dataset.ready = ''")
+        options[1].click()
+        page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
+        assert "21 of 21" in page.text("left")
+        page.press("j", "r", "j", "r")
+        page.wait(lambda: "19 of 21" in page.text("left"))
+        page.button("save")
+        page.wait(lambda: "Saved" in page.text("message"))
+        # What was edited on the first plan is as it was left.
+        page.run("document.body.dataset.ready = ''")
+        page.driver.find_elements(By.CSS_SELECTOR, "#plans option")[0].click()
+        page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
+        assert "20 of 21" in page.text("left")
+    second = read_plan(folder / "second" / "field.gpkg").obstacles
+    assert second is not None
+    assert (second["status"] == "rejected").sum() == 2
+    first = read_plan(plan_path).obstacles
+    assert first is not None
+    assert (first["status"] == "rejected").sum() == 0
+    assert plan_path.with_name("field.gpkg.review.jsonl").exists()

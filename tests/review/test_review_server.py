@@ -19,6 +19,7 @@ from rasterio.warp import Resampling, calculate_default_transform, reproject
 from geofield.imagery.display import TILE_PX, TiledPicture
 from geofield.review.desk import Desk
 from geofield.review.server import MOST_BYTES, ReviewServer
+from geofield.review.shelf import Shelf
 
 
 class Visitor:
@@ -55,7 +56,7 @@ class Visitor:
 
 @pytest.fixture
 def visitor(plan_path: Path) -> Iterator[Visitor]:
-    server = ReviewServer(Desk(plan_path))
+    server = ReviewServer(Shelf(plan_path))
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
     thread.start()
     yield Visitor(server)
@@ -82,7 +83,7 @@ def test_only_the_printed_address_opens(visitor: Visitor) -> None:
 def test_strangers_change_nothing(visitor: Visitor) -> None:
     edit = {"do": "status", "no": 3, "status": "rejected"}
     visitor.post("/api/take", {})
-    before = visitor.server.desk.session.step
+    before = visitor.server.shelf.desk.session.step
     # A name that was pointed at this machine, another site's page, no cookie, no key, wrong key.
     for wrong in (
         {"Host": "evil.example"},
@@ -96,9 +97,9 @@ def test_strangers_change_nothing(visitor: Visitor) -> None:
     ):
         headers = {k: v.encode("utf-8").decode("latin-1") for k, v in wrong.items()}
         assert visitor.post("/api/edit", edit, **headers)[0] == 403, wrong
-    assert visitor.server.desk.session.step is before
+    assert visitor.server.shelf.desk.session.step is before
     assert visitor.post("/api/edit", edit)[0] == 200
-    assert visitor.server.desk.session.step is not before
+    assert visitor.server.shelf.desk.session.step is not before
 
 
 def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
@@ -119,8 +120,13 @@ def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
         "//x/",
     ):
         assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404
-    for path in ("/tile/colour/99/0/0", "/tile/colour/0/-1/0", "/tile/colour/0/0/9", "/tile/x"):
-        assert visitor.ask("GET", path, Cookie=visitor.cookie)[0] == 404
+    for path in (
+        "/tile/colour/0/99/0/0",
+        "/tile/colour/0/0/-1/0",
+        "/tile/colour/7/0/0/0",
+        "/tile/x",
+    ):
+        assert visitor.ask("GET", f"/tile/{path}", Cookie=visitor.cookie)[0] == 404
 
 
 def test_a_second_tab_is_told(visitor: Visitor) -> None:

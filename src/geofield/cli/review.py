@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import click
@@ -15,6 +14,7 @@ from geofield.cli.console import say
 Examples:
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/
   geofield review out/field.gpkg
+  geofield review farm/
   geofield review out/field.gpkg --picture out/scene.tif --no-browser --port 8765
 The page lists its keys when you press "?". Ctrl-C, or the page itself, ends the session.
 """
@@ -22,7 +22,7 @@ The page lists its keys when you press "?". Ctrl-C, or the page itself, ends the
 @click.argument(
     "plan_file",
     metavar="PLAN",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=click.Path(exists=True, path_type=Path),
 )
 @click.option(
     "--picture",
@@ -41,24 +41,25 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     """Correct a plan on a page in the browser.
 
     Confirm or reject obstacles, add and move them, correct the outline, turn the tracks: they
-    follow at once. PLAN is a GeoPackage of geofield. Saving writes into it; until then every
-    edit lies in a journal beside it, and comes back when the session was killed.
+    follow at once. PLAN is a GeoPackage of geofield, or a folder with several. Saving writes into
+    it; until then every edit lies in a journal beside it, and comes back when the session was
+    killed.
 
     The page is served to this machine only, under an address that holds a key.
     """
     from geofield.errors import GeofieldError
-    from geofield.review.desk import Desk
     from geofield.review.server import ReviewServer
+    from geofield.review.shelf import Shelf
 
-    desk = Desk(plan_file, picture)
+    shelf = Shelf(plan_file, picture)
     try:
-        server = ReviewServer(desk, port)
+        server = ReviewServer(shelf, port)
     except OSError as error:
         raise GeofieldError(
             f"Port {port} cannot be used: {error.strerror}.", hint="Choose another --port."
         ) from error
-    if desk.brought_back:
-        say(desk.brought_back)
+    if shelf.desk.brought_back:
+        say(shelf.desk.brought_back)
     click.echo(server.address)
     say("Open this address in a browser on this machine. Ctrl-C ends the session.")
     if not no_browser:
@@ -68,8 +69,8 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     try:
         server.serve_forever(poll_interval=0.2)
     except KeyboardInterrupt:
-        time.sleep(0.0)
+        say("Ended.")
     finally:
         server.server_close()
-    if desk.session.edited:
-        say(f"Edits that were not saved lie in {desk.journal.path}; the next session has them.")
+    for journal in shelf.unsaved():
+        say(f"Edits that were not saved lie in {journal}; the next session has them.")

@@ -42,7 +42,6 @@ class Desk:
     def __init__(self, path: Path, picture: Path | None = None) -> None:
         self.path = path
         self.lock = threading.RLock()
-        self.holder: str | None = None
         self._picture_path = picture or picture_beside(path)
         self._read()
 
@@ -146,17 +145,6 @@ class Desk:
                 dataset, folder, [name], stem=self.path.stem, overwrite=True, inputs=[self.path]
             )
         return {"files": [str(path.relative_to(self.path.parent)) for path in written]}
-
-    def take(self, tab: str, *, force: bool = False) -> dict[str, Any]:
-        """Who edits: the first tab, or another that takes over."""
-        with self.lock:
-            if self.holder is None or force:
-                self.holder = tab
-            return {"yours": self.holder == tab}
-
-    def holds(self, tab: str) -> bool:
-        """Whether a tab may edit."""
-        return self.holder == tab
 
     # -- inner -------------------------------------------------------------------------------
 

@@ -14,8 +14,9 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from geofield.errors import GeofieldError
-from geofield.review.desk import ChangedError, Desk
+from geofield.review.desk import ChangedError
 from geofield.review.guard import SECURITY_HEADERS, Guard
+from geofield.review.shelf import Shelf
 
 #: The largest request that is read: an outline of a hundred thousand corners.
 MOST_BYTES = 4_000_000
@@ -29,11 +30,11 @@ _TYPES = {
 
 
 class ReviewServer(ThreadingHTTPServer):
-    """A server for one desk, bound to 127.0.0.1.
+    """A server for one session, bound to 127.0.0.1.
 
     Parameters
     ----------
-    desk : Desk
+    shelf : Shelf
     port : int
         0 takes a free one.
     """
@@ -41,9 +42,9 @@ class ReviewServer(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 32
 
-    def __init__(self, desk: Desk, port: int = 0) -> None:
+    def __init__(self, shelf: Shelf, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), _Handler)
-        self.desk = desk
+        self.shelf = shelf
         self.guard = Guard(self.server_port)
         self.files = _page_files()
 
@@ -102,8 +103,10 @@ class _Handler(BaseHTTPRequestHandler):
         if self._refused():
             return
         if address.path == "/api/state":
-            opening = self.server.desk.opening()
-            self._json(200, {**opening, "token": self.server.guard.token})
+            shelf = self.server.shelf
+            opening = shelf.desk.opening()
+            plans = {"plans": shelf.names, "plan": shelf.current}
+            self._json(200, {**opening, **plans, "token": self.server.guard.token})
         elif address.path.startswith("/tile/"):
             self._tile(address.path)
         else:
@@ -141,16 +144,21 @@ class _Handler(BaseHTTPRequestHandler):
             self._json(404, {"message": "There is no such request."})
 
     def _answer(self, path: str, value: dict[str, Any]) -> dict[str, Any]:
-        desk, tab = self.server.desk, self.headers.get("X-Geofield-Tab", "")
+        shelf, tab = self.server.shelf, self.headers.get("X-Geofield-Tab", "")
         if path == "/api/take":
-            return desk.take(tab, force=bool(value.get("force")))
+            return {"yours": shelf.take(tab, force=bool(value.get("force")))}
         if path == "/api/stop":
             self.server.stop()
             return {"stopped": True}
-        if not desk.holds(tab):
+        if not shelf.holds(tab):
             raise GeofieldError(
                 "Another tab is editing this plan.", hint="Go on there, or take over here."
             )
+        if path == "/api/open":
+            number = value.get("plan")
+            shelf.open(number if isinstance(number, int) else -1)
+            return {"plan": shelf.current}
+        desk = shelf.desk
         if path == "/api/edit":
             return desk.edit(value)
         if path == "/api/preview":
@@ -165,13 +173,17 @@ class _Handler(BaseHTTPRequestHandler):
         raise LookupError(path)
 
     def _tile(self, path: str) -> None:
-        parts = path.split("/")[2:]
-        picture = self.server.desk.picture
-        if picture is None or len(parts) != 4 or not all(p.isdecimal() for p in parts[1:]):
+        show, *places = path.split("/")[2:]
+        shelf = self.server.shelf
+        numbers = [int(place) for place in places if place.isdecimal()]
+        if len(places) != 4 or len(numbers) != 4 or numbers[0] >= len(shelf.paths):
             self._json(404, {"message": "There is no such tile."})
             return
-        level, column, row = (int(part) for part in parts[1:])
-        show = "infrared" if parts[0] == "infrared" else "colour"
+        plan, level, column, row = numbers
+        picture = shelf.desk_of(plan).picture
+        if picture is None or show not in ("colour", "infrared"):
+            self._json(404, {"message": "There is no such tile."})
+            return
         try:
             data, kind = picture.tile(level, column, row, show)  # type: ignore[arg-type]
         except GeofieldError as error:

@@ -3,7 +3,7 @@
 const WORDS = {
   en: {
     undo: "Undo", redo: "Redo", save: "Save", more: "More", keys: "Keys", tools: "Tools", map: "Map",
-    panel: "Findings", obstacles: "Obstacles", obstacle: "Obstacle", previous: "Previous", next: "Next", confirm: "Confirm",
+    panel: "Findings", plan: "Plan", obstacles: "Obstacles", obstacle: "Obstacle", previous: "Previous", next: "Next", confirm: "Confirm",
     reject: "Reject", outline: "Outline", tracks: "Tracks", spacing: "Spacing, m", headland: "Headland, m",
     direction: "Direction or heading", last_strip: "Last strip", route: "Route", apply: "Apply", view: "View",
     opacity: "Picture", contrast: "Contrast", infrared: "Near infrared", legend: "Legend", close: "Close",
@@ -31,7 +31,7 @@ const WORDS = {
   },
   de: {
     undo: "Zurück", redo: "Vor", save: "Speichern", more: "Mehr", keys: "Tasten", tools: "Werkzeuge", map: "Karte",
-    panel: "Befunde", obstacles: "Hindernisse", obstacle: "Hindernis", previous: "Voriges", next: "Nächstes", confirm: "Bestätigen",
+    panel: "Befunde", plan: "Plan", obstacles: "Hindernisse", obstacle: "Hindernis", previous: "Voriges", next: "Nächstes", confirm: "Bestätigen",
     reject: "Verwerfen", outline: "Umriss", tracks: "Spuren", spacing: "Abstand, m", headland: "Vorgewende, m",
     direction: "Richtung oder Kurs", last_strip: "Letzter Streifen", route: "Fahrweg", apply: "Anwenden", view: "Ansicht",
     opacity: "Bild", contrast: "Kontrast", infrared: "Nahes Infrarot", legend: "Legende", close: "Schließen",

@@ -1,6 +1,8 @@
 // Speaks to the server: one request at a time for what drags, errors as words.
 
-const tab = crypto.randomUUID ? crypto.randomUUID() : String(Math.random());
+// A tab keeps its name when it is loaded again.
+const tab = sessionStorage.getItem("tab") ?? String(crypto.getRandomValues(new Uint32Array(2)));
+sessionStorage.setItem("tab", tab);
 let token = "";
 
 export class Refused extends Error {
@@ -38,6 +40,7 @@ export const takeOver = () => ask("/api/take", {force: true});
 export const edit = command => ask("/api/edit", command);
 export const save = name => ask("/api/save", name ? {name} : {});
 export const reload = () => ask("/api/reload", {});
+export const openPlan = plan => ask("/api/open", {plan});
 export const stop = () => ask("/api/stop", {});
 export const exportAs = format => ask("/api/export", {format});
 

@@ -217,6 +217,10 @@ async function start() {
   $("credit").textContent = state.picture?.credit ?? "";
   $("export-format").replaceChildren(...state.formats.map(([name, title]) => new Option(title, name)));
   $("language").value = currentLanguage();
+  $("plans-row").hidden = state.plans.length < 2;
+  $("plans").replaceChildren(...state.plans.map((name, i) => new Option(name, i, i === state.plan, i === state.plan)));
+  // Edits stay with their plan on the server: nothing is lost by going to another one.
+  $("plans").onchange = ({target}) => act(() => api.openPlan(Number(target.value)), () => { ended = true; location.reload(); });
   for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more"])
     $(name).onclick = () => ACTIONS[name]();
   $("infrared").onchange = ({target}) => maps.showInfrared(target.checked, state);

@@ -20,7 +20,7 @@ export function build(state, chosen) {
   pictureFacts = state.picture;
   const layers = [];
   if (pictureFacts) layers.push(picture = new ol.layer.Tile({className: "picture", extent: state.bounds, preload: 1,
-    source: tiles(state.bounds, "colour", projection)}));
+    source: tiles(state, "colour", projection)}));
   const add = (name, style) => layers.push(new ol.layer.Vector({source: sources[name], style,
     updateWhileInteracting: true, updateWhileAnimating: true}));
   add("tracks", symbols.trackStyle);
@@ -47,17 +47,17 @@ function grown([left, bottom, right, top], share) {
   return [left - x, bottom - y, right + x, top + y];
 }
 
-function tiles(bounds, show, projection) {
+function tiles({bounds, plan}, show, projection) {
   return new ol.source.TileImage({
     projection, interpolate: true, transition: 0,
     tileGrid: new ol.tilegrid.TileGrid({extent: bounds, origin: [bounds[0], bounds[3]],
       resolutions: pictureFacts.resolutions, tileSize: 512}),
-    tileUrlFunction: ([z, x, y]) => `tile/${show}/${z}/${x}/${y}`,
+    tileUrlFunction: ([z, x, y]) => `tile/${show}/${plan}/${z}/${x}/${y}`,
   });
 }
 
 export function showInfrared(on, state) {
-  picture?.setSource(tiles(state.bounds, on ? "infrared" : "colour", view.getProjection()));
+  picture?.setSource(tiles(state, on ? "infrared" : "colour", view.getProjection()));
 }
 
 export const setOpacity = value => picture?.setOpacity(value);
