@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 import subprocess
@@ -152,8 +153,12 @@ def test_every_edit_survives_every_stage(
     rewritten(
         file, "field", lambda table: table.assign(name="Long meadow", crop=["rye"], soil=[41])
     )
-    run(folder, made, "--overwrite")
+    told = run(folder, made, "--overwrite")
     once = plan_in(folder)
+    count = len(before)
+    said = f"outline as before; 8 obstacles of yours kept, {count - 9} found again, "
+    assert said + "2 you took away not taken up again" in told
+    assert len(json.loads((folder / "out/report.json").read_text())["changes"]) == 2
     check(before, rows(once))
     assert once.field.name == "Long meadow"
     geofield("obstacles", folder / "picture.tif", file, "-o", file)

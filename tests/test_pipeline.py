@@ -62,6 +62,24 @@ def test_stage_by_stage_is_the_same(plan: Plan, simulated: SimulatedField) -> No
     assert staged == plan
 
 
+def test_a_window_is_read_once(
+    simulated: SimulatedField, simulated_tif: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from geofield import imagery
+
+    read, sizes = imagery.read_scene, []
+
+    def counted(*args: object, **options: object) -> object:
+        sizes.append(options["size_m"])
+        return read(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(imagery, "read_scene", counted)
+    where = {"lat": simulated.lat, "lon": simulated.lon}
+    plan_field(simulated_tif, **where, settings=SETTINGS, size_m=180.0)
+    assert sizes
+    assert len(sizes) == len(set(sizes))
+
+
 def test_a_plan_is_read_back_equal(plan: Plan, file: Path) -> None:
     again = read_plan(file)
     assert again == plan

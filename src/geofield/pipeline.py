@@ -85,6 +85,7 @@ def plan_field(
             settings=settings,
             previous=previous,
             boundary=boundary,
+            window=picture,
         )
         picture = plan.scene or picture
     with _timed("obstacles", timings, tell):
@@ -121,6 +122,7 @@ def run_field(
     previous: Plan | None = None,
     regions: Sequence[int] = (),
     boundary: Field | None = None,
+    window: Scene | None = None,
 ) -> Plan:
     """Stage 2: find the outline, unless a person drew it.
 
@@ -137,8 +139,13 @@ def run_field(
         Numbered regions of the study's method that a person chose.
     boundary : Field, optional
         The user's own outline; nothing is extracted then.
+    window : Scene, optional
+        The picture around the point, where it was read from the path already.
     """
-    scene = picture if isinstance(picture, Scene) else open_scene(picture, lat, lon, settings)
+    if isinstance(picture, Scene):
+        scene = picture
+    else:
+        scene = open_scene(picture, lat, lon, settings) if window is None else window
     if previous is not None and not _holds(previous, lat=lat, lon=lon):
         _refuse_to_forget(previous, lat, lon)
         previous = None
@@ -174,6 +181,7 @@ def run_field(
         grid=scene.grid,
         evidence=Evidence((lat, lon), outline_digest(field), written=written),
         scene=scene,
+        changes=() if previous is None else (_outline_changed(previous, field),),
     )
 
 
@@ -214,11 +222,13 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
     detected.attrs.clear()
+    changes = plan.changes
     if plan.obstacles is None:
         written = Written.of(detected, np.zeros(len(detected), bool))
     else:
         earlier, written = reconcile(plan.obstacles, plan.evidence.written, scene.grid)
-        detected, written, _ = merge(detected, earlier, written)
+        detected, written, told = merge(detected, earlier, written)
+        changes += (told.in_words(),)
     return replace(
         plan,
         obstacles=detected,
@@ -228,6 +238,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
         grid=scene.grid,
         evidence=replace(plan.evidence, detection=found, written=written),
         scene=scene,
+        changes=changes,
     )
 
 
@@ -289,6 +300,17 @@ def _refuse_too_wide(field: Field, spacing_m: float) -> None:
 def keeps_outline(previous: Plan) -> bool:
     """Whether an earlier plan's outline is a person's word."""
     return previous.outline_edited or previous.field.method in ("drawn", "boundary")
+
+
+def _outline_changed(previous: Plan, field: Field) -> str:
+    """What became of an earlier plan's outline, in words."""
+    if keeps_outline(previous) and field.method in ("drawn", previous.field.method):
+        return "your outline kept"
+    if previous.field.crs != field.crs:
+        return "outline found anew"
+    before, after = previous.field.polygon, field.polygon
+    other = before.symmetric_difference(after).area / before.union(after).area
+    return "outline as before" if other < 1e-9 else f"outline other by {other:.1%} of its area"
 
 
 def _holds(previous: Plan, *, lat: float, lon: float) -> bool:

@@ -53,6 +53,8 @@ class Plan:
         What the stages recorded.
     scene : Scene or None
         The picture itself, where it is at hand; no part of equality.
+    changes : tuple of str
+        What the last run changed of an earlier plan, in words; no part of equality.
     """
 
     field: Field
@@ -63,6 +65,7 @@ class Plan:
     grid: Grid | None = None
     evidence: Evidence = dataclasses.field(default_factory=Evidence)
     scene: Scene | None = None
+    changes: tuple[str, ...] = ()
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -242,6 +245,7 @@ class Plan:
             options=options,
             timings_s=timings_s,
             inputs=inputs,
+            changes=self.changes,
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:

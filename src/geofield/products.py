@@ -35,6 +35,7 @@ def write_products(
     options: Mapping[str, Any] | None = None,
     timings_s: Mapping[str, float] | None = None,
     inputs: Sequence[str | Path] = (),
+    changes: Sequence[str] = (),
 ) -> list[Path]:
     """Write a dataset and its picture into a folder.
 
@@ -53,6 +54,8 @@ def write_products(
         Seconds per stage, for the report.
     inputs : sequence of path
         Files that were read and must never be replaced.
+    changes : sequence of str
+        What the run changed of an earlier plan, for the report.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def write_products(
         )
         map_picture.result()
         report = json.dumps(
-            make_report(dataset, timings_s or {}, formats),
+            make_report(dataset, timings_s or {}, formats, changes),
             indent=2,
             ensure_ascii=False,
             allow_nan=False,
@@ -97,7 +100,10 @@ def _draw(dataset: Dataset, scene: Scene | None, path: Path) -> None:
 
 
 def make_report(
-    dataset: Dataset, timings_s: Mapping[str, float], formats: Sequence[str] = ()
+    dataset: Dataset,
+    timings_s: Mapping[str, float],
+    formats: Sequence[str] = (),
+    changes: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Counts, lengths, areas, timings, settings, versions and terms, as plain JSON values."""
     field = dataset.table(schema.FIELD.name).iloc[0]
@@ -127,6 +133,7 @@ def make_report(
             "length_m": _rounded(segments["length_m"].sum(), 3),
             **_turns(dataset),
         },
+        "changes": list(changes),
         "formats": {name: {"leaves_out": dropped(dataset, format_named(name))} for name in formats},
         # The rows of the obstacles' record are in the GeoPackage, for geofield alone.
         "evidence": {k: v for k, v in provenance.evidence.items() if k != "written"},

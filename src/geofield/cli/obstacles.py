@@ -75,3 +75,5 @@ def obstacles(
     counts = table["status"].value_counts().sort_index()
     parts = ", ".join(f"{count} {status}" for status, count in counts.items()) or "none found"
     say(f"{len(table)} obstacles ({parts}) in {output}")
+    for change in plan.changes:
+        say(f"Changes: {change}")

@@ -171,6 +171,8 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
             _say_turns(plan.tracks.turns)
         for note in plan.tracks.notes:
             say(f"           {note}")
+    if plan.changes:
+        say(f"Changes    {'; '.join(plan.changes)}")
     if timings:
         say("Time       " + ", ".join(f"{stage} {value:.1f} s" for stage, value in timings.items()))
     folder = files[0].parent

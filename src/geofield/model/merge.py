@@ -37,6 +37,16 @@ class Changes:
     gone: int = 0
     stay_deleted: int = 0
 
+    def in_words(self) -> str:
+        """One line for people."""
+        noun = "obstacle" if self.kept == 1 else "obstacles"
+        words = [f"{self.kept} {noun} of yours kept", f"{self.found_again} found again"]
+        for count, what in ((self.new, "new"), (self.gone, "gone")):
+            words += [f"{count} {what}"] if count else []
+        if self.stay_deleted:
+            words.append(f"{self.stay_deleted} you took away not taken up again")
+        return ", ".join(words)
+
 
 def merge(
     detected: gpd.GeoDataFrame, previous: gpd.GeoDataFrame, written: Written
