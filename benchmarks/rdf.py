@@ -35,6 +35,7 @@ NOTE = (
 #: Name, points, profile.
 CASES = (
     ("write_rdfxml", STUDY_POINTS, "geosparql"),
+    ("write_rdfxml without points", STUDY_POINTS, "geosparql"),
     ("write_ntriples", 1_000_000, "geosparql"),
     ("rdflib xml", STUDY_POINTS, "geosparql"),
     ("write_rdfxml", STUDY_POINTS, "study"),
@@ -53,11 +54,11 @@ def measure(name: str, points: int, profile: str, folder: Path) -> dict[str, flo
 
     from geofield.formats.rdf import write
 
-    options = {"rdf_profile": profile}
+    options = {"rdf_profile": profile, "points": "without points" not in name}
     plan = long_plan(points)
     work: Any
     if name.startswith("write_"):
-        writer = getattr(write, name)
+        writer = getattr(write, name.split(maxsplit=1)[0])
 
         def work() -> None:
             writer(plan, folder, options=options)

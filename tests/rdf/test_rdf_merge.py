@@ -12,7 +12,7 @@ from rdf_plans import small_plan
 
 from geofield.formats.rdf import write
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import DCTERMS, LABEL, expand
+from geofield.formats.rdf.namespaces import expand
 from geofield.formats.rdf.query import ask, open_store, queries
 from geofield.formats.rdf.read import read
 from geofield.formats.rdf.validate import validate
@@ -65,7 +65,7 @@ def test_merging_two_plans_says_nothing_twice(tmp_path, name, profile):
     twice = {key for key, values in said.items() if len(values) > 1 and key[1] not in many}
     assert not twice
     # One field, by one name.
-    assert len({s for s, p in said if p == DCTERMS + "identifier"}) == 1
+    assert len({s for s, p in said if p == expand("dcterms:identifier")}) == 1
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -201,4 +201,4 @@ def test_points_come_when_asked_for_and_say_each_place_once(tmp_path):
     wkt = str(graph.value(geometry, rdflib.URIRef(expand("geo:asWKT"))))
     position = wkt[wkt.index("(") + 1 : -1].split()
     assert [len(each.partition(".")[2]) for each in position] == [7, 7]
-    assert LABEL not in {str(predicate) for predicate, _ in told}
+    assert expand("rdfs:label") not in {str(predicate) for predicate, _ in told}

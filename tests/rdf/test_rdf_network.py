@@ -12,7 +12,8 @@ import pytest
 
 from geofield.errors import FormatError
 from geofield.formats.rdf import write
-from geofield.formats.rdf.query import queries, refuse_outward
+from geofield.formats.rdf.guard import check_query
+from geofield.formats.rdf.query import queries
 
 
 class Listener:
@@ -137,11 +138,11 @@ def test_a_document_that_names_others_connects_to_nothing(tmp_path, listener, na
     ],
 )
 def test_the_words_are_free_in_names_texts_and_comments(text):
-    refuse_outward(text)
+    check_query(text)
 
 
 def test_the_queries_of_the_package_pass_and_the_line_is_told():
     for query in queries().values():
-        refuse_outward(query.sparql)
+        check_query(query.sparql)
     with pytest.raises(FormatError, match=r"line 3: SERVICE"):
-        refuse_outward('SELECT * {\n # FROM\n SERVICE <http://a/> { ?s ?p "x" } }')
+        check_query('SELECT * {\n # FROM\n SERVICE <http://a/> { ?s ?p "x" } }')

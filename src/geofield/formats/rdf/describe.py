@@ -19,7 +19,7 @@ from geofield.formats.rdf.features import feature_group, point_group, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
 from geofield.formats.rdf.namespaces import crs_iri, node
-from geofield.formats.rdf.triples import Column, Group, Nodes, named, single, term
+from geofield.formats.rdf.triples import Column, Group, Nodes, date_term, named, single, term
 from geofield.model.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -41,6 +41,16 @@ LICENCES = {
 }
 #: Metres by which `geo:sfWithin` may miss, for corners that are computed, not measured.
 WITHIN_TOLERANCE_M = 0.001
+#: What the rows of a layer are of: a property and one of the dataset's names.
+_BELONGS = {
+    "field": (
+        ("gf:inField", "field"), ("prov:wasDerivedFrom", "imagery"), ("prov:wasGeneratedBy", "run"),
+    ),
+    "obstacles": (
+        ("gf:inField", "field"), ("gf:inSurvey", "survey"), ("prov:wasDerivedFrom", "imagery"),
+    ),
+    "tracks": (("gf:inField", "field"), ("prov:wasDerivedFrom", "survey")),
+}  # fmt: skip
 #: The files of RDF/XML; also the order of the others.
 PRODUCTS = ("field", "obstacles", "tracks")
 
@@ -106,29 +116,18 @@ class Description:
 
     def belonging(self, name: str, frame: gpd.GeoDataFrame) -> list[Column]:
         """What the rows of a layer say beyond their columns: what they belong to."""
-        names, count = self.names, len(frame)
-
-        def all_to(predicate: str, iri: str) -> Column:
-            return (node(predicate), [ox.NamedNode(iri) if iri else None] * count)
-
+        layer = layer_map(name)
         result: list[Column] = []
-        if name in (schema.FIELD.name, schema.OBSTACLES.name, schema.TRACKS.name):
-            result.append(all_to("gf:inField", names.field))
-        if name in (schema.FIELD.name, schema.OBSTACLES.name):
-            result.append(all_to("prov:wasDerivedFrom", names.imagery))
-        if name == schema.FIELD.name:
-            result.append(all_to("prov:wasGeneratedBy", names.run))
-        if name == schema.OBSTACLES.name:
-            result.append(all_to("gf:inSurvey", names.survey))
-        if name == schema.TRACKS.name:
-            result.append(all_to("prov:wasDerivedFrom", names.survey))
+        links = [*_BELONGS.get(name, ())]
+        if layer.in_plan and layer.says_plan:
+            links.append(("gf:inPlan", "plan"))
+        for predicate, owner in links:
+            target = _thing(getattr(self.names, owner))
+            result.append((node(predicate), [target] * len(frame)))
         if name in (schema.OBSTACLES.name, schema.TRACKS.name):
             result.append(self._within(frame))
-        layer = layer_map(name)
-        if layer.in_plan and layer.says_plan:
-            result.append(all_to("gf:inPlan", names.plan))
         if name == schema.ROUTE.name:
-            steps = row_iris(layer, frame, names)
+            steps = row_iris(layer, frame, self.names)
             result.append((node("gf:nextStep"), named([*steps[1:], None])))
         return result
 
@@ -169,8 +168,7 @@ class Description:
     def _plan(self) -> Iterator[Group]:
         """The plan of tracks, where the dataset has any layer of one."""
         dataset, names = self.dataset, self.names
-        layers = [each.layer.name for each in layer_maps() if each.in_plan]
-        if not any(map(dataset.has, layers)):
+        if not any(dataset.has(each.layer.name) for each in layer_maps() if each.in_plan):
             return
         rows = dataset.table(schema.FIELD.name)
         heading = rows["heading_deg"].iloc[0] if len(rows) and self._has_plan() else np.nan
@@ -245,12 +243,11 @@ class Description:
                 "gf_geoTransform": " ".join(repr(float(v)) for v in grid.transform[:6]),
                 "gf_gridCrs": authority if ":" in authority else grid.crs.to_wkt(),
             }
-        date: Any = source.date
         yield single(
             names.imagery,
             "prov:Entity",
             rdfs_label=source.name,
-            dcterms_created=ox.Literal(date, datatype=node("xsd:date")) if is_date(date) else date,
+            dcterms_created=date_term(source.date) if source.date else None,
             dcterms_license=licence,
             dc_rights=source.licence,
             cc_attributionName=source.attribution,
@@ -299,14 +296,6 @@ def licence_iri(licence: str) -> str | None:
     if text.startswith(("http://", "https://")) and not NOT_IN_IRI.search(text):
         return text
     return LICENCES.get(text.lower())
-
-
-def is_date(text: str | None) -> bool:
-    """Whether a text is a whole ISO 8601 day."""
-    try:
-        return text is not None and len(text) == 10 and np.datetime64(text, "D") is not None
-    except ValueError:
-        return False
 
 
 def _json(value: Any) -> str:

@@ -24,8 +24,17 @@ from geofield.formats.rdf.layers import (
     value_iri,
 )
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import CRS84, SF, crs_iri, node, northing_first
-from geofield.formats.rdf.triples import Column, Group, Nodes, named, term, text_term, typed
+from geofield.formats.rdf.namespaces import CRS84, crs_iri, node, northing_first
+from geofield.formats.rdf.triples import (
+    Column,
+    Group,
+    Nodes,
+    date_term,
+    named,
+    term,
+    text_term,
+    typed,
+)
 from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
@@ -35,7 +44,6 @@ if TYPE_CHECKING:
 LONLAT_DECIMALS = 9
 #: Decimals of a track point, whose place is told once: a centimetre.
 POINT_DECIMALS = 7
-_DATE = re.compile(r"\d{4}-\d\d-\d\d")
 _OBSTACLES_IN_CAUSE = re.compile(r"obstacles?\s+([0-9][0-9,\s]*)")
 _ALSO = {"gf:Survey": ("prov:Entity",), "gf:Obstacle": ("sosa:FeatureOfInterest",)}
 
@@ -178,9 +186,8 @@ def _column_terms(
         return [None if t is None else node(value_iri(t)) for t in texts]
     if column.values == YES_NO:
         return [None if t is None else term(t == "yes") for t in texts]
-    if column.type == "date" and all(_DATE.fullmatch(t) for t in texts if t is not None):
-        return typed(texts, "xsd:date")
-    return [None if t is None else text_term(t) for t in texts]
+    literal = date_term if column.type == "date" else text_term
+    return [None if text is None else literal(text) for text in texts]
 
 
 def _label(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
@@ -251,7 +258,7 @@ def _geometry_nodes(
     iris: list[str], geometry: Any, crs: str, decimals: int, accuracy_m: float | None
 ) -> Nodes:
     wkt = shapely.to_wkt(geometry, rounding_precision=decimals)
-    kinds = [node(SF + shape.geom_type) for shape in geometry]
+    kinds = [node(f"sf:{shape.geom_type}") for shape in geometry]
     columns: list[Column] = [
         (node("rdf:type"), [(kind, node("geo:Geometry")) for kind in kinds]),
         (node("geo:asWKT"), typed([f"<{crs}> {text}" for text in wkt], "geo:wktLiteral")),

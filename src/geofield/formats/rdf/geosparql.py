@@ -7,7 +7,7 @@ WGS 84 ellipsoid, so that they are metres on the ground wherever the field lies.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,12 @@ from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer, utm_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEO, GEOF, UNIT
+from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEOF, expand, node
 from geofield.formats.rdf.wkt import geometries_of
 
-WKT = GEO + "wktLiteral"
 _GEOD = Geod(ellps="WGS84")
 #: Units of measure that `geof:distance` and `geof:buffer` take.
-METRE_IRIS = (
-    "http://www.opengis.net/def/uom/OGC/1.0/metre",
-    UNIT + "M",
-)
+METRE_IRIS = ("http://www.opengis.net/def/uom/OGC/1.0/metre", expand("unit:M"))
 
 Value = str | float | bool | None
 
@@ -35,17 +31,6 @@ Value = str | float | bool | None
 def _shape(literal: str) -> Any:
     """A WKT literal as a geometry in longitude and latitude."""
     return geometries_of([literal], ["the literal"], LONLAT)[0]
-
-
-def _local(shape: Any) -> Any:
-    """A geometry in metres around its own place, and back."""
-    west, south, east, north = shapely.bounds(shape).tolist()
-    crs = utm_crs((west + east) / 2, (south + north) / 2)
-    there, back = transformer(LONLAT, crs), transformer(crs, LONLAT)
-    return (
-        shapely.transform(shape, lambda c: np.column_stack(there.transform(c[:, 0], c[:, 1]))),
-        lambda s: shapely.transform(s, lambda c: np.column_stack(back.transform(c[:, 0], c[:, 1]))),
-    )
 
 
 def _literal(shape: Any) -> str:
@@ -76,62 +61,64 @@ def metric_area(literal: str) -> float:
 
 
 def buffer(literal: str, radius: float, unit: str = METRE_IRIS[0]) -> str:
-    """`geof:buffer`: grown by a radius in metres."""
+    """`geof:buffer`: grown by a radius in metres, in the UTM zone of the place."""
     _need_metres(unit)
-    metres, back = _local(_shape(literal))
-    return _literal(back(shapely.buffer(metres, float(radius), quad_segs=16)))
+    west, south, east, north = shapely.bounds(_shape(literal)).tolist()
+    crs = utm_crs((west + east) / 2, (south + north) / 2)
+
+    def moved(shape: Any, project: Any) -> Any:
+        return shapely.transform(
+            shape, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
+        )
+
+    metres = moved(_shape(literal), transformer(LONLAT, crs))
+    grown = shapely.buffer(metres, float(radius), quad_segs=16)
+    return _literal(moved(grown, transformer(crs, LONLAT)))
 
 
-def _relation(name: str) -> Callable[[str, str], bool]:
+def _relation(name: str) -> tuple[Callable[..., Value], str]:
     test = getattr(shapely, name)
-    return lambda first, second: bool(test(_shape(first), _shape(second)))
+    return lambda first, second: bool(test(_shape(first), _shape(second))), BOOLEAN
 
 
-def _operation(name: str) -> Callable[[str, str], str]:
+def _operation(name: str) -> tuple[Callable[..., Value], str]:
     work = getattr(shapely, name)
-    return lambda first, second: _literal(work(_shape(first), _shape(second)))
+    return lambda *literals: _literal(work(*map(_shape, literals))), expand("geo:wktLiteral")
 
 
+_RELATIONS = (
+    "equals", "disjoint", "intersects", "touches", "crosses", "within", "contains", "overlaps",
+)  # fmt: skip
 #: Local name in the `geof:` namespace to function and datatype of the result.
 FUNCTIONS: dict[str, tuple[Callable[..., Value], str]] = {
-    "sfEquals": (_relation("equals"), BOOLEAN),
-    "sfDisjoint": (_relation("disjoint"), BOOLEAN),
-    "sfIntersects": (_relation("intersects"), BOOLEAN),
-    "sfTouches": (_relation("touches"), BOOLEAN),
-    "sfCrosses": (_relation("crosses"), BOOLEAN),
-    "sfWithin": (_relation("within"), BOOLEAN),
-    "sfContains": (_relation("contains"), BOOLEAN),
-    "sfOverlaps": (_relation("overlaps"), BOOLEAN),
+    **{f"sf{name.capitalize()}": _relation(name) for name in _RELATIONS},
+    **{name: _operation(name) for name in ("intersection", "union", "difference", "envelope")},
+    "convexHull": _operation("convex_hull"),
     "distance": (distance, DOUBLE),
     "metricLength": (metric_length, DOUBLE),
     "metricArea": (metric_area, DOUBLE),
-    "buffer": (buffer, WKT),
-    "intersection": (_operation("intersection"), WKT),
-    "union": (_operation("union"), WKT),
-    "difference": (_operation("difference"), WKT),
-    "envelope": (lambda literal: _literal(shapely.envelope(_shape(literal))), WKT),
-    "convexHull": (lambda literal: _literal(shapely.convex_hull(_shape(literal))), WKT),
+    "buffer": (buffer, expand("geo:wktLiteral")),
 }
+
+
+def _text(function: Callable[..., Value], *arguments: str) -> str | None:
+    """A function's answer as a literal's text; None where it fails."""
+    try:
+        value = function(*arguments)
+    except (FormatError, TypeError, ValueError):
+        return None
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def oxigraph_functions() -> dict[ox.NamedNode, Callable[..., Any]]:
     """The functions for `pyoxigraph.Store.query(custom_functions=...)`."""
-    return {
-        ox.NamedNode(GEOF + name): _for_oxigraph(function, datatype)
-        for name, (function, datatype) in FUNCTIONS.items()
-    }
 
+    def call(function: Callable[..., Value], datatype: str, *arguments: Any) -> Any:
+        text = _text(function, *(argument.value for argument in arguments))
+        # In SPARQL a function that fails leaves its value unbound.
+        return None if text is None else ox.Literal(text, datatype=node(datatype))
 
-def _for_oxigraph(function: Callable[..., Value], datatype: str) -> Callable[..., Any]:
-    def call(*arguments: Any) -> Any:
-        try:
-            value = function(*(argument.value for argument in arguments))
-        except (FormatError, TypeError, ValueError):
-            # In SPARQL a function that fails leaves its value unbound.
-            return None
-        return ox.Literal(_lexical(value), datatype=ox.NamedNode(datatype))
-
-    return call
+    return {node(GEOF + name): partial(call, *each) for name, each in FUNCTIONS.items()}
 
 
 def register_in_rdflib() -> None:
@@ -140,21 +127,11 @@ def register_in_rdflib() -> None:
     from rdflib.plugins.sparql.operators import register_custom_function
     from rdflib.plugins.sparql.sparql import SPARQLError
 
-    def adapted(function: Callable[..., Value], datatype: str) -> Callable[..., Any]:
-        def call(*arguments: Any) -> Any:
-            try:
-                value = function(*(str(argument) for argument in arguments))
-            except (FormatError, TypeError, ValueError) as error:
-                raise SPARQLError(str(error)) from error
-            return rdflib.Literal(_lexical(value), datatype=rdflib.URIRef(datatype))
+    def call(function: Callable[..., Value], datatype: str, *arguments: Any) -> Any:
+        text = _text(function, *map(str, arguments))
+        if text is None:
+            raise SPARQLError("the function fails")
+        return rdflib.Literal(text, datatype=rdflib.URIRef(datatype))
 
-        return call
-
-    for name, (function, datatype) in FUNCTIONS.items():
-        register_custom_function(
-            rdflib.URIRef(GEOF + name), adapted(function, datatype), override=True
-        )
-
-
-def _lexical(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    for name, each in FUNCTIONS.items():
+        register_custom_function(rdflib.URIRef(GEOF + name), partial(call, *each), override=True)

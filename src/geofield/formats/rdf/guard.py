@@ -1,8 +1,9 @@
-"""Guard: refuse hostile files before a parser works on them.
+"""Guard: refuse hostile files and questions before a parser works on them.
 
-A look at the file's bytes only: nothing is expanded, fetched or opened. RDF/XML must not
-define entities that grow, name external ones, or nest deeper than any honest file does
-(RDF/XML parsers take minutes over that). JSON-LD must not ask for a context on the network.
+A look at the bytes only: nothing is expanded, fetched or opened. RDF/XML must not define
+entities that grow, name external ones, or nest deeper than any honest file does (RDF/XML
+parsers take minutes over that). JSON-LD must not ask for a context on the network, SPARQL for
+data elsewhere.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 from xml.parsers import expat
 
 from geofield.errors import FormatError
@@ -25,90 +26,34 @@ MAX_ENTITY_CHARACTERS = 256
 _IRI_ATTRIBUTES = frozenset({RDF + name for name in ("about", "resource", "datatype")})
 _JSON_ID = re.compile(r'"@(?:id|type)"\s*:\s*"((?:[^"\\]|\\.)*)"')
 _JSON_CONTEXT = re.compile(r'"@(?:context|import)"\s*:\s*\[?\s*"((?:[^"\\]|\\.)*)"')
-_BLOCK = 1 << 20
+_FORBIDDEN = "holds a space or another forbidden character"
+_BLANK = r"(?:\s|\#[^\r\n]*[\r\n])*"
+_NAME = r"(?:<[^>]*>|[?$]\w+|[\w.-]*:[^\s{]*?)"
+#: What reaches beyond the files that were named: other hosts, and data that is not in them.
+#: Looked for in the raw text, texts and comments too: no second reading of SPARQL's syntax can
+#: then differ from the engine's and let one through.
+_OUTWARD = re.compile(
+    rf"(?<![?$])(SERVICE){_BLANK}(?:SILENT{_BLANK})?{_NAME}{_BLANK}\{{"
+    rf"|(?<![?$\w:])(FROM|LOAD){_BLANK}(?:(?:NAMED|SILENT){_BLANK})?(?:<[^>]*>|[\w.-]*:)",
+    re.IGNORECASE,
+)
 
 
-def check_xml(path: Path) -> None:
-    """Refuse an RDF/XML file that is hostile or not well-formed.
+def check_query(text: str) -> None:
+    """Refuse SPARQL that would reach for other hosts or other data.
 
     Raises
     ------
     FormatError
-        Names file, line and reason.
+        Names the keyword and its line.
     """
-    guard = _XmlGuard(path)
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            guard.feed(block, last=False)
-        guard.feed(b"", last=True)
-
-
-class _XmlGuard:
-    """An expat parser that only counts."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.depth = 0
-        self.entities = 0
-        parser = expat.ParserCreate(namespace_separator="")
-        parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
-        parser.buffer_text = True
-        parser.StartElementHandler = self.start
-        parser.EndElementHandler = self.end
-        parser.EntityDeclHandler = self.entity
-        parser.StartDoctypeDeclHandler = self.doctype
-        parser.ExternalEntityRefHandler = self.external
-        self.parser = parser
-
-    def feed(self, block: bytes, *, last: bool) -> None:
-        try:
-            self.parser.Parse(block, last)
-        except expat.ExpatError as error:
-            self.refuse(
-                f"it is not well-formed XML ({expat.ErrorString(error.code)})", error.lineno
-            )
-
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            self.refuse(f"elements are nested deeper than {MAX_DEPTH}")
-        for attribute, value in attributes.items():
-            if attribute in _IRI_ATTRIBUTES and NOT_IN_IRI.search(value):
-                self.refuse(f"the IRI {value[:120]!r} holds a space or another forbidden character")
-
-    def end(self, name: str) -> None:
-        self.depth -= 1
-
-    def doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
-        if system or public:
-            self.refuse(f"it names an external document type ({(system or public)!r:.80})")
-
-    def entity(
-        self,
-        name: str,
-        is_parameter: bool,
-        value: str | None,
-        base: str | None,
-        system: str | None,
-        public: str | None,
-        notation: str | None,
-    ) -> None:
-        self.entities += 1
-        if is_parameter or value is None:
-            self.refuse(f"it defines the external or parameter entity {name!r:.40}")
-        if "&" in value or "%" in value or "<" in value:
-            self.refuse(f"it defines the entity {name!r:.40} by other entities or markup")
-        if self.entities > MAX_ENTITIES or len(value) > MAX_ENTITY_CHARACTERS:
-            self.refuse(f"it defines too many or too long entities ({name!r:.40})")
-
-    def external(self, *ignored: object) -> int:
-        self.refuse("it refers to an external entity")
-
-    def refuse(self, reason: str, line: int | None = None) -> NoReturn:
-        where = self.parser.CurrentLineNumber if line is None else line
+    found = _OUTWARD.search(text)
+    if found:
         raise FormatError(
-            f"{self.path.name}, line {where}: {reason}.",
-            hint="Nothing was read from it. Ask its maker for plain RDF/XML.",
+            f"The query, line {_line(text, found.start())}: {(found[1] or found[2]).upper()} asks "
+            "for data elsewhere. geofield answers from the files that you name, and opens no "
+            "connection.",
+            hint="Take it out; give the other data as a file of RDF.",
         )
 
 
@@ -131,17 +76,85 @@ def check_json(path: Path) -> None:
     for match in _JSON_ID.finditer(text):
         if NOT_IN_IRI.search(_unescaped(match[1])):
             raise FormatError(
-                f"{path.name}, line {_line(text, match.start())}: the IRI {match[1][:120]!r} holds "
-                "a space or another forbidden character.",
+                f"{path.name}, line {_line(text, match.start())}: the IRI {match[1][:120]!r} "
+                f"{_FORBIDDEN}.",
                 hint="Percent-encode it: a space is %20.",
             )
 
 
+def check_xml(path: Path) -> None:
+    """Refuse an RDF/XML file that is hostile or not well-formed.
+
+    Raises
+    ------
+    FormatError
+        Names file, line and reason.
+    """
+    with path.open("rb") as file:
+        parser = _XmlGuard(path).parser
+        try:
+            parser.ParseFile(file)
+        except expat.ExpatError as error:
+            reason = f"it is not well-formed XML ({expat.ErrorString(error.code)})"
+            raise _refused(path, error.lineno, reason) from error
+
+
+def _refused(path: Path, line: int, reason: str) -> FormatError:
+    return FormatError(
+        f"{path.name}, line {line}: {reason}.",
+        hint="Nothing was read from it. Ask its maker for plain RDF/XML.",
+    )
+
+
+class _XmlGuard:
+    """An expat parser that only counts."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.depth, self.entities = path, 0, 0
+        parser = expat.ParserCreate(namespace_separator="")
+        parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
+        parser.buffer_text = True
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.EntityDeclHandler = self.entity
+        parser.StartDoctypeDeclHandler = self.doctype
+        parser.ExternalEntityRefHandler = self.external
+        self.parser = parser
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            self.refuse(f"elements are nested deeper than {MAX_DEPTH}")
+        for attribute, value in attributes.items():
+            if attribute in _IRI_ATTRIBUTES and NOT_IN_IRI.search(value):
+                self.refuse(f"the IRI {value[:120]!r} {_FORBIDDEN}")
+
+    def end(self, name: str) -> None:
+        self.depth -= 1
+
+    def doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
+        if system or public:
+            self.refuse(f"it names an external document type ({(system or public)!r:.80})")
+
+    def entity(self, name: str, is_parameter: bool, value: str | None, *_: Any) -> None:
+        self.entities += 1
+        if is_parameter or value is None:
+            self.refuse(f"it defines the external or parameter entity {name!r:.40}")
+        if set(value) & set("&%<"):
+            self.refuse(f"it defines the entity {name!r:.40} by other entities or markup")
+        if self.entities > MAX_ENTITIES or len(value) > MAX_ENTITY_CHARACTERS:
+            self.refuse(f"it defines too many or too long entities ({name!r:.40})")
+
+    def external(self, *_: Any) -> int:
+        self.refuse("it refers to an external entity")
+
+    def refuse(self, reason: str) -> NoReturn:
+        raise _refused(self.path, self.parser.CurrentLineNumber, reason)
+
+
 def _unescaped(text: str) -> str:
-    if "\\" not in text:
-        return text
     try:
-        return str(json.loads(f'"{text}"'))
+        return str(json.loads(f'"{text}"')) if "\\" in text else text
     except ValueError:
         return text
 

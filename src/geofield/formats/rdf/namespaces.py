@@ -15,27 +15,23 @@ GF: Final = "https://w3id.org/geofield#"
 #: belongs to nobody: whoever publishes data sets a base they control.
 DEFAULT_BASE: Final = "https://example.org/geofield/"
 
-RDF: Final = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
-RDFS: Final = "http://www.w3.org/2000/01/rdf-schema#"
-OWL: Final = "http://www.w3.org/2002/07/owl#"
-XSD: Final = "http://www.w3.org/2001/XMLSchema#"
-SKOS: Final = "http://www.w3.org/2004/02/skos/core#"
-DC: Final = "http://purl.org/dc/elements/1.1/"
-DCTERMS: Final = "http://purl.org/dc/terms/"
-DCAT: Final = "http://www.w3.org/ns/dcat#"
-PROV: Final = "http://www.w3.org/ns/prov#"
-GEO: Final = "http://www.opengis.net/ont/geosparql#"
-GEOF: Final = "http://www.opengis.net/def/function/geosparql/"
-SF: Final = "http://www.opengis.net/ont/sf#"
-SOSA: Final = "http://www.w3.org/ns/sosa/"
-S4AGRI: Final = "https://saref.etsi.org/saref4agri/"
-WGS: Final = "http://www.w3.org/2003/01/geo/wgs84_pos#"
-CC: Final = "http://creativecommons.org/ns#"
-QUDT: Final = "http://qudt.org/schema/qudt/"
-UNIT: Final = "http://qudt.org/vocab/unit/"
-PO: Final = "http://purl.obolibrary.org/obo/PO_"
-SH: Final = "http://www.w3.org/ns/shacl#"
-
+#: Prefixes of every product, by name.
+PREFIXES: Final[dict[str, str]] = {
+    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "xsd": "http://www.w3.org/2001/XMLSchema#",
+    "dc": "http://purl.org/dc/elements/1.1/",
+    "dcterms": "http://purl.org/dc/terms/",
+    "dcat": "http://www.w3.org/ns/dcat#",
+    "prov": "http://www.w3.org/ns/prov#",
+    "geo": "http://www.opengis.net/ont/geosparql#",
+    "sf": "http://www.opengis.net/ont/sf#",
+    "sosa": "http://www.w3.org/ns/sosa/",
+    "s4agri": "https://saref.etsi.org/saref4agri/",
+    "wgs84": "http://www.w3.org/2003/01/geo/wgs84_pos#",
+    "cc": "http://creativecommons.org/ns#",
+    "gf": GF,
+}
 # The source study's vocabulary (METHOD.md, section 5).
 STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
 STUDY_TRAJECTORY: Final = "http://www.DLC.org/Trajectory#"
@@ -45,23 +41,6 @@ SVG_CIRCLE: Final = "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd/circle#"
 GML: Final = "http://www.opengis.net/gml/"
 DCMI_IMAGE: Final = "http://purl.org/dc/dcmitype/Image"
 
-#: Prefixes of every product, by name; the order is that of the files.
-PREFIXES: Final[dict[str, str]] = {
-    "rdf": RDF,
-    "rdfs": RDFS,
-    "xsd": XSD,
-    "dc": DC,
-    "dcterms": DCTERMS,
-    "dcat": DCAT,
-    "prov": PROV,
-    "geo": GEO,
-    "sf": SF,
-    "sosa": SOSA,
-    "s4agri": S4AGRI,
-    "wgs84": WGS,
-    "cc": CC,
-    "gf": GF,
-}
 STUDY_PREFIXES: Final[dict[str, str]] = {
     "po": STUDY_TREE,
     "svg": SVG_CIRCLE,
@@ -72,17 +51,20 @@ STUDY_PREFIXES: Final[dict[str, str]] = {
 #: Further prefixes that the ontology, the shapes and the queries need.
 SCHEMA_PREFIXES: Final[dict[str, str]] = {
     **PREFIXES,
-    "owl": OWL,
-    "skos": SKOS,
-    "qudt": QUDT,
-    "unit": UNIT,
-    "po": PO,
-    "sh": SH,
-    "geof": GEOF,
+    "owl": "http://www.w3.org/2002/07/owl#",
+    "skos": "http://www.w3.org/2004/02/skos/core#",
+    "qudt": "http://qudt.org/schema/qudt/",
+    "unit": "http://qudt.org/vocab/unit/",
+    "po": "http://purl.obolibrary.org/obo/PO_",
+    "sh": "http://www.w3.org/ns/shacl#",
+    "geof": "http://www.opengis.net/def/function/geosparql/",
 }
 
+RDF: Final = PREFIXES["rdf"]
+XSD: Final = PREFIXES["xsd"]
+SH: Final = SCHEMA_PREFIXES["sh"]
+GEOF: Final = SCHEMA_PREFIXES["geof"]
 TYPE: Final = RDF + "type"
-LABEL: Final = RDFS + "label"
 STRING: Final = XSD + "string"
 DOUBLE: Final = XSD + "double"
 INTEGER: Final = XSD + "integer"

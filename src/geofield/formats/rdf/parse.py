@@ -69,13 +69,17 @@ class Graph:
     ----------
     nodes : dict
         Subject to predicate to values, in the order of the file.
+    by_type : dict
+        Class to subjects, made when first asked for.
     """
 
     nodes: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+    by_type: dict[str, set[str]] = field(default_factory=dict, repr=False)
 
     def add(self, quads: Iterable[ox.Quad]) -> None:
         """Take in triples."""
         nodes = self.nodes
+        self.by_type.clear()
         name, node = "", nodes.get("", {})
         for subject, predicate, value, _ in quads:
             if subject.value != name:
@@ -83,10 +87,27 @@ class Graph:
                 node = nodes.setdefault(name, {})
             node.setdefault(predicate.value, []).append(value.value)
 
+    def merge(self, more: Graph) -> None:
+        """Take in another graph."""
+        self.by_type.clear()
+        for subject, node in more.nodes.items():
+            mine = self.nodes.setdefault(subject, {})
+            for predicate, values in node.items():
+                mine.setdefault(predicate, []).extend(values)
+
+    def everywhere(self, predicate: str) -> Iterator[str]:
+        """The values of a predicate, whatever the subject."""
+        name = expand(predicate)
+        return (value for node in self.nodes.values() for value in node.get(name, ()))
+
     def of_type(self, *types: str) -> list[str]:
         """The subjects of any of some classes, in the order of the file."""
-        wanted = set(map(expand, types))
-        return [iri for iri, node in self.nodes.items() if wanted.intersection(node.get(TYPE, ()))]
+        if not self.by_type:
+            for iri, node in self.nodes.items():
+                for each in node.get(TYPE, ()):
+                    self.by_type.setdefault(each, set()).add(iri)
+        found = set().union(*(self.by_type.get(expand(each), ()) for each in types))
+        return [iri for iri in self.nodes if iri in found] if found else []
 
     def values(self, subject: str | None, predicate: str) -> list[str]:
         """All distinct values; none where there is nothing."""

@@ -14,23 +14,13 @@ import pyoxigraph as ox
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.geosparql import oxigraph_functions
+from geofield.formats.rdf.guard import check_query
 from geofield.formats.rdf.namespaces import BOOLEAN, DOUBLE, INTEGER, SCHEMA_PREFIXES, XSD
 from geofield.formats.rdf.parse import parse
 
 #: A parameter is a variable with one value, which stands in the query and can be replaced.
 _PARAMETER = re.compile(
     r'VALUES \?(?P<name>\w+) \{ (?P<value>"(?P<text>[^"]*)"(?:\^\^xsd:(?P<kind>\w+))?|-?\d+) \}'
-)
-
-_BLANK = r"(?:\s|\#[^\r\n]*[\r\n])*"
-_NAME = r"(?:<[^>]*>|[?$]\w+|[\w.-]*:[^\s{]*?)"
-#: What reaches beyond the files that were named: other hosts, and data that is not in them.
-#: Looked for in the raw text, texts and comments too: no second reading of SPARQL's syntax can
-#: then differ from the engine's and let one through.
-_OUTWARD = re.compile(
-    rf"(?<![?$])(SERVICE){_BLANK}(?:SILENT{_BLANK})?{_NAME}{_BLANK}\{{"
-    rf"|(?<![?$\w:])(FROM|LOAD){_BLANK}(?:(?:NAMED|SILENT){_BLANK})?(?:<[^>]*>|[\w.-]*:)",
-    re.IGNORECASE,
 )
 
 
@@ -157,7 +147,7 @@ def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = 
         parameter is unknown or of the wrong kind.
     """
     text = query.with_values(values or {}) if isinstance(query, Query) else query
-    refuse_outward(text)
+    check_query(text)
     try:
         result = store.query(
             text,
@@ -173,25 +163,6 @@ def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = 
     except (RuntimeError, OSError) as error:
         raise FormatError(f"The query cannot be answered: {error}.") from error
     return Answer(columns, rows)
-
-
-def refuse_outward(text: str) -> None:
-    """Refuse SPARQL that would reach for other hosts or other data, before anything runs it.
-
-    Raises
-    ------
-    FormatError
-        Names the keyword and its line.
-    """
-    found = _OUTWARD.search(text)
-    if found:
-        line = text.count("\n", 0, found.start()) + 1
-        keyword = (found[1] or found[2]).upper()
-        raise FormatError(
-            f"The query, line {line}: {keyword} asks for data elsewhere. geofield answers "
-            "from the files that you name, and opens no connection.",
-            hint="Take it out; give the other data as a file of RDF.",
-        )
 
 
 def _parsed(name: str, text: str) -> Query:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from geofield.formats.rdf.namespaces import LABEL, expand
+from geofield.formats.rdf.namespaces import expand
 from geofield.formats.rdf.parse import Graph
 
 #: File names in the package's folder ``data``.
@@ -41,4 +41,4 @@ def context() -> dict[str, Any]:
 
 def label(name: str) -> str:
     """What a property is called; empty for one that the ontology does not explain."""
-    return (ontology().value(expand(name), LABEL) or "") if ":" in name else ""
+    return (ontology().value(expand(name), "rdfs:label") or "") if ":" in name else ""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf.layers import LayerMap
-from geofield.formats.rdf.namespaces import expand
 from geofield.formats.rdf.parse import Graph
 
 #: The end of a plan's IRI that its content named, not a person.
@@ -43,16 +42,10 @@ class Scope:
             return track in self.tracks
         return graph.value(iri, "gf:inPlan") in (None, self.plan)
 
-    def sources(self, layer: LayerMap, iri: str) -> tuple[str | None, ...]:
-        """The nodes that tell a row's columns: a field's are told by its survey, too."""
-        return (iri, self.survey) if layer.layer.name == "field" else (iri,)
-
 
 def fields_of(graph: Graph) -> set[str]:
     """The fields that anything in a graph is of."""
-    in_field = expand("gf:inField")
-    named = {value for node in graph.nodes.values() for value in node.get(in_field, ())}
-    return named | set(graph.of_type("gf:Field"))
+    return {*graph.everywhere("gf:inField"), *graph.of_type("gf:Field")}
 
 
 def track_of(graph: Graph, iri: str) -> str | None:

@@ -15,7 +15,7 @@ from typing import Any
 import pyoxigraph as ox
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import RDFS, SH, TYPE, XSD, compact, expand
+from geofield.formats.rdf.namespaces import SH, TYPE, XSD, compact, expand
 from geofield.formats.rdf.parse import Problem
 from geofield.formats.rdf.resources import SHAPES, label, resource
 
@@ -51,7 +51,9 @@ def _with_parents(types: Iterable[Any], nodes: dict[Any, Node]) -> list[str]:
     """Classes, and those above them where the file has classes of its own."""
     found = list(types)
     for each in found:
-        found += [p for p in nodes.get(each, {}).get(RDFS + "subClassOf", ()) if p not in found]
+        found += [
+            p for p in nodes.get(each, {}).get(expand("rdfs:subClassOf"), ()) if p not in found
+        ]
     return [each.value for each in found if isinstance(each, ox.NamedNode)]
 
 

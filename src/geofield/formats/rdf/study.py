@@ -42,7 +42,7 @@ from geofield.formats.rdf.namespaces import (
     STUDY_TRAJECTORY,
     STUDY_TREE,
     SVG_CIRCLE,
-    WGS,
+    expand,
     node,
 )
 from geofield.formats.rdf.triples import Column, Group, Nodes, named, text_term, typed
@@ -50,8 +50,8 @@ from geofield.formats.rdf.triples import Column, Group, Nodes, named, text_term,
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
     "obstacle_no": (STUDY_OBSTACLE + "no", "xsd:int"),
-    "lat": (WGS + "lat", "xsd:double"),
-    "lon": (WGS + "long", "xsd:double"),
+    "lat": (expand("wgs84:lat"), "xsd:double"),
+    "lon": (expand("wgs84:long"), "xsd:double"),
     "x_px": (SVG_CIRCLE + "cx", "xsd:double"),
     "y_px": (SVG_CIRCLE + "cy", "xsd:double"),
     "radius_px": (SVG_CIRCLE + "r", "xsd:double"),

@@ -7,9 +7,9 @@ metres and says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from geofield import schema
 from geofield.formats.rdf.triples import xml_text
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import active
-
-if TYPE_CHECKING:
-    import geopandas as gpd
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 #: Element names of the kinds of obstacles; the study knows trees only.
@@ -29,7 +26,7 @@ _ELEMENTS = {"tree": "Tree", "other": "Other"}
 def write_study_xml(
     dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
 ) -> list[Path]:
-    """Two files, ``obstacles.xml`` and ``path.xml``; rejected obstacles are left out.
+    """Two files, ``obstacles.xml`` and ``path.xml``, of what is driven around and driven.
 
     Parameters
     ----------
@@ -55,55 +52,40 @@ def write_study_xml(
 def _obstacles(dataset: Dataset) -> Iterator[str]:
     yield _HEAD + "<Obstacles>\n"
     frame = active(dataset.table(schema.OBSTACLES.name))
-    region = xml_text(dataset.name)
     for kind, element in _ELEMENTS.items():
-        rows = frame[frame["kind"] == kind]
-        if not len(rows):
-            continue
-        yield f"  <{element}>\n"
-        yield from (_item(row, region) for row in rows.to_dict("records"))
-        yield f"  </{element}>\n"
+        rows = frame[frame["kind"] == kind].to_dict("records")
+        if rows:
+            items = "".join(_item(row, xml_text(dataset.name)) for row in rows)
+            yield f"  <{element}>\n{items}  </{element}>\n"
     yield "</Obstacles>\n"
 
 
 def _item(row: dict[Any, Any], region: str) -> str:
-    x, y, radius = _number(row["x_px"]), _number(row["y_px"]), _number(row["radius_m"])
-    lines = [f"<Number>{row['obstacle_no']}</Number>", f"<Position>{region}</Position>"]
-    if x and y:
-        lines.append(f"<PixelCoordinates><X>{x}</X><Y>{y}</Y></PixelCoordinates>")
-    if radius:
-        lines.append(f'<Radius unit="m">{radius}</Radius>')
-    lat, lon = _number(row["lat"]), _number(row["lon"])
-    lines += [
+    x, y, radius, lat, lon = (
+        repr(float(row[name])) if np.isfinite(row[name]) else ""
+        for name in ("x_px", "y_px", "radius_m", "lat", "lon")
+    )
+    lines = [
+        f"<Number>{row['obstacle_no']}</Number>",
+        f"<Position>{region}</Position>",
+        f"<PixelCoordinates><X>{x}</X><Y>{y}</Y></PixelCoordinates>" if x and y else "",
+        f'<Radius unit="m">{radius}</Radius>' if radius else "",
         f"<Latitude>{lat}</Latitude>",
         f"<Longitude>{lon}</Longitude>",
         f"<GpsPositions>{lat},{lon}</GpsPositions>",
     ]
-    inside = "".join(f"      {line}\n" for line in lines)
+    inside = "".join(f"      {line}\n" for line in lines if line)
     return f"    <Item>\n{inside}    </Item>\n"
 
 
 def _path(dataset: Dataset) -> Iterator[str]:
     yield _HEAD + "<Path>\n"
-    number: int | None = None
-    for track_no, lat, lon in _positions(dataset.point_chunks()):
-        if track_no != number:
-            yield ("  </Track>\n" if number is not None else "") + "  <Track>\n"
-            yield f"    <Number>{track_no}</Number>\n"
-            number = track_no
-        yield f"    <gpsPoint>{lat!r},{lon!r}</gpsPoint>\n"
-    yield ("  </Track>\n" if number is not None else "") + "</Path>\n"
-
-
-def _positions(chunks: Iterable[gpd.GeoDataFrame]) -> Iterator[tuple[int, float, float]]:
-    for chunk in chunks:
-        yield from zip(
-            chunk["track_no"].to_numpy(dtype=np.int64).tolist(),
-            chunk["lat"].to_numpy(dtype="float64").tolist(),
-            chunk["lon"].to_numpy(dtype="float64").tolist(),
-            strict=True,
-        )
-
-
-def _number(value: float) -> str:
-    return repr(float(value)) if np.isfinite(value) else ""
+    closing, number = "", None
+    for chunk in dataset.point_chunks():
+        columns = (chunk[name].tolist() for name in ("track_no", "lat", "lon"))
+        for track_no, lat, lon in zip(*columns, strict=True):
+            if track_no != number:
+                yield f"{closing}  <Track>\n    <Number>{track_no}</Number>\n"
+                closing, number = "  </Track>\n", track_no
+            yield f"    <gpsPoint>{lat!r},{lon!r}</gpsPoint>\n"
+    yield closing + "</Path>\n"

@@ -24,6 +24,7 @@ Value = Any
 Column = tuple[ox.NamedNode, Sequence[Value]]
 #: Control characters cannot stand in XML 1.0, not even escaped: they are none in any syntax.
 _NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+_DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
 _DATATYPES = {bool: BOOLEAN, int: INTEGER, float: DOUBLE}
 
 
@@ -83,6 +84,11 @@ def term(value: Any) -> Any:
 def text_term(text: str) -> ox.Literal:
     """A plain text as a literal."""
     return ox.Literal(_NOT_IN_XML.sub("\ufffd", text))
+
+
+def date_term(text: str) -> ox.Literal:
+    """A day as a date; a text where only the year or month is known."""
+    return ox.Literal(text, datatype=node("xsd:date")) if _DAY.fullmatch(text) else text_term(text)
 
 
 def xml_text(text: str) -> str:

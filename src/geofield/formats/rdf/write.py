@@ -1,8 +1,8 @@
-"""Writers: a dataset to RDF/XML, Turtle, JSON-LD and N-Triples, as a stream."""
+"""Writers: a dataset to RDF/XML, Turtle, JSON-LD and N-Triples as a stream, and to rdflib."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,12 +45,10 @@ def write_rdfxml(
     list of Path
         The files written.
     """
-    description = describe(dataset, options)
-    paths = []
-    for product in PRODUCTS:
-        path = folder / product_name(stem, product)
+    description, before = describe(dataset, options), "" if stem == "field" else f"{stem}_"
+    paths = [folder / f"{before}{product}.rdf" for product in PRODUCTS]
+    for path, product in zip(paths, PRODUCTS, strict=True):
         _write(path, ox.RdfFormat.RDF_XML, description.product(product), options)
-        paths.append(path)
     return paths
 
 
@@ -61,52 +59,41 @@ def write_study(
     return write_rdfxml(dataset, folder, stem=stem, options={**options, "rdf_profile": "study"})
 
 
-def write_turtle(
-    dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
-) -> list[Path]:
-    """Turtle in one file; options as in :func:`write_rdfxml`."""
-    return _write_one(dataset, folder / f"{stem}.ttl", ox.RdfFormat.TURTLE, options)
+def _one_file(suffix: str, syntax: ox.RdfFormat) -> Callable[..., list[Path]]:
+    def write(
+        dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
+    ) -> list[Path]:
+        """One file; options as in :func:`write_rdfxml`."""
+        path = folder / f"{stem}{suffix}"
+        _write(path, syntax, describe(dataset, options).everything(), options)
+        return [path]
+
+    return write
 
 
-def write_jsonld(
-    dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
-) -> list[Path]:
-    """JSON-LD in one file, its context inside; options as in :func:`write_rdfxml`."""
-    return _write_one(dataset, folder / f"{stem}.jsonld", ox.RdfFormat.JSON_LD, options)
-
-
-def write_ntriples(
-    dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
-) -> list[Path]:
-    """N-Triples in one file; options as in :func:`write_rdfxml`."""
-    return _write_one(dataset, folder / f"{stem}.nt", ox.RdfFormat.N_TRIPLES, options)
-
-
-def product_name(stem: str, product: str) -> str:
-    """The RDF/XML file of a product."""
-    return f"{product}.rdf" if stem == "field" else f"{stem}_{product}.rdf"
+write_turtle = _one_file(".ttl", ox.RdfFormat.TURTLE)
+#: The context stands inside the file.
+write_jsonld = _one_file(".jsonld", ox.RdfFormat.JSON_LD)
+write_ntriples = _one_file(".nt", ox.RdfFormat.N_TRIPLES)
 
 
 def to_graph(dataset: Dataset, options: Mapping[str, Any]) -> rdflib.Graph:
     """The dataset as an rdflib graph, prefixes bound; options as in :func:`write_rdfxml`."""
     import rdflib
 
+    def term(each: Any) -> Any:
+        if isinstance(each, ox.NamedNode):
+            return rdflib.URIRef(each.value)
+        # A plain text is untyped in rdflib.
+        kind = each.datatype.value
+        return rdflib.Literal(each.value, datatype=None if kind == STRING else rdflib.URIRef(kind))
+
     graph = rdflib.Graph()
     for prefix, namespace in _prefixes(options).items():
         graph.bind(prefix, namespace, replace=True)
     for each in triples(describe(dataset, options).everything()):
-        graph.add(tuple(map(_in_rdflib, each)))
+        graph.add((term(each.subject), term(each.predicate), term(each.object)))
     return graph
-
-
-def _in_rdflib(term: Any) -> Any:
-    import rdflib
-
-    if isinstance(term, ox.NamedNode):
-        return rdflib.URIRef(term.value)
-    # A plain text is untyped in rdflib.
-    kind = None if term.datatype.value == STRING else rdflib.URIRef(term.datatype.value)
-    return rdflib.Literal(term.value, datatype=kind)
 
 
 def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
@@ -118,16 +105,12 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
         When there is no such profile, or the base cannot name features.
     """
     kind, points = (StudyDescription, True) if _is_study(options) else (Description, False)
-    base, plan = options.get("base_iri"), str(options.get("plan_name") or "")
-    names = Names.of(dataset, base=base, plan=plan)
-    return kind(dataset, names, _yes(options.get("points", points)))
-
-
-def _write_one(
-    dataset: Dataset, path: Path, syntax: ox.RdfFormat, options: Mapping[str, Any]
-) -> list[Path]:
-    _write(path, syntax, describe(dataset, options).everything(), options)
-    return [path]
+    names = Names.of(
+        dataset, base=options.get("base_iri"), plan=str(options.get("plan_name") or "")
+    )
+    # --option points=no arrives as a text.
+    wanted = str(options.get("points", points)).lower() not in ("no", "false", "0", "none", "")
+    return kind(dataset, names, wanted)
 
 
 def _is_study(options: Mapping[str, Any]) -> bool:
@@ -137,11 +120,6 @@ def _is_study(options: Mapping[str, Any]) -> bool:
             f"There is no RDF profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
         )
     return profile == "study"
-
-
-def _yes(value: Any) -> bool:
-    # --option points=no arrives as a text.
-    return str(value).lower() not in ("no", "false", "0", "none", "")
 
 
 def _prefixes(options: Mapping[str, Any]) -> dict[str, str]:
