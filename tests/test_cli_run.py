@@ -135,7 +135,7 @@ def test_overwriting_keeps_a_persons_edits(
     assert geofield(*run, "--overwrite", "--fresh") == 0
     fresh = read_plan(file).obstacles
     assert fresh is not None
-    assert set(fresh["status"]) == {"detected"}
+    assert set(fresh["status"]) <= {"detected", "possible"}
 
 
 def fails(capsys: pytest.CaptureFixture[str], out: Path, *args: object, code: int = 1) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.crs import authority_name
+from geofield.evaluation.driving import unseen
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
 from geofield.model.dataset import Dataset
@@ -111,12 +112,13 @@ def make_report(
     segments, gaps = dataset.table("segments"), dataset.table("gaps")
     status = obstacles["status"].value_counts().sort_index()
     provenance = dataset.provenance
+    area_ha = float(field["area_ha"])
     return {
         "field": {
             "field_id": field["field_id"],
             "name": field["name"],
             "crs": authority_name(dataset.crs),
-            "area_ha": _rounded(field["area_ha"], 4),
+            "area_ha": _rounded(area_ha, 4),
             "perimeter_m": _rounded(field["perimeter_m"], 2),
             "longest_edge_m": _rounded(field["longest_edge_m"], 2),
             "heading_deg": _rounded(field["heading_deg"], 3),
@@ -124,7 +126,11 @@ def make_report(
             "certainty": _rounded(field["certainty"], 4),
             "doubts": _parts(field["doubts"]),
         },
-        "obstacles": {"count": len(obstacles), **{str(k): int(v) for k, v in status.items()}},
+        "obstacles": {
+            "count": len(obstacles),
+            **{str(k): int(v) for k, v in status.items()},
+            "expected_unseen_per_ha": _rounded(unseen(obstacles, field.geometry) / area_ha, 3),
+        },
         "tracks": {
             "tracks": len(tracks),
             "segments": len(segments),

@@ -184,14 +184,21 @@ class ObstacleSettings(Section):
         "study_listing",
         "study_dlc",
     ] = Field("auto", description="How obstacles are found: auto, or a way of the study.")
-    radius_m: tuple[PositiveFloat, PositiveFloat] = Field(
-        (2.0, 9.0), description="Smallest and largest crown radius, metres."
+    radius_m: tuple[PositiveFloat, PositiveFloat] | None = Field(
+        None,
+        description="Smallest and largest crown radius, metres; 1 to 15 with auto, 2 to 9 with "
+        "the study's strategies by default.",
     )
-    buffer_m: NonNegative = Field(1.0, description="Safety margin around each obstacle, metres.")
+    buffer_m: NonNegative = Field(1.5, description="Safety margin around each obstacle, metres.")
+    cost_missed: PositiveFloat = Field(
+        30.0,
+        description="auto: what driving into a thing costs, against a look at one place of the "
+        "map; it decides what is detected, and what only possible.",
+    )
+    careful: bool = Field(False, description="auto: drive around what is only possible, too.")
     min_confidence: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
-        description="auto: confidence from which a detection is an obstacle; lower it to miss "
-        "less. The fitted one by default.",
+        description="auto: confidence from which a thing is driven around, instead of the cost.",
     )
     polarity: Literal["dark", "bright", "both"] = Field(
         "both", description="auto: crowns darker or brighter than what is around them."

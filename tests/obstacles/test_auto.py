@@ -8,11 +8,9 @@ from affine import Affine
 import geofield as gf
 from geofield import schema
 from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.obstacles.detect import STRATEGIES
-from geofield.obstacles.features import FeatureTable
-from geofield.obstacles.forest import Forest
-from geofield.obstacles.verifier import load_verifier, strongest
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -39,8 +37,9 @@ def test_the_table_is_complete(simulated, detected):
     trees = detected[detected["kind"] == "tree"]
     assert detected["obstacle_no"].tolist() == list(range(1, len(detected) + 1))
     assert trees["confidence"].between(0, 1).all()
-    assert trees["radius_m"].between(2, 9).all()
-    assert set(detected["status"]) == {"detected"}
+    assert trees["radius_m"].between(1, 15).all()
+    sure = detected["confidence"] >= detected.attrs["detection"]["threshold"]
+    assert detected["status"].tolist() == ["detected" if s else "possible" for s in sure]
     order = trees[["y_px", "x_px"]].to_numpy()
     assert order.tolist() == sorted(order.tolist())
     area = shapely.area(trees.geometry.to_numpy())
@@ -48,7 +47,7 @@ def test_the_table_is_complete(simulated, detected):
     assert area == pytest.approx(full, rel=0.01)
     told = detected.attrs["detection"]
     assert told["strategy"] == "auto"
-    assert told["method"] == "evidence_nir"
+    assert told["method"] == "network_nir"
 
 
 @pytest.mark.parametrize("missing", [("nir",), ("nir", "red", "blue")])
@@ -65,17 +64,16 @@ def test_a_hole_in_the_outline_is_searched_too(simulated):
     assert found.geometry.intersects(tree.centroid).any()
 
 
-def test_results_do_not_depend_on_the_window(simulated):
-    from geofield.obstacles.windows import detect_trees
-
-    verifier = load_verifier("nir")
-    whole = detect_trees(simulated.scene, None, verifier, factor=1.0, min_confidence=0.4)
-    parts = detect_trees(
-        simulated.scene, None, verifier, factor=1.0, min_confidence=0.4, core_px=160
-    )
+@pytest.mark.parametrize("core_px", [96, 160])
+def test_results_do_not_depend_on_the_window(simulated, monkeypatch, core_px):
+    whole = gf.detect_obstacles(simulated.scene, simulated.field)
+    monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
+    parts = gf.detect_obstacles(simulated.scene, simulated.field)
     assert len(whole) == len(parts) > 5
-    a = np.sort(np.round(whole.x_px, 3))
-    assert a == pytest.approx(np.sort(np.round(parts.x_px, 3)), abs=0.1)
+    for column in ("x_px", "y_px", "radius_px", "confidence"):
+        assert parts[column].to_numpy() == pytest.approx(
+            whole[column].to_numpy(), abs=2e-3, nan_ok=True
+        )
 
 
 def test_a_finer_picture_gives_the_same_trees():
@@ -153,6 +151,7 @@ def test_a_coarse_picture_warns(simulated):
         ({"buffer_m": -1}, "margin"),
         ({"polarity": "grey"}, "polarity"),
         ({"min_confidence": 2}, "confidence"),
+        ({"cost_missed": 0}, "cost"),
         ({"strategy": "single", "edge_method": "laplace"}, "edge method"),
         ({"strategy": "single", "grey_check": "bright"}, "grey check"),
     ],
@@ -183,34 +182,14 @@ def test_a_pond_becomes_a_polygon():
     found = gf.detect_obstacles(
         Scene(scene.grid, bands, scene.roles, scene.valid), field.field, buffer_m=0
     )
+    found = active(found)
     other = found[found["kind"] == "other"]
     assert len(other) == 1
+    assert other["confidence"].iloc[0] > 0.5
     truth = shapely.transform(shapely.box(x - 14, y - 6, x + 14, y + 6), scene.grid.to_metric_array)
     shape = other.geometry.iloc[0]
     assert shape.intersection(truth).area / shape.union(truth).area > 0.7
     assert np.isnan(other["radius_m"].iloc[0])
-
-
-def test_a_forest_says_what_its_table_says():
-    table = {
-        "features": ["a", "b"],
-        "base": 0.5,
-        "trees": [
-            {"nodes": [[0, 1.0, 1, -3], [1, 2.0, -1, -2]], "leaves": [1.0, 10.0, 100.0]},
-            {"nodes": [], "leaves": [0.25]},
-        ],
-    }
-    values = np.array([[0, 0], [0, 3], [2, 0], [1.0, 2.0]], np.float32)
-    measured = FeatureTable(("b", "a"), values[:, ::-1])
-    assert Forest.read(table).evaluate(measured).tolist() == [1.75, 10.75, 100.75, 1.75]
-    with pytest.raises(ObstacleError, match="unknown feature"):
-        Forest.read(table).evaluate(FeatureTable(("a",), values[:, :1]))
-
-
-def test_the_strongest_suppress_within_their_reach():
-    x, y = np.array([0.0, 3, 5, 20]), np.zeros(4)
-    keep = strongest(x, y, np.array([0.9, 0.8, 0.7, 0.1]), np.array([4.0, 9, 9, 1]))
-    assert keep.tolist() == [0, 2, 3]
 
 
 def test_pixel_transform_is_that_of_the_grid(simulated, detected):

@@ -109,8 +109,8 @@ def test_canny_edges_lie_where_octave_sees_them(peer):
 def compare(found, theirs, centre_limit):
     """Share of the circles within the limit, and the radius errors of those."""
     tree = cKDTree(np.column_stack([found.x_px, found.y_px]))
-    # Octave counts pixels from one.
-    distance, index = tree.query(theirs[:, :2] - 1)
+    # Octave counts the centres of pixels from one.
+    distance, index = tree.query(theirs[:, :2] - 0.5)
     close = distance < centre_limit
     return close, np.abs(found.radius_px[index] - theirs[:, 2])
 

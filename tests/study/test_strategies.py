@@ -102,12 +102,15 @@ def test_bad_names_are_refused(grey, region):
 
 def test_checks_on_circles():
     circles = Circles(
-        *np.array([[10.0, 10, 3], [10.2, 10, 3], [30, 30, 2], [-5, 10, 3]]).T, np.ones(4)
+        *np.array([[10.5, 10.5, 3], [10.7, 10.5, 3], [30.5, 30.5, 2], [-5, 10, 3]]).T, np.ones(4)
     )
     assert first_of_duplicates(circles).tolist() == [True, False, True, True]
     region = np.zeros((40, 40), bool)
     region[:20] = True
     assert inside(circles, region).tolist() == [True, True, False, False]
+    # The pixel in row 19 ends at 20, counted from the picture's corner.
+    edge = Circles(*np.array([[3.0, 19.9, 1], [3.0, 20.1, 1]]).T, np.ones(2))
+    assert inside(edge, region).tolist() == [True, False]
     grey = np.full((40, 40), 200.0)
     grey[25:36, 25:36] = 100.0
     means = disc_means(grey, circles)

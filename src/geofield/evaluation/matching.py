@@ -25,6 +25,7 @@ from scipy.spatial import cKDTree
 
 from geofield.crs import ground_areas_m2, is_metric
 from geofield.errors import CRSError, GeofieldError, ObstacleError
+from geofield.evaluation.driving import Driving, driving
 from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
@@ -118,12 +119,15 @@ class Evaluation:
     matches : dict of name to Matches
     distance_m : float
         Within which a detection counts.
+    driving : Driving or None
+        What a driver loses, where tracks were given.
     """
 
     pooled: Score
     images: dict[str, Score]
     matches: dict[str, Matches]
     distance_m: float
+    driving: Driving | None = None
 
 
 def match_points(detected: ArrayLike, truth: ArrayLike, distance: float) -> Matches:
@@ -192,6 +196,7 @@ def evaluate(
     *,
     distance_m: float = DEFAULT_DISTANCE_M,
     area: Any = None,
+    segments: gpd.GeoDataFrame | Mapping[str, gpd.GeoDataFrame] | None = None,
     bootstrap: int = 1000,
     seed: int = 0,
 ) -> Evaluation:
@@ -208,6 +213,9 @@ def evaluate(
         Between centres, on the ground.
     area : shapely geometry, or mapping of picture name to one, optional
         Only obstacles and truths with their centre inside count; in the CRS of ``detected``.
+    segments : GeoDataFrame, or mapping of picture name to one, optional
+        The lines that are driven, in metres; with an area, the fields, they give the
+        figures of `Evaluation.driving`.
     bootstrap : int
         Resamplings for the intervals: of pictures where there are at least five, of single
         obstacles otherwise; 0 for none.
@@ -240,7 +248,16 @@ def evaluate(
         rows[name] = _Counts(match, difference)
     images = {name: _score([counts]) for name, counts in rows.items()}
     pooled = _score(list(rows.values()), bootstrap=bootstrap, seed=seed)
-    return Evaluation(pooled, images, matches, distance_m)
+    lost = None
+    if segments is not None:
+        if area is None:
+            raise ObstacleError("What a driver loses needs the field as area.")
+        lost = Driving()
+        for name in found:
+            lines = segments[name] if isinstance(segments, Mapping) else segments
+            field = area[name] if isinstance(area, Mapping) else area
+            lost += driving(lines, found[name], true[name], field)
+    return Evaluation(pooled, images, matches, distance_m, lost)
 
 
 @dataclass(frozen=True, slots=True)

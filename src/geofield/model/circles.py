@@ -23,7 +23,7 @@ class Circles:
     Attributes
     ----------
     x_px, y_px : float64 arrays, shape (n,)
-        Centres; the centre of the top-left pixel is (0, 0).
+        Centres, from the corner of the top-left pixel, as in every table.
     radius_px : float64 array, shape (n,)
     strength : float64 array, shape (n,)
         The detector's own measure of support; comparable within one picture only.
@@ -52,9 +52,10 @@ class Circles:
             np.concatenate([self.strength, other.strength]),
         )
 
-    def shifted(self, dx_px: float, dy_px: float) -> Circles:
-        """Return the circles moved, for example from a window into its picture."""
-        return Circles(self.x_px + dx_px, self.y_px + dy_px, self.radius_px, self.strength)
+    def scaled(self, factor: float, dx_px: float = 0.0, dy_px: float = 0.0) -> Circles:
+        """Return the circles in smaller pixels, moved, as from a window into its picture."""
+        x, y = self.x_px * factor + dx_px, self.y_px * factor + dy_px
+        return Circles(x, y, self.radius_px * factor, self.strength)
 
 
 def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tuple[float, float]:
@@ -77,8 +78,8 @@ def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tupl
 def inside(circles: Circles, region: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which centres lie on a pixel of the region (rows, cols)."""
     rows, cols = region.shape
-    x = np.floor(circles.x_px + 0.5).astype(np.intp)
-    y = np.floor(circles.y_px + 0.5).astype(np.intp)
+    x = np.floor(circles.x_px).astype(np.intp)
+    y = np.floor(circles.y_px).astype(np.intp)
     known = (x >= 0) & (x < cols) & (y >= 0) & (y < rows)
     result = np.zeros(len(circles), dtype=bool)
     result[known] = region[y[known], x[known]]
@@ -92,7 +93,7 @@ def disc_means(
     rows, cols = grey.shape
     means = np.full(len(circles), np.nan)
     for i in range(len(circles)):
-        x, y = circles.x_px[i], circles.y_px[i]
+        x, y = circles.x_px[i] - 0.5, circles.y_px[i] - 0.5
         reach = max(float(circles.radius_px[i]), 0.5)
         c0, c1 = max(int(np.floor(x - reach)), 0), min(int(np.ceil(x + reach)) + 1, cols)
         r0, r1 = max(int(np.floor(y - reach)), 0), min(int(np.ceil(y + reach)) + 1, rows)

@@ -1,137 +1,223 @@
-"""The default detector on a scene or a reader: trees, then what is not round."""
+"""The default detector: a network looks at the picture window by window."""
 
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from geofield.errors import ObstacleError, ObstacleWarning
-from geofield.model.circles import Circles
+from geofield.learned import network
+from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.field import Field
-from geofield.obstacles.auto import WORKING_RESOLUTION_M, picture_channels
-from geofield.obstacles.shapes import footprints
-from geofield.obstacles.verifier import FloatArray, load_verifier
-from geofield.obstacles.windows import (
+from geofield.obstacles.crowns import (
+    ALIGN_PX,
+    CELL_PX,
+    NETWORK,
+    OVERLAP_PX,
+    answers,
+    centres,
+    once_each,
+)
+from geofield.obstacles.picture import (
     Picture,
-    Polarity,
-    Progress,
-    detect_trees,
-    overview,
+    Tone,
+    on_working_grid,
     part_of,
     search_region,
-    variant_of,
+    tone_of,
+    working_bands,
+    working_factor,
 )
-from geofield.obstacles.working import working_factor, working_picture
+from geofield.obstacles.standing import StandingMap
+from geofield.raster import Window, windows
 
-MIN_RADIUS_PX = 2.0
-MAX_SHAPES_MPX = 25.0
-"""Fields larger than this (working megapixels) are not searched for polygons."""
+Progress = Callable[[int, int, str], None]
+Polarity = Literal["dark", "bright", "both"]
+FloatArray = NDArray[np.float64]
 
+CORE_PX = 1024
+"""Side of a window without its overlap, working pixels."""
 _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""
+MIN_RADIUS_PX = 1.6
+"""Smaller crowns are seen by chance, in pixels of the picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the default detector found.
+
+    Attributes
+    ----------
+    trees : Circles
+        Pixels of the scene; the strength is the probability that a tree stands there.
+    shapes : list of Polygon
+        Pixels of the scene.
+    shape_confidence : float64 array
+    detection : dict
+        Method, thresholds and notes.
+    """
+
+    trees: Circles
+    shapes: list[shapely.Polygon]
+    shape_confidence: FloatArray
+    detection: dict[str, Any]
 
 
 def detect_by_default(
     picture: Picture,
-    field: Field | None,
+    area: Field | None,
     radius_m: tuple[float, float],
     *,
-    polarity: Polarity,
-    min_confidence: float | None,
-    others: bool,
-    progress: Progress | None,
-) -> tuple[Circles, list[shapely.Polygon], dict[str, Any]]:
+    polarity: Polarity = "both",
+    least: float = 0.0,
+    others: bool = True,
+    progress: Progress | None = None,
+) -> Found:
     """Run the default detector.
 
-    Returns
-    -------
-    circles : Circles
-        Pixel-index coordinates of the scene; the strength is the confidence.
-    shapes : list of Polygon
-        Pixel coordinates, the corner of the top-left pixel as origin.
-    detection : dict
-        Method, threshold and notes.
+    Parameters
+    ----------
+    picture : Scene or PictureReader
+    area : Field or None
+        Only centres inside its outer ring count.
+    radius_m : (low, high)
+    polarity : {"dark", "bright", "both"}
+        Of crowns, against the ring around each.
+    least : float
+        Least probability of what is returned.
+    others : bool
+        Whether to look for what is no tree; in a field only.
+    progress : callable, optional
 
     Raises
     ------
     ObstacleError
-        For an unknown polarity or a confidence outside 0 to 1.
+        For an unknown polarity.
     """
     if polarity not in ("dark", "bright", "both"):
         raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark, bright or both.")
-    if min_confidence is not None and not 0 <= min_confidence <= 1:
-        raise ObstacleError(f"The confidence {min_confidence:g} is outside 0 to 1.")
-    notes: list[str] = []
-    small = overview(picture)
-    variant = variant_of(small)
-    verifier = load_verifier(variant)
-    least = verifier.threshold if min_confidence is None else min_confidence
     resolution = picture.grid.ground_resolution_m
-    if radius_m[0] / resolution < MIN_RADIUS_PX:
-        message = (
-            f"The picture is coarse ({resolution:.2f} m per pixel) for radii from "
-            f"{radius_m[0]:g} m: small trees span too few pixels to be seen."
-        )
-        notes.append(message)
-        warnings.warn(message, ObstacleWarning, stacklevel=4)
-    factor = working_factor(resolution, WORKING_RESOLUTION_M)
-    if factor != 1.0:
-        notes.append(f"Resampled from {resolution:.2f} m to {resolution * factor:.2f} m per pixel.")
-    trees = detect_trees(
-        picture,
-        field,
-        verifier,
-        factor=factor,
-        min_confidence=least,
-        polarity=polarity,
-        scaling=small.scaling,
-        progress=progress,
-    )
-    measured_m = trees.radius_px * resolution
-    keep = (measured_m >= _BELOW * radius_m[0]) & (measured_m <= _ABOVE * radius_m[1])
-    radius = np.clip(measured_m, *radius_m) / resolution
-    found = Circles(trees.x_px, trees.y_px, radius, trees.confidence).take(keep)
+    factor = working_factor(resolution)
+    tone = tone_of(picture)
+    notes = _doubts(tone, resolution, factor, radius_m)
+    facts = network(NETWORK).facts
+    standing = None
+    if others and area is not None:
+        bounds = (np.array(area.polygon_px(picture.grid).bounds) / factor).clip(0)
+        standing = StandingMap.over(*bounds.tolist())
+        if standing is None:
+            notes.append("The field is too large to search it for what is no tree.")
+    crowns = _look(picture, area, tone, factor, polarity, standing, progress)
+    crowns = once_each(crowns, **facts["suppression"])
     shapes: list[shapely.Polygon] = []
-    if others and field is not None:
-        shapes = _others(picture, field, found, factor, small.scaling, notes)
-    return found, shapes, {"method": f"evidence_{variant}", "threshold": least, "notes": notes}
-
-
-def _others(
-    picture: Picture,
-    field: Field,
-    trees: Circles,
-    factor: float,
-    scaling: tuple[float, float] | None,
-    notes: list[str],
-) -> list[shapely.Polygon]:
-    """Return footprints of what is in the field and not round."""
-    grid = picture.grid
-    left, top, right, bottom = field.polygon_px(grid).bounds
-    margin = 8
-    c0, r0 = max(int(left) - margin, 0), max(int(top) - margin, 0)
-    width = min(int(right) + margin, grid.width_px) - c0
-    height = min(int(bottom) + margin, grid.height_px) - r0
-    if width < 1 or height < 1:
-        return []
-    if width * height / factor**2 > MAX_SHAPES_MPX * 1e6:
-        notes.append("The field is too large to search it for what is not round.")
-        return []
-    part = part_of(picture, (c0, r0, width, height), scaling)
-    working = working_picture(part, search_region(part, field), factor)
-    found = picture_channels(working.luma, working.rgb, working.nir)
-    near = Circles(
-        (trees.x_px - c0 + 0.5) / factor - 0.5,
-        (trees.y_px - r0 + 0.5) / factor - 0.5,
-        trees.radius_px / factor,
-        trees.strength,
+    shape_confidence = np.empty(0)
+    if standing is not None:
+        sure = crowns.take(crowns.strength >= facts["explains"])
+        shapes, answers_there = standing.things(sure, facts["standing"]["least"])
+        shape_confidence = calibrated(np.array(answers_there), facts["standing"]["calibration"])
+        likely = np.flatnonzero(shape_confidence >= least)
+        shapes = [shapely.transform(shapes[i], lambda c: c * factor) for i in likely]
+        shape_confidence = shape_confidence[likely]
+    p = calibrated(crowns.strength, facts["calibration"][tone.bands])
+    measured_m = crowns.radius_px * factor * resolution
+    radius = np.clip(measured_m, *radius_m) / resolution
+    trees = Circles(crowns.x_px * factor, crowns.y_px * factor, radius, p)
+    keep = (measured_m >= _BELOW * radius_m[0]) & (measured_m <= _ABOVE * radius_m[1])
+    return Found(
+        trees.take(keep & (p >= least)),
+        shapes,
+        shape_confidence,
+        {"method": f"network_{tone.bands}", "notes": notes},
     )
 
-    def to_scene(c: FloatArray) -> FloatArray:
-        return np.asarray(c * factor + np.array([c0, r0]), dtype=np.float64)
 
-    polygons = footprints(found, working.region, near, grid.ground_resolution_m * factor)
-    return [shapely.transform(polygon, to_scene) for polygon in polygons]
+def calibrated(answer: FloatArray, curve: dict[str, list[float]]) -> FloatArray:
+    """Return probabilities for the network's answers, by a rising curve of a few points."""
+    return np.asarray(np.interp(answer, curve["answer"], curve["probability"]), dtype=np.float64)
+
+
+def _look(
+    picture: Picture,
+    area: Field | None,
+    tone: Tone,
+    factor: float,
+    polarity: Polarity,
+    standing: StandingMap | None,
+    progress: Progress | None,
+) -> Circles:
+    """Return all candidates, working pixels, and fill the map of what else stands there."""
+    grid = picture.grid
+    todo = list(windows(grid.shape, CORE_PX, OVERLAP_PX, ALIGN_PX, factor))
+    if area is not None:
+        outline = shapely.Polygon(area.polygon_px(grid).exterior)
+        todo = [w for w in todo if outline.intersects(shapely.box(*w.core))]
+    crowns = Circles()
+    for done, window in enumerate(todo):
+        scene = part_of(picture, (window.col, window.row, window.width, window.height), tone)
+        region = search_region(scene, area)
+        if region.any():
+            bands = working_bands(scene, tone, factor)
+            named = answers(bands)
+            here = _candidates(named, bands, region, factor, polarity)
+            start = round(window.col / factor), round(window.row / factor)
+            here = here.scaled(1.0, *start)
+            crowns = crowns.joined(here.take(_in_core(here, window, factor)))
+            if standing is not None:
+                cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
+                standing.fill(named["other"], cells, start[0] // CELL_PX, start[1] // CELL_PX)
+        if progress is not None:
+            progress(done + 1, len(todo), "obstacles")
+    return crowns
+
+
+def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
+    return window.in_core(crowns.x_px * factor, crowns.y_px * factor)
+
+
+def _candidates(
+    named: dict[str, Any],
+    bands: dict[str, Any],
+    region: NDArray[np.bool_],
+    factor: float,
+    polarity: Polarity,
+) -> Circles:
+    """Return the candidates of one window that lie in its region, working pixels."""
+    crowns = centres(named)
+    crowns = crowns.take(inside(crowns.scaled(factor), region))
+    if polarity == "both" or not len(crowns):
+        return crowns
+    luma = (bands["red"] + bands["green"] + bands["blue"]) / 3
+    wide = Circles(crowns.x_px, crowns.y_px, 1.6 * crowns.radius_px, crowns.strength)
+    bright = disc_means(luma, crowns) > disc_means(luma, wide)
+    return crowns.take(bright == (polarity == "bright"))
+
+
+def _doubts(
+    tone: Tone, resolution_m: float, factor: float, radius_m: tuple[float, float]
+) -> list[str]:
+    """Return notes on what the picture does not allow, and warn of it."""
+    notes = []
+    if MIN_RADIUS_PX * resolution_m > radius_m[0]:
+        notes.append(
+            f"The picture is coarse ({resolution_m:.2f} m per pixel): crowns below "
+            f"{MIN_RADIUS_PX * resolution_m:.1f} m of radius are seen by chance."
+        )
+    if tone.is_flat:
+        notes.append(
+            f"The picture has hardly any contrast ({tone.high - tone.low:.0f} of 255 grey "
+            "levels): haze, or ground alone; trees may be missed."
+        )
+    for note in notes:
+        warnings.warn(note, ObstacleWarning, stacklevel=4)
+    if factor != 1.0:
+        notes.append(
+            f"Resampled from {resolution_m:.2f} m to {resolution_m * factor:.2f} m per pixel."
+        )
+    return notes

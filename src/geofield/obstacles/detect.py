@@ -12,15 +12,17 @@ from geofield import schema
 from geofield.errors import ObstacleError
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, method
-from geofield.model.circles import checked_range
+from geofield.model.circles import Circles, checked_range
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px, from_polygons
 from geofield.model.scene import Scene
-from geofield.obstacles.default import detect_by_default
-from geofield.obstacles.windows import Picture, Polarity, Progress, search_region
+from geofield.obstacles.costs import thresholds
+from geofield.obstacles.default import Found, Polarity, Progress, detect_by_default
+from geofield.obstacles.picture import Picture, search_region
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    from pyproj import CRS
 
     from geofield.study.detectors import GreyCheck
     from geofield.study.edges import EdgeMethod
@@ -38,6 +40,8 @@ Strategy = Literal[
     "study_listing",
     "study_dlc",
 ]
+RADIUS_M = (1.0, 15.0)
+STUDY_RADIUS_M = (2.0, 9.0)
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
 
 
@@ -46,9 +50,11 @@ def detect_obstacles(
     field: Field | None = None,
     *,
     strategy: Strategy = "auto",
-    radius_m: tuple[float, float] = (2.0, 9.0),
-    buffer_m: float = 1.0,
+    radius_m: tuple[float, float] | None = None,
+    buffer_m: float = 1.5,
     polarity: Polarity = "both",
+    cost_missed: float = 30.0,
+    careful: bool = False,
     min_confidence: float | None = None,
     others: bool = True,
     edge_method: EdgeMethod | None = None,
@@ -74,17 +80,24 @@ def detect_obstacles(
     strategy : str
         One of :data:`STRATEGIES`.
     radius_m : (low, high)
-        Radii to look for, metres on the ground.
+        Radii to look for, metres on the ground; 1 to 15 for ``auto``, 2 to 9 for the
+        study's strategies by default.
     buffer_m : float
         Safety margin added around each footprint, metres.
     polarity : {"dark", "bright", "both"}
         ``auto``: keep only crowns that are darker, or brighter, than their surroundings.
+    cost_missed : float
+        ``auto``: what driving into a thing costs, against a look at one place of the map. It
+        decides from which confidence a thing is `detected`, and from which it is `possible`:
+        :func:`geofield.obstacles.costs.thresholds`.
+    careful : bool
+        ``auto``: drive around what is possible, too: it becomes `detected`.
     min_confidence : float, optional
-        ``auto``: the confidence from which a detection is an obstacle; default the one with
-        the best F1 in cross-validation. Lower it to miss less.
+        ``auto``: the confidence from which a thing is `detected`, instead of the one that
+        follows from the cost.
     others : bool
-        ``auto`` in a field: also return what is in the field, not field and not round, as
-        polygons of kind `other`.
+        ``auto`` in a field: also return what stands there and is no tree, as polygons of
+        kind `other`.
     edge_method : str, optional
         Edge method of the study's strategies; see :mod:`geofield.study.strategies`.
     threshold : float, optional
@@ -113,31 +126,33 @@ def detect_obstacles(
     ObstacleError
         For an impossible radius range, margin, strategy or method.
     """
-    low_m, high_m = checked_range(radius_m)
     if not (np.isfinite(buffer_m) and buffer_m >= 0):
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
     if strategy not in STRATEGIES:
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
         )
-    shapes: list[shapely.Polygon] = []
-    confidence: NDArray[np.float64] | None
-    told: dict[str, Any]
+    low_m, high_m = checked_range(radius_m or (RADIUS_M if strategy == "auto" else STUDY_RADIUS_M))
+    crs = scene.grid.metric_crs if field is None else field.crs
+    detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m], "notes": []}
     if strategy == "auto":
-        circles, shapes, told = detect_by_default(
+        limits = thresholds(cost_missed) if min_confidence is None else _limits(min_confidence)
+        detected = limits[1] if careful else limits[0]
+        found = detect_by_default(
             scene,
             field,
             (low_m, high_m),
             polarity=polarity,
-            min_confidence=min_confidence,
+            least=min(limits),
             others=others,
             progress=progress,
         )
-        confidence = circles.strength
+        table = _of_default(found, scene.grid, crs, buffer_m, detected)
+        detection |= {"threshold": detected, "possible_from": min(limits)} | found.detection
     else:
         whole = scene if isinstance(scene, Scene) else scene.read()
         resolution = whole.grid.ground_resolution_m
-        circles, confidence, told = method(STUDY_STRATEGIES, strategy)(
+        circles, share, told = method(STUDY_STRATEGIES, strategy)(
             whole,
             search_region(whole, field),
             strategy,
@@ -151,26 +166,57 @@ def detect_obstacles(
             grey_check=grey_check,
             min_share=min_share,
         )
-    order = np.lexsort((circles.x_px, circles.y_px))
-    circles = circles.take(order)
-    table = from_circles_px(
-        circles.x_px + 0.5,
-        circles.y_px + 0.5,
-        circles.radius_px,
-        scene.grid,
-        buffer_m=buffer_m,
-        confidence=None if confidence is None else confidence[order],
-        crs=scene.grid.metric_crs if field is None else field.crs,
-    )
-    if shapes:
-        table = _with_shapes(table, shapes, scene.grid, buffer_m)
-    detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m], "notes": []}
-    table.attrs["detection"] = detection | told
+        table = _of_circles(circles, share, scene.grid, crs, buffer_m)
+        detection |= told
+    table.attrs["detection"] = detection
     return table
 
 
+def _limits(min_confidence: float) -> tuple[float, float]:
+    """Return the thresholds of a confidence that a person chose: nothing below is possible."""
+    if not 0 <= min_confidence <= 1:
+        raise ObstacleError(f"The confidence {min_confidence:g} is outside 0 to 1.")
+    return min_confidence, min_confidence
+
+
+def _of_circles(
+    circles: Circles,
+    confidence: NDArray[np.float64] | None,
+    grid: Grid,
+    crs: CRS,
+    buffer_m: float,
+) -> gpd.GeoDataFrame:
+    """Return circles as obstacles, in the order of rows and columns."""
+    order = np.lexsort((circles.x_px, circles.y_px))
+    circles = circles.take(order)
+    return from_circles_px(
+        circles.x_px,
+        circles.y_px,
+        circles.radius_px,
+        grid,
+        buffer_m=buffer_m,
+        confidence=None if confidence is None else confidence[order],
+        crs=crs,
+    )
+
+
+def _of_default(
+    found: Found, grid: Grid, crs: CRS, buffer_m: float, detected: float
+) -> gpd.GeoDataFrame:
+    """Return trees and other things as obstacles, detected or merely possible."""
+    table = _of_circles(found.trees, found.trees.strength, grid, crs, buffer_m)
+    if found.shapes:
+        table = _with_shapes(table, found.shapes, found.shape_confidence, grid, buffer_m)
+    unsure = table["confidence"].to_numpy(dtype="float64") < detected
+    return table.assign(status=table["status"].mask(unsure, "possible"))
+
+
 def _with_shapes(
-    table: gpd.GeoDataFrame, shapes: list[shapely.Polygon], grid: Grid, buffer_m: float
+    table: gpd.GeoDataFrame,
+    shapes: list[shapely.Polygon],
+    confidence: NDArray[np.float64],
+    grid: Grid,
+    buffer_m: float,
 ) -> gpd.GeoDataFrame:
     """Append polygons of kind `other`, numbered on in the order of their rows."""
     import pandas as pd
@@ -180,8 +226,16 @@ def _with_shapes(
     def to_metric(c: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack(grid.to_crs(c[:, 0], c[:, 1], crs))
 
-    order = sorted(shapes, key=lambda shape: (shape.centroid.y, shape.centroid.x))
-    metric = shapely.transform(np.asarray(order, dtype=object), to_metric)
-    rows = from_polygons(metric, crs, buffer_m=buffer_m, grid=grid, first_no=len(table) + 1)
+    every = np.asarray(shapes, dtype=object)
+    centre = shapely.centroid(every)
+    order = np.lexsort((shapely.get_x(centre), shapely.get_y(centre)))
+    rows = from_polygons(
+        shapely.transform(every[order], to_metric),
+        crs,
+        buffer_m=buffer_m,
+        grid=grid,
+        confidence=confidence[order],
+        first_no=len(table) + 1,
+    )
     joined = pd.concat([table, rows]) if len(table) else rows
     return schema.conform(schema.OBSTACLES, joined)

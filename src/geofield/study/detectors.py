@@ -64,7 +64,6 @@ def detect_by_study(
     Returns
     -------
     circles : Circles
-        Pixel-index coordinates of the scene.
     share : float64 array or None
         ``consensus``: the share of the settings that saw each circle.
     detection : dict

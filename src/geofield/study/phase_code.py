@@ -66,7 +66,7 @@ def find_circles(
     Returns
     -------
     Circles
-        Strongest first, none when no peak stands out. Centres in pixel-index coordinates.
+        Strongest first, none when no peak stands out.
 
     Raises
     ------
@@ -124,7 +124,8 @@ def circles_from_edges(
         theta = np.mod(np.arctan2(votes[1][rows, cols], votes[0][rows, cols]), 2 * np.pi)
         radius = np.exp(theta / (2 * np.pi) * np.log(radii[-1] / radii[0]) + np.log(radii[0]))
     order = np.argsort(-strength, kind="stable")
-    return Circles(x, y, radius, strength).take(order)
+    # The transform counts from the centre of the top-left pixel, all values from its corner.
+    return Circles(x + 0.5, y + 0.5, radius, strength).take(order)
 
 
 def _centres(

@@ -1,4 +1,7 @@
-"""Centre and radius of a crown, measured on the picture to a fraction of a pixel."""
+"""Radii of labelled crowns, measured on the picture to a fraction of a pixel.
+
+The labels are points. Positions are pixels from the corner of the top-left pixel.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
-from geofield.obstacles.channels import Channels, Image, bilinear, smoothed
+from geofield.raster import Image, bilinear, smoothed
 
 FloatArray = NDArray[np.float64]
 
@@ -20,7 +23,7 @@ _SMOOTHING_PX = 0.7
 _EDGE_SIGMA_PX = 1.0
 """How far an edge is blurred in all: by lens, pixel, smoothing and interpolation."""
 
-_SCALE = {"ndvi": 14.0, "exg": 5.0, "luma": 13.0}
+_NDVI_STEP, _LUMA_STEP = 14.0, 13.0
 """What counts as a clear step in each map."""
 
 
@@ -35,20 +38,14 @@ class _Fit:
 
 
 def fit_circles(
-    found: Channels, x_px: FloatArray, y_px: FloatArray, largest_px: float
+    bands: NDArray[np.uint8], x_px: FloatArray, y_px: FloatArray, largest_px: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit a circle around each centre.
+    """Fit a circle around each centre of a picture (red, green, blue, near infrared).
 
     The radius is where the mean over all directions falls most steeply; the centre is moved
     by the circle through the steepest places of the single directions, where they agree.
     Greenness decides, for shadows do not move its edge; where crowns are no greener than the
     ground, brightness does.
-
-    Parameters
-    ----------
-    found : Channels
-    x_px, y_px : float64 arrays, shape (n,)
-    largest_px : float
 
     Returns
     -------
@@ -56,16 +53,14 @@ def fit_circles(
     """
     if x_px.size == 0:
         return x_px, y_px, np.empty(0)
+    red, green, blue, nir = bands.astype(np.float32)
+    luma = np.float32(0.298) * red + np.float32(0.587) * green + np.float32(0.114) * blue
+    weight = nir + red + 30
     limit = _radius_limit(x_px, y_px, largest_px)
-    luma = _smooth(-found.maps["luma"])
-    if found.index is None:
-        x, y, fit = _settle(luma, x_px, y_px, limit)
-        return x, y, fit.radius
-    name = "ndvi" if "ndvi" in found.maps else "exg"
-    x, y, fit = _settle(_smooth(found.index), x_px, y_px, limit)
-    radius = fit.radius + _mixture_shift(found, x, y, fit.radius)
-    dark_x, dark_y, dark = _settle(luma, x_px, y_px, limit)
-    darker = dark.step / _SCALE["luma"] > 2 * np.maximum(fit.step, 0) / _SCALE[name]
+    x, y, fit = _settle(_smooth(255 * (nir - red) / weight), x_px, y_px, limit)
+    radius = fit.radius + _mixture_shift(weight, x, y, fit.radius)
+    dark_x, dark_y, dark = _settle(_smooth(-luma), x_px, y_px, limit)
+    darker = dark.step / _LUMA_STEP > 2 * np.maximum(fit.step, 0) / _NDVI_STEP
     return (
         np.where(darker, dark_x, x),
         np.where(darker, dark_y, y),
@@ -87,7 +82,7 @@ def _radius_limit(x_px: FloatArray, y_px: FloatArray, largest_px: float) -> Floa
 
 
 def _mixture_shift(
-    found: Channels, x_px: FloatArray, y_px: FloatArray, radius: FloatArray
+    weight: Image, x_px: FloatArray, y_px: FloatArray, radius: FloatArray
 ) -> FloatArray:
     """Return how far an index's edge lies inside the true one.
 
@@ -95,10 +90,8 @@ def _mixture_shift(
     point lies where the covers weigh the same, not where they share the pixel equally: at
     the crown's share s_out / (s_in + s_out), s being what the index divides by.
     """
-    if found.mixture is None:
-        return np.zeros(radius.size)
-    inner = _ring_mean(found.mixture, x_px, y_px, 0.5 * radius)
-    outer = _ring_mean(found.mixture, x_px, y_px, radius + 3.0)
+    inner = _ring_mean(weight, x_px, y_px, 0.5 * radius)
+    outer = _ring_mean(weight, x_px, y_px, radius + 3.0)
     share = outer / np.maximum(inner + outer, 1.0)
     shift = _EDGE_SIGMA_PX * ndtri(np.clip(share, 0.05, 0.95))
     return np.asarray(np.clip(shift, -0.5, 0.5), dtype=np.float64)

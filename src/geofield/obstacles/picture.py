@@ -1,0 +1,156 @@
+"""The picture that obstacles are looked for in: read in parts, on the working grid, normalised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, cast, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from geofield.grid import Grid
+from geofield.model.field import Field
+from geofield.model.scene import Scene
+from geofield.raster import Image, pixel_centres, resample
+
+WORKING_RESOLUTION_M = 0.6
+"""Ground size of a pixel of the working grid: that of the pictures the network learned from."""
+_AS_IT_IS = (0.87, 1.15)
+"""Between these factors a picture is used as it is."""
+_OVERVIEW_PX = 1024
+LEAST_CONTRAST = 24.0
+"""Grey levels between the dark and the bright end, below which noise would be blown up."""
+
+
+@runtime_checkable
+class PictureReader(Protocol):
+    """A picture that is read window by window, for instance `geofield.imagery.SceneReader`."""
+
+    @property
+    def grid(self) -> Grid:
+        """Of the whole picture."""
+
+    def read(
+        self,
+        window: tuple[int, int, int, int] | None = None,
+        *,
+        shape_px: tuple[int, int] | None = None,
+        scaling: tuple[float, float] | None = None,
+    ) -> Scene:
+        """Read a window (column, row, width, height)."""
+
+
+Picture = Scene | PictureReader
+
+
+@dataclass(frozen=True, slots=True)
+class Tone:
+    """What is known of a picture as a whole, so that all its parts are seen alike.
+
+    Attributes
+    ----------
+    bands : {"nir", "rgb", "grey"}
+        What the network may look at; three equal bands are grey.
+    low, high : float
+        The dark and the bright end of the visible bands: grey levels.
+    scaling : (float, float) or None
+        Of a reader's values.
+    """
+
+    bands: str
+    low: float
+    high: float
+    scaling: tuple[float, float] | None
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether there is too little contrast to stretch, but not nothing at all."""
+        return 1 < self.high - self.low < LEAST_CONTRAST
+
+    def normalised(self, image: Image) -> Image:
+        """Bring a band to about -1..1, by the gain and offset common to all bands."""
+        gain = 2 / max(self.high - self.low, LEAST_CONTRAST)
+        stretched = (image - np.float32(self.low)) * np.float32(gain) - 1
+        return np.asarray(np.clip(stretched, -3, 3), dtype=np.float32)
+
+
+def tone_of(picture: Picture) -> Tone:
+    """Look at a small version of a picture."""
+    small = picture
+    if not isinstance(picture, Scene):
+        rows, cols = picture.grid.shape
+        step = max(rows, cols) / min(max(rows, cols), _OVERVIEW_PX)
+        small = picture.read(shape_px=(max(int(rows / step), 1), max(int(cols / step), 1)))
+    scene = cast("Scene", small)
+    step = max(max(scene.grid.shape) // _OVERVIEW_PX, 1)
+    valid = scene.valid[::step, ::step]
+    bands, visible = "grey", [scene.grey[::step, ::step][valid]]
+    if scene.is_colour:
+        rgb = [scene.bands[scene.roles.index(r)] for r in ("red", "green", "blue")]
+        if any(not np.array_equal(rgb[0], other) for other in rgb[1:]):
+            bands = "rgb" if scene.nir is None else "nir"
+            visible = [band[::step, ::step][valid] for band in rgb]
+    low, high = np.percentile(np.concatenate(visible), [2, 98]) if valid.any() else (0, 255)
+    return Tone(bands, float(low), float(high), scene.scaling)
+
+
+def part_of(picture: Picture, window: tuple[int, int, int, int], tone: Tone) -> Scene:
+    """Return a window (column, row, width, height) of a picture."""
+    if isinstance(picture, Scene):
+        return picture.crop(*window)
+    return picture.read(window, scaling=tone.scaling)
+
+
+def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
+    """Return the pixels (rows, cols) on which an obstacle's centre may lie."""
+    if field is None:
+        return scene.valid
+    return field.mask(scene.grid, holes=False) & scene.valid
+
+
+def working_factor(resolution_m: float) -> float:
+    """Return the scene's pixels per working pixel, 1 where the picture is near enough."""
+    factor = WORKING_RESOLUTION_M / resolution_m
+    return 1.0 if _AS_IT_IS[0] <= factor <= _AS_IT_IS[1] else factor
+
+
+def working_bands(scene: Scene, tone: Tone, factor: float) -> dict[str, Image | float]:
+    """Bring a scene to the working grid: red, green, blue, nir, has_nir.
+
+    Missing pixels are filled with the nearest, so that their border is no edge.
+    """
+    nearest = None
+    if not scene.valid.all() and scene.valid.any():
+        nearest = ndimage.distance_transform_edt(
+            ~scene.valid, return_distances=False, return_indices=True
+        )
+
+    def band(values: NDArray[np.generic]) -> Image:
+        picture = values.astype(np.float32)
+        if nearest is not None:
+            picture = picture[tuple(nearest)]
+        return tone.normalised(resample(picture, factor))
+
+    if tone.bands == "grey":
+        grey = band(scene.grey)
+        return {"red": grey, "green": grey, "blue": grey, "nir": 0.0, "has_nir": 0.0}
+    visible: dict[str, Image | float] = {
+        r: band(scene.bands[scene.roles.index(r)]) for r in ("red", "green", "blue")
+    }
+    if tone.bands == "nir" and scene.nir is not None:
+        return visible | {"nir": band(scene.nir), "has_nir": 1.0}
+    return visible | {"nir": 0.0, "has_nir": 0.0}
+
+
+def on_working_grid(
+    mask: NDArray[np.bool_], shape: tuple[int, ...], factor: float
+) -> NDArray[np.bool_]:
+    """Return a mask at the centres of the working pixels."""
+    if factor == 1.0:
+        return mask
+    rows, cols = (
+        pixel_centres(n, factor, size).astype(np.intp)
+        for n, size in zip(shape, mask.shape, strict=True)
+    )
+    return mask[rows][:, cols]

@@ -1,0 +1,127 @@
+"""What stands in a field and is no tree: posts, walls, huts, trucks, heaps, ponds.
+
+The network says of each cell whether something stands there. Cells that hang together become
+one polygon, as probable as its clearest cells; what the trees explain is left to them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.filters import apply_hysteresis_threshold
+
+from geofield.model.circles import Circles
+from geofield.obstacles.crowns import CELL_PX
+from geofield.raster import Image
+
+MAX_CELLS = 100e6
+"""Larger fields are searched for trees alone, for their cells would not fit into memory."""
+RIM = 0.5
+"""A thing reaches as far as its cells are at least this share of its clearest ones."""
+_EXPLAINED = 0.5
+_CLEAR_CELLS = 3
+
+
+@dataclass(slots=True)
+class StandingMap:
+    """How probable it is that something stands in each cell (0..255), filled window by window.
+
+    Attributes
+    ----------
+    cells : uint8 array (rows, cols)
+    col, row : int
+        Of its first cell, counted in cells from the picture's corner.
+    """
+
+    cells: NDArray[np.uint8]
+    col: int
+    row: int
+
+    @classmethod
+    def over(cls, left: float, top: float, right: float, bottom: float) -> StandingMap | None:
+        """Return an empty map of an area (working pixels), None where it would be too large."""
+        c0, r0 = int(left // CELL_PX), int(top // CELL_PX)
+        shape = (int(bottom // CELL_PX) + 1 - r0, int(right // CELL_PX) + 1 - c0)
+        if shape[0] * shape[1] > MAX_CELLS:
+            return None
+        return cls(np.zeros(shape, np.uint8), c0, r0)
+
+    def fill(self, other: Image, region: NDArray[np.bool_], col: int, row: int) -> None:
+        """Enter a window's answers where its region is, its first cell at (col, row)."""
+        values = np.where(region, np.rint(255 * other), 0).astype(np.uint8)
+        c0, r0 = max(self.col - col, 0), max(self.row - row, 0)
+        c1 = min(self.col + self.cells.shape[1] - col, values.shape[1])
+        r1 = min(self.row + self.cells.shape[0] - row, values.shape[0])
+        if c0 < c1 and r0 < r1:
+            part = np.s_[row + r0 - self.row : row + r1 - self.row,
+                         col + c0 - self.col : col + c1 - self.col]  # fmt: skip
+            # Where windows overlap they agree, but for those whose region ends there.
+            np.maximum(self.cells[part], values[r0:r1, c0:c1], out=self.cells[part])
+
+    def things(self, trees: Circles, least: float) -> tuple[list[shapely.Polygon], list[float]]:
+        """Return what stands there beside the trees, and how probable each is.
+
+        Parameters
+        ----------
+        trees : Circles
+            Working pixels.
+        least : float
+            Least probability of a thing, before it is calibrated.
+
+        Returns
+        -------
+        polygons : list of Polygon
+            Working pixels from the corner of the picture.
+        probabilities : list of float
+        """
+        p = self.cells.astype(np.float32) / 255
+        mask = apply_hysteresis_threshold(p, RIM * least, least)
+        labels, count = ndimage.label(mask, structure=np.ones((3, 3), bool))
+        if not count:
+            return [], []
+        known = self._discs(trees)
+        polygons, probabilities = [], []
+        for number, where in enumerate(ndimage.find_objects(labels), start=1):
+            part = labels[where] == number
+            if float(known[where][part].mean()) >= _EXPLAINED:
+                continue
+            clearest = np.sort(p[where][part])[-_CLEAR_CELLS:]
+            thing = part & (p[where] >= RIM * float(clearest.mean()))
+            outline = _outline(np.pad(thing, 1))
+            place = np.array([where[1].start - 1 + self.col, where[0].start - 1 + self.row])
+            corners = shapely.get_coordinates(outline)
+            polygons.append(shapely.Polygon((corners + place) * CELL_PX))
+            probabilities.append(float(clearest.mean()))
+        return polygons, probabilities
+
+    def _discs(self, trees: Circles) -> NDArray[np.bool_]:
+        mask = np.zeros(self.cells.shape, np.uint8)
+        for x, y, radius in zip(trees.x_px, trees.y_px, trees.radius_px, strict=True):
+            # A sixteenth of a cell is what OpenCV can place.
+            centre = [
+                round(16 * (v / CELL_PX - o - 0.5)) for v, o in ((x, self.col), (y, self.row))
+            ]
+            cv2.circle(mask, centre, round(16 * radius / CELL_PX), 1, -1, cv2.LINE_8, 4)
+        return mask.astype(bool)
+
+
+def _outline(part: NDArray[np.bool_]) -> shapely.Polygon:
+    """Return the outline of one region of cells, holes filled, its stairs smoothed away."""
+    from rasterio.features import shapes
+
+    filled = ndimage.binary_fill_holes(part).astype(np.uint8)
+    rings = [
+        shapely.Polygon(shape["coordinates"][0])
+        for shape, value in shapes(filled, mask=filled.astype(bool), connectivity=8)
+        if value
+    ]
+    largest = max(rings, key=lambda ring: ring.area)
+    simple = largest.buffer(0).simplify(0.75)
+    if simple.is_empty or not isinstance(simple, shapely.Polygon):
+        return largest
+    return simple

@@ -1,0 +1,84 @@
+"""Networks of the package: loaded once, named channels, any thread, other processes."""
+
+import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from geofield.errors import GeofieldError
+from geofield.learned import network
+
+
+@pytest.fixture(scope="module")
+def crowns():
+    return network("crowns")
+
+
+@pytest.fixture(scope="module")
+def picture(simulated):
+    """A part of a simulated field with trees, normalised."""
+    from geofield.obstacles.picture import tone_of, working_bands
+
+    part = simulated.scene.crop(80, 80, 160, 160)
+    return working_bands(part, tone_of(simulated.scene), 1.0)
+
+
+def test_every_channel_of_the_network_has_a_part(crowns, picture):
+    """Two inputs swapped change the answer, whichever they are."""
+    right = crowns(crowns.stacked(**picture))
+    names = list(crowns.inputs)
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            swapped = picture | {one: picture[other], other: picture[one]}
+            change = np.abs(crowns(crowns.stacked(**swapped)) - right).max()
+            assert change > 0.05, (one, other)
+
+
+def test_outputs_are_what_their_names_say(crowns, picture, simulated):
+    named = crowns.named(crowns.stacked(**picture))
+    assert tuple(named) == crowns.outputs
+    trees = simulated.obstacles[["x_px", "y_px", "radius_px"]].to_numpy() - [80, 80, 0]
+    inner = (trees[:, :2] > 8).all(axis=1) & (trees[:, :2] < 152).all(axis=1)
+    assert inner.sum() >= 2
+    for x, y, radius in trees[inner]:
+        at = int(y // 2), int(x // 2)
+        near = np.s_[at[0] - 2 : at[0] + 3, at[1] - 2 : at[1] + 3]
+        assert named["centre"][near].max() > named["centre"].mean() + 3
+        assert named["cover"][at] > 0
+        assert np.exp(named["log_radius"][at]) == pytest.approx(radius, rel=0.35)
+
+
+def test_threads_and_pickles_get_the_same_answer(crowns, picture):
+    batch = crowns.stacked(**picture)
+    right = crowns(batch)
+    again = pickle.loads(pickle.dumps(crowns))
+    assert again is crowns
+    with ThreadPoolExecutor(4) as pool:
+        for other in pool.map(crowns, [batch] * 8):
+            assert np.array_equal(other, right)
+
+
+def test_wrong_channels_are_refused(crowns, picture):
+    with pytest.raises(ValueError, match="takes"):
+        crowns(np.zeros((1, 3, 32, 32), np.float32))
+    with pytest.raises(ValueError, match="takes"):
+        crowns.stacked(red=0.0)
+
+
+def test_an_unknown_network_is_told():
+    with pytest.raises(GeofieldError, match="oaks"):
+        network("oaks")
+
+
+def test_the_model_files_stay_small_and_honest():
+    folder = files("geofield.learned")
+    facts = json.loads((folder / "crowns.json").read_text())
+    assert (folder / "crowns.onnx").stat().st_size < 1.5e6
+    for kind in ("nir", "rgb", "grey"):
+        curve = facts["calibration"][kind]
+        assert np.all(np.diff(curve["answer"]) > 0)
+        assert np.all(np.diff(curve["probability"]) >= 0)
+        assert facts["left_out"][kind]["calibration_error"] <= 0.03

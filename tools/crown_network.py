@@ -1,0 +1,69 @@
+"""The network that sees crowns, as it is trained: a small U-Net at half resolution."""
+
+from __future__ import annotations
+
+import torch
+from crown_samples import INPUTS, OUTPUTS
+from torch import Tensor, nn
+from torch.nn import functional
+
+WIDTHS = (24, 48, 64, 64)
+
+
+def step(inputs: int, outputs: int, size: int = 3, stride: int = 1) -> nn.Sequential:
+    """Return a convolution with batch norm and a rectifier."""
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
+        nn.BatchNorm2d(outputs),
+        nn.ReLU(inplace=True),
+    )
+
+
+class Residual(nn.Module):
+    """Two convolutions beside the identity."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.first = step(width, width)
+        self.second = nn.Sequential(
+            nn.Conv2d(width, width, 3, 1, 1, bias=False), nn.BatchNorm2d(width)
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        return functional.relu(x + self.second(self.first(x)))
+
+
+class CrownNetwork(nn.Module):
+    """Bands in, one value per output and cell of two pixels out (logits, offsets, ln radius)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        a, b, c, d = WIDTHS
+        self.stem, self.level1 = step(len(INPUTS), a, 3, 2), Residual(a)
+        self.down1, self.level2 = step(a, b, 3, 2), Residual(b)
+        self.down2, self.level3 = step(b, c, 3, 2), Residual(c)
+        self.down3, self.level4 = step(c, d, 3, 2), step(d, d)
+        self.up3, self.join3 = step(d, c, 1), step(c, c)
+        self.up2, self.join2 = step(c, b, 1), step(b, b)
+        self.up1, self.join1 = step(b, a, 1), step(a, 32)
+        self.head = nn.Conv2d(32, len(OUTPUTS), 1)
+        with torch.no_grad():
+            # Centres are rare: begin where the focal loss is calm.
+            self.head.bias.zero_()
+            self.head.bias[0] = -4.0
+            self.head.bias[3] = 1.4
+            self.head.bias[5] = -4.0
+
+    def forward(self, x: Tensor) -> Tensor:
+        one = self.level1(self.stem(x))
+        two = self.level2(self.down1(one))
+        three = self.level3(self.down2(two))
+        four = self.level4(self.down3(three))
+        y = self.join3(three + twice(self.up3(four)))
+        y = self.join2(two + twice(self.up2(y)))
+        y = self.join1(one + twice(self.up1(y)))
+        return self.head(y)
+
+
+def twice(x: Tensor) -> Tensor:
+    return functional.interpolate(x, scale_factor=2, mode="nearest")

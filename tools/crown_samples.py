@@ -1,0 +1,283 @@
+"""Training samples: crops of the pictures, turned, scaled, spoiled, and what is to be seen.
+
+Coordinates are pixels from the corner of the top-left pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from standing_things import place_things
+
+INPUTS = ("red", "green", "blue", "nir", "has_nir")
+OUTPUTS = ("centre", "dx", "dy", "log_radius", "cover", "other")
+CROP_PX = 192
+CELL_PX = 2
+SPOILED = 0.65
+"""Share of the samples that are of another camera, light or file than the chips."""
+BORDER_PX = 2.0
+"""Crowns on the picture's border may be cut off, their centres outside."""
+
+
+@dataclass
+class Pictures:
+    """All pictures in memory."""
+
+    names: np.ndarray
+    left_out: np.ndarray
+    bands: np.ndarray
+    regions: np.ndarray
+    trees: list[np.ndarray]
+
+    @classmethod
+    def read(cls, path: Path) -> Pictures:
+        with np.load(path) as data:
+            number, trees = data["trees"][:, 0].astype(int), data["trees"][:, 1:]
+            bands = np.ascontiguousarray(data["bands"].transpose(0, 2, 3, 1))
+            count = len(bands)
+            return cls(
+                data["names"],
+                data["left_out"],
+                bands,
+                np.unpackbits(data["regions"], axis=-1),
+                [trees[number == i] for i in range(count)],
+            )
+
+    @property
+    def simulated(self) -> np.ndarray:
+        return np.char.startswith(self.names, "simulated")
+
+    def weights(self) -> np.ndarray:
+        """Return how often each picture is drawn: open and green land more often."""
+        count = np.array([len(t) for t in self.trees])
+        weight = np.where(count < 40, 1.6, 1.0)
+        green = zip(self.bands, self.trees, strict=True)
+        weight += 2 * np.array([green_ground(bands, trees) for bands, trees in green])
+        weight[self.simulated] = 0.5
+        weight[self.left_out] = 0
+        return weight / weight.sum()
+
+
+def green_ground(bands: np.ndarray, trees: np.ndarray) -> float:
+    """Return the share of a picture that is green and no crown: lawn, pasture, crop."""
+    red, nir = bands[..., 0].astype(np.float32), bands[..., 3].astype(np.float32)
+    free = np.ones(red.shape, np.uint8)
+    for x, y, _ in trees:
+        cv2.circle(free, (int(x), int(y)), 9, 0, -1)
+    return float(((nir - red > 0.15 * (nir + red)) & (free > 0)).mean())
+
+
+def calm(image: np.ndarray) -> np.ndarray:
+    """Return where hardly anything can stand: no edges within a few pixels."""
+    grey = image[..., :3].mean(axis=2)
+    mean = cv2.blur(grey, (9, 9))
+    spread = np.sqrt(np.maximum(cv2.blur(grey * grey, (9, 9)) - mean * mean, 0))
+    return spread < 7
+
+
+def normalised(image: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Bring bands to about -1..1 by one gain and offset for all of them."""
+    return np.clip((image - low) * (2 / max(high - low, 24.0)) - 1, -3, 3)
+
+
+def levels(image: np.ndarray) -> tuple[float, float]:
+    """Return the dark and the bright end of the visible bands (rows, cols, 3 or more)."""
+    low, high = np.percentile(image[::3, ::3, :3], [2, 98])
+    return float(low), float(high)
+
+
+class Sampler:
+    """Draw samples from a seed."""
+
+    def __init__(self, pictures: Pictures, seed: int) -> None:
+        self.pictures = pictures
+        self.rng = np.random.default_rng(seed)
+        self.p = pictures.weights()
+        self.simulated = pictures.simulated
+
+    def batch(self, size: int) -> dict[str, np.ndarray]:
+        chosen = self.rng.choice(len(self.p), size, p=self.p)
+        samples = [self.sample(int(i)) for i in chosen]
+        return {key: np.stack([s[key] for s in samples]) for key in samples[0]}
+
+    def sample(self, number: int) -> dict[str, np.ndarray]:
+        rng = self.rng
+        image, valid, trees = self._moved(number)
+        count_near = len(trees)
+        simulated = bool(self.simulated[number])
+        open_land = simulated or count_near <= 12
+        other = np.zeros((CROP_PX, CROP_PX), np.float32)
+        known = (calm(image) | simulated).astype(np.float32)
+        if open_land and rng.random() < 0.5:
+            image, other, touched = place_things(rng, image, trees, known)
+            known = np.maximum(known, touched)
+        if rng.random() < SPOILED:
+            image = spoiled(rng, image)
+        low, high = levels(image)
+        spread = high - low
+        low += rng.normal(0, 0.06) * spread
+        high += rng.normal(0, 0.12) * spread
+        x = np.zeros((5, CROP_PX, CROP_PX), np.float32)
+        kind = rng.random()
+        if kind < 0.45:
+            x[:4] = normalised(image, low, high).transpose(2, 0, 1)
+            x[4] = 1
+        else:
+            rgb = image[..., :3]
+            if kind > 0.78:
+                rgb = np.repeat((rgb @ np.float32([0.299, 0.587, 0.114]))[..., None], 3, axis=2)
+            x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
+        return {"x": x} | targets(trees, valid, other, known * open_land)
+
+    def _moved(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return a crop turned, mirrored and scaled, with its valid pixels and trees."""
+        rng = self.rng
+        bands = self.pictures.bands[number]
+        region = self.pictures.regions[number]
+        side = bands.shape[0]
+        zoom = float(np.exp(rng.uniform(np.log(0.85), np.log(1.18))))
+        if rng.random() < 0.3:
+            zoom = float(np.exp(rng.uniform(np.log(0.55), np.log(1.9))))
+        angle = int(rng.integers(4)) * np.pi / 2
+        if rng.random() < 0.4:
+            angle = rng.uniform(0, 2 * np.pi)
+        cos, sin = zoom * np.cos(angle), zoom * np.sin(angle)
+        turn = np.array([[cos, -sin], [sin, cos]])
+        if rng.random() < 0.5:
+            turn[:, 0] *= -1
+        reach = max((side - CROP_PX / zoom) / 2, 0) + 12
+        centre = side / 2 + rng.uniform(-reach, reach, 2)
+        shift = CROP_PX / 2 - turn @ centre
+        # The pixel whose corner is at zero has its centre at one half.
+        matrix = np.column_stack([turn, shift + turn @ [0.5, 0.5] - 0.5])
+        picture = bands
+        if zoom < 0.8:
+            picture = cv2.GaussianBlur(bands, (0, 0), 0.5 * np.sqrt(1 / zoom**2 - 1))
+        image = cv2.warpAffine(
+            picture,
+            matrix,
+            (CROP_PX, CROP_PX),
+            flags=cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REFLECT_101,
+        ).astype(np.float32)
+        inner = region.copy()
+        edge = int(np.ceil(BORDER_PX))
+        inner[:edge], inner[-edge:], inner[:, :edge], inner[:, -edge:] = 0, 0, 0, 0
+        valid = cv2.warpAffine(inner, matrix, (CROP_PX, CROP_PX), flags=cv2.INTER_NEAREST)
+        trees = self.pictures.trees[number]
+        moved = np.column_stack([trees[:, :2] @ turn.T + shift, trees[:, 2] * zoom])
+        near = ((moved[:, :2] > -20) & (moved[:, :2] < CROP_PX + 20)).all(axis=1)
+        return image, valid, moved[near]
+
+
+def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
+    """Return the picture of another camera, light and file (0..255)."""
+    side = image.shape[0]
+    if rng.random() < 0.2:
+        factor = rng.uniform(1.3, 3.4)
+        small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
+        image = cv2.resize(small, (side, side), interpolation=cv2.INTER_LINEAR)
+    if rng.random() < 0.25:
+        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 1.4))
+    elif rng.random() < 0.25:
+        image = image + rng.uniform(0.3, 1.2) * (image - cv2.GaussianBlur(image, (0, 0), 1.2))
+    image = np.clip(image, 0, 255) / 255
+    if rng.random() < 0.7:
+        image = image ** np.float32(np.exp(rng.normal(0, 0.25)))
+    if rng.random() < 0.15:
+        image = image * shade(rng, side)[..., None]
+    gain = np.exp(rng.normal(0, 0.12)) * np.exp(rng.normal(0, 0.07, image.shape[2]))
+    image = image * gain.astype(np.float32)
+    if rng.random() < 0.25:
+        share = np.float32(rng.uniform(0.05, 0.55))
+        image = image * (1 - share) + share * np.float32(rng.uniform(0.6, 0.95))
+    if rng.random() < 0.15:
+        share = np.float32(rng.uniform(0.35, 0.9))
+        image = image * share + np.float32(rng.uniform(0, 1 - share))
+    image = image * 255
+    if rng.random() < 0.4:
+        noise = rng.standard_normal(image.shape, dtype=np.float32)
+        image = image + noise * np.float32(rng.uniform(0.5, 7))
+    image = np.clip(image, 0, 255)
+    if rng.random() < 0.35:
+        image = jpeg(rng, image)
+    return np.ascontiguousarray(np.rint(image), dtype=np.float32)
+
+
+def jpeg(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
+    """Return the picture after it was stored with losses, near infrared on its own."""
+    quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 95))]
+    eight = np.rint(image).astype(np.uint8)
+    visible = cv2.imdecode(cv2.imencode(".jpg", eight[..., :3], quality)[1], cv2.IMREAD_COLOR)
+    infrared = cv2.imdecode(
+        cv2.imencode(".jpg", np.ascontiguousarray(eight[..., 3]), quality)[1], cv2.IMREAD_GRAYSCALE
+    )
+    return np.dstack([visible, infrared]).astype(np.float32)
+
+
+def shade(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Return the factor of a cloud's or slope's soft shade."""
+    y, x = np.mgrid[:side, :side].astype(np.float32)
+    angle = rng.uniform(0, 2 * np.pi)
+    along = (x - side / 2) * np.cos(angle) + (y - side / 2) * np.sin(angle)
+    edge = np.clip((along - rng.uniform(-60, 60)) / rng.uniform(4, 40) + 0.5, 0, 1)
+    return (1 - edge * rng.uniform(0.2, 0.55)).astype(np.float32)
+
+
+def targets(
+    trees: np.ndarray, valid: np.ndarray, other: np.ndarray, known: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return what the network should say, and where it counts, per cell."""
+    side = CROP_PX // CELL_PX
+    heat = np.zeros((side, side), np.float32)
+    around = np.zeros((3, side, side), np.float32)
+    counts = np.zeros((2, side, side), np.float32)
+    cover = np.zeros((side, side), np.float32)
+    unknown = np.zeros((side, side), np.uint8)
+    yy, xx = np.mgrid[:side, :side].astype(np.float32)
+    best = np.full((side, side), np.inf, np.float32)
+    for x, y, radius in trees:
+        u, v = x / CELL_PX, y / CELL_PX
+        col, row = int(np.floor(u)), int(np.floor(v))
+        measured = np.isfinite(radius)
+        r = (radius if measured else 5.0) / CELL_PX
+        reach = int(max(r, 4)) + 2
+        c0, c1 = max(col - reach, 0), min(col + reach + 1, side)
+        r0, r1 = max(row - reach, 0), min(row + reach + 1, side)
+        if c0 >= c1 or r0 >= r1:
+            continue
+        where = np.s_[r0:r1, c0:c1]
+        du, dv = u - (xx[where] + 0.5), v - (yy[where] + 0.5)
+        d2 = du**2 + dv**2
+        np.maximum(heat[where], np.exp(-d2 / (2 * 1.1**2)), out=heat[where])
+        inside = d2 <= r * r
+        if measured:
+            cover[where][inside] = 1
+        else:
+            unknown[where][inside] = 1
+        near = (d2 <= 1.6**2) & (d2 < best[where])
+        best[where][near] = d2[near]
+        for k, value in enumerate((du, dv)):
+            around[k][where][near] = value[near]
+        counts[0][where][near] = 1
+        around[2][where][near] = np.log(max(r * CELL_PX, 1.0))
+        counts[1][where][near] = float(measured)
+        if 0 <= col < side and 0 <= row < side:
+            heat[row, col] = 1
+    seen = valid.reshape(side, CELL_PX, side, CELL_PX).min(axis=(1, 3)).astype(np.float32)
+    standing = other.reshape(side, CELL_PX, side, CELL_PX).max(axis=(1, 3))
+    # Real land holds unlabelled things: only where it is calm, or painted on, all is known.
+    other_counts = seen * known[CELL_PX // 2 :: CELL_PX, CELL_PX // 2 :: CELL_PX]
+    return {
+        "heat": heat,
+        "around": around,
+        "around_counts": counts * seen,
+        "cover": cover,
+        "cover_counts": seen * (1 - unknown * (1 - cover)),
+        "other": standing,
+        "other_counts": other_counts,
+        "seen": seen,
+    }

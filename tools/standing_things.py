@@ -1,0 +1,166 @@
+"""Things that stand in fields, painted into pictures: posts, walls, huts, trucks, heaps, ponds.
+
+No labelled pictures of them exist; their outlines and shadows are simple enough to draw. Each
+stands clear of the labelled trees, throws a shadow where it has height, and is as bright or dark
+as chance has it. What only lies on the ground (wheel marks, wet spots, bare patches) is drawn as
+often and counts as nothing.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+CLEAR_PX = 9.0
+
+
+def place_things(
+    rng: np.random.Generator, image: np.ndarray, trees: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the picture (rows, cols, 4; 0..255) with things, what they cover, what changed."""
+    side = image.shape[0]
+    cover = np.zeros((side, side), np.float32)
+    sun = rng.uniform(0, 2 * np.pi)
+    before, image = image, image.copy()
+    taken = [tuple(t[:2]) for t in trees]
+    for _ in range(int(rng.integers(3, 14))):
+        at = rng.uniform(10, side - 10, 2)
+        if not free[int(at[1]), int(at[0])]:
+            continue
+        if any(np.hypot(at[0] - x, at[1] - y) < CLEAR_PX + 12 for x, y in taken):
+            continue
+        taken.append((float(at[0]), float(at[1])))
+        local = image[int(at[1]) - 6 : int(at[1]) + 7, int(at[0]) - 6 : int(at[0]) + 7]
+        ground = local.mean(axis=(0, 1))
+        if rng.random() < 0.45:
+            mark(rng, image, at, ground)
+        else:
+            stand(rng, image, cover, at, ground, sun)
+    changed = (np.abs(image - before).max(axis=2) > 2).astype(np.float32)
+    return image, cover, np.maximum(cv2.dilate(changed, np.ones((9, 9))), cover)
+
+
+def drawn(side: int, polygons: list[np.ndarray], blur: float) -> np.ndarray:
+    """Return the share of each pixel inside polygons, softened."""
+    mask = np.zeros((side, side), np.uint8)
+    for polygon in polygons:
+        cv2.fillPoly(mask, [np.rint(polygon * 16).astype(np.int32)], 255, cv2.LINE_AA, 4)
+    soft = mask.astype(np.float32) / 255
+    return cv2.GaussianBlur(soft, (0, 0), blur) if blur > 0.2 else soft
+
+
+def outline(rng: np.random.Generator, at: np.ndarray) -> tuple[np.ndarray, float, str]:
+    """Return a thing's outline, its height in pixels and its kind."""
+    kind = str(rng.choice(["post", "wall", "hut", "truck", "heap", "pond", "bush"]))
+    turn = rng.uniform(0, np.pi)
+    if kind == "post":
+        half, height = (rng.uniform(0.5, 1.3),) * 2, rng.uniform(4, 16)
+    elif kind == "wall":
+        half, height = (rng.uniform(8, 35), rng.uniform(0.5, 1.4)), rng.uniform(1.2, 4)
+    elif kind == "hut":
+        half, height = (rng.uniform(3, 11), rng.uniform(3, 8)), rng.uniform(3, 8)
+    elif kind == "truck":
+        half, height = (rng.uniform(3.5, 9), rng.uniform(1.6, 2.4)), rng.uniform(3, 6)
+    else:
+        half, height = (rng.uniform(1.5, 8), rng.uniform(1.5, 6)), rng.uniform(1, 4)
+    if kind in ("post", "wall", "hut", "truck"):
+        shape = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    else:
+        shape = blob(rng) * half
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return shape @ rotation.T + at, 0.0 if kind == "pond" else height, kind
+
+
+def blob(rng: np.random.Generator) -> np.ndarray:
+    """Return a round outline with a few soft bulges, about one in radius."""
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    radius = np.ones(24)
+    for k in (2, 3, 4):
+        radius += rng.normal(0, 0.12) * np.cos(k * angle + rng.uniform(0, 6))
+    return np.column_stack([np.cos(angle), np.sin(angle)]) * radius[:, None]
+
+
+def stand(
+    rng: np.random.Generator,
+    image: np.ndarray,
+    cover: np.ndarray,
+    at: np.ndarray,
+    ground: np.ndarray,
+    sun: float,
+) -> None:
+    """Draw a thing that stands, its shadow first."""
+    side = image.shape[0]
+    shape, height, kind = outline(rng, at)
+    blur = rng.uniform(0.3, 0.9)
+    if height > 0 and rng.random() < 0.9:
+        length = height * rng.uniform(0.4, 1.3)
+        step = np.array([np.cos(sun), np.sin(sun)])
+        parts = [shape + step * d for d in np.linspace(0, length, max(int(length * 2), 2))]
+        dark = drawn(side, parts, blur)
+        image *= (1 - dark * rng.uniform(0.35, 0.7))[..., None]
+    body = drawn(side, [shape], blur)
+    colour = colours(rng, ground, kind)
+    relief = np.ones((side, side), np.float32)
+    if kind in ("heap", "bush"):
+        y, x = np.mgrid[:side, :side].astype(np.float32)
+        slope = (x - at[0]) * np.cos(sun) + (y - at[1]) * np.sin(sun)
+        relief -= np.clip(slope * rng.uniform(0.02, 0.08), -0.35, 0.35)
+        rough = cv2.GaussianBlur(rng.standard_normal((side, side), dtype=np.float32), (0, 0), 0.8)
+        relief += rough * rng.uniform(0.05, 0.3)
+    elif kind == "hut" and rng.random() < 0.6:
+        roof = np.clip(shape, at - 40, at + 40)
+        half = drawn(
+            side,
+            [np.vstack([(roof[0] + roof[3]) / 2, (roof[1] + roof[2]) / 2, roof[2], roof[3]])],
+            0.3,
+        )
+        relief -= half * rng.uniform(0.1, 0.35)
+    image += (colour * relief[..., None] - image) * body[..., None]
+    np.clip(image, 0, 255, out=image)
+    np.maximum(cover, (body > 0.35).astype(np.float32), out=cover)
+
+
+def colours(rng: np.random.Generator, ground: np.ndarray, kind: str) -> np.ndarray:
+    """Return a colour (red, green, blue, near infrared) that differs from the ground's."""
+    bright = ground[:3].mean()
+    if kind == "bush":
+        base = bright * rng.uniform(0.35, 0.75)
+        colour = base * np.array(
+            [rng.uniform(0.8, 1.05), 1.05, rng.uniform(0.7, 0.95), rng.uniform(1.2, 2.2)]
+        )
+    elif kind == "pond":
+        base = rng.uniform(15, 90) if rng.random() < 0.8 else rng.uniform(150, 240)
+        colour = base * np.array([0.85, 1.0, rng.uniform(0.9, 1.2), rng.uniform(0.2, 0.6)])
+    else:
+        base = bright
+        while abs(base - bright) < 28:
+            base = rng.uniform(25, 250)
+        cast = np.exp(rng.normal(0, 0.15, 4))
+        colour = base * cast
+    return np.clip(colour, 0, 255).astype(np.float32)
+
+
+def mark(rng: np.random.Generator, image: np.ndarray, at: np.ndarray, ground: np.ndarray) -> None:
+    """Draw what only lies on the ground: wheel marks, wet spots, bare patches."""
+    side = image.shape[0]
+    kind = rng.random()
+    if kind < 0.4:
+        turn, bend = rng.uniform(0, np.pi), rng.normal(0, 0.004)
+        along = np.linspace(-120, 120, 40)
+        line = np.column_stack([along, bend * along**2])
+        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        soft = np.zeros((side, side), np.float32)
+        width = rng.uniform(0.4, 0.9)
+        for gap in (0, rng.uniform(2.5, 4)):
+            path = (line + np.array([0, gap])) @ rotation.T + at
+            half = np.array([0, width])
+            both = np.vstack([path + half, path[::-1] - half])
+            soft = np.maximum(soft, drawn(side, [both], 0.6))
+        strength = rng.uniform(0.05, 0.22)
+    else:
+        shape = blob(rng) * rng.uniform(3, 16, 2) + at
+        soft = drawn(side, [shape], rng.uniform(1.5, 5))
+        strength = rng.uniform(0.08, 0.3)
+    change = strength * rng.choice([-1, 1]) * np.exp(rng.normal(0, 0.25, 4))
+    image *= 1 + (soft[..., None] * change).astype(np.float32)
+    np.clip(image, 0, 255, out=image)

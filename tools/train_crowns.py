@@ -1,0 +1,211 @@
+"""Train the network that sees crowns, and write it as ONNX.
+
+    python tools/crown_pictures.py pictures.npz
+    python tools/train_crowns.py pictures.npz crowns.onnx --minutes 90
+
+Needs PyTorch and ONNX (dependency group `train`); one core is enough. The schedule follows the
+clock: the learning rate falls to nothing at the end of the time given. Seeded, yet sums on
+another machine may round differently. Every few minutes the figures on the sites left out are
+printed and the averaged weights are written, so that the best so far can always be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from crown_network import CrownNetwork
+from crown_samples import CELL_PX, INPUTS, Pictures, Sampler, levels, normalised
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+from torch import Tensor
+from torch.nn import functional
+
+SEED = 7
+BATCH = 8
+RATE = 2e-3
+DECAY = 2e-2
+AVERAGE = 0.9985
+
+
+def loss_of(out: Tensor, want: dict[str, Tensor]) -> tuple[Tensor, list[float]]:
+    """Return the sum of the losses and its parts."""
+    heat, seen = want["heat"], want["seen"]
+    logit = out[:, 0]
+    p = torch.sigmoid(logit).clamp(1e-4, 1 - 1e-4)
+    centre = (heat > 0.999).float() * seen
+    count = centre.sum().clamp(min=1)
+    positive = -((1 - p) ** 2) * functional.logsigmoid(logit) * centre
+    negative = -((1 - heat) ** 4) * p**2 * functional.logsigmoid(-logit) * (seen - centre)
+    focal = (positive.sum() + negative.sum()) / count
+    here = want["around_counts"]
+    apart = functional.smooth_l1_loss(out[:, 1:3], want["around"][:, :2], reduction="none").sum(1)
+    offset = (apart * here[:, 0]).sum() / here[:, 0].sum().clamp(min=1)
+    size = functional.smooth_l1_loss(out[:, 3], want["around"][:, 2], beta=0.2, reduction="none")
+    radius = (size * here[:, 1]).sum() / here[:, 1].sum().clamp(min=1)
+    covered = functional.binary_cross_entropy_with_logits(
+        out[:, 4], want["cover"], reduction="none"
+    )
+    cover = (covered * want["cover_counts"]).sum() / want["cover_counts"].sum().clamp(min=1)
+    stands = functional.binary_cross_entropy_with_logits(out[:, 5], want["other"], reduction="none")
+    stands = stands * (1 + 3 * want["other"])
+    other = (stands * want["other_counts"]).sum() / want["other_counts"].sum().clamp(min=1)
+    parts = [focal, offset, radius, cover, other]
+    total = focal + 0.5 * offset + 0.7 * radius + 0.5 * cover + 1.0 * other
+    return total, [float(v.detach()) for v in parts]
+
+
+def peaks(out: np.ndarray, least: float) -> np.ndarray:
+    """Return x, y (pixels), probability and radius of the maxima of one picture."""
+    heat = 1 / (1 + np.exp(-out[0]))
+    padded = np.pad(heat, 1)
+    rows, cols = heat.shape
+    around = np.max(
+        [padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)], axis=0
+    )
+    r, c = np.nonzero((heat >= around) & (heat >= least))
+    x = (c + 0.5 + out[1, r, c]) * CELL_PX
+    y = (r + 0.5 + out[2, r, c]) * CELL_PX
+    found = np.column_stack([x, y, heat[r, c], np.exp(out[3, r, c])])
+    return apart(found[np.argsort(-found[:, 2])])
+
+
+def apart(found: np.ndarray) -> np.ndarray:
+    """Drop what lies within a stronger one's crown."""
+    keep: list[int] = []
+    for i, (x, y, _, radius) in enumerate(found):
+        others = found[keep]
+        if len(others):
+            reach = np.clip(0.55 * np.maximum(others[:, 3], radius), 3.0, None)
+            if np.any(np.hypot(others[:, 0] - x, others[:, 1] - y) < reach):
+                continue
+        keep.append(i)
+    return found[keep]
+
+
+def f1_of(found: list[np.ndarray], trees: list[np.ndarray], reach: float, t: float) -> float:
+    hits = total = truth = 0
+    for every, tr in zip(found, trees, strict=True):
+        f = every[every[:, 2] >= t]
+        total, truth = total + len(f), truth + len(tr)
+        if len(f) and len(tr):
+            d = cdist(f[:, :2], tr[:, :2])
+            i, j = linear_sum_assignment(np.where(d <= reach, d, 1e6))
+            hits += int((d[i, j] <= reach).sum())
+    return 2 * hits / max(total + truth, 1)
+
+
+def judged(net: CrownNetwork, pictures: Pictures) -> str:
+    """Return the figures on the sites left out: F1 at 6 and 10 px at the best threshold."""
+    net.eval()
+    which = np.flatnonzero(pictures.left_out)
+    trees = [pictures.trees[i] for i in which]
+    text = []
+    for kind in ("nir", "rgb", "grey"):
+        found = []
+        for i in which:
+            image = pictures.bands[i].astype(np.float32)
+            x = np.zeros((5, *image.shape[:2]), np.float32)
+            low, high = levels(image)
+            rgb = image[..., :3]
+            if kind == "grey":
+                rgb = np.repeat((rgb @ np.float32([0.299, 0.587, 0.114]))[..., None], 3, axis=2)
+                low, high = levels(rgb)
+            x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
+            if kind == "nir":
+                x[3], x[4] = normalised(image[..., 3], low, high), 1
+            with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+                out = net(torch.from_numpy(x[None]).to(memory_format=torch.channels_last))
+            found.append(peaks(out.float().numpy()[0], 0.1))
+        best = max(np.arange(0.15, 0.6, 0.05), key=lambda t: f1_of(found, trees, 10, t))
+        six, ten = f1_of(found, trees, 6, best), f1_of(found, trees, 10, best)
+        text.append(f"{kind} {six:.3f} {ten:.3f} (at {best:.2f})")
+    return "; ".join(text)
+
+
+def export(net: CrownNetwork, path: Path) -> None:
+    """Write the network as ONNX, its batch norms folded into the convolutions."""
+    net = copy.deepcopy(net).eval().to(memory_format=torch.contiguous_format)
+    torch.onnx.export(
+        net,
+        (torch.zeros(1, len(INPUTS), 256, 256),),
+        str(path),
+        dynamo=False,
+        input_names=["bands"],
+        output_names=["cells"],
+        dynamic_axes={"bands": {2: "rows", 3: "cols"}, "cells": {2: "rows", 3: "cols"}},
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("pictures", type=Path)
+    parser.add_argument("network", type=Path)
+    parser.add_argument("--minutes", type=float, default=90.0)
+    parser.add_argument("--judge-every", type=float, default=6.0, help="minutes")
+    parser.add_argument("--start", type=Path, help="weights to go on from")
+    parser.add_argument("--rate", type=float, default=RATE)
+    given = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.manual_seed(SEED)
+    pictures = Pictures.read(given.pictures)
+    sampler = Sampler(pictures, SEED)
+    net = CrownNetwork().to(memory_format=torch.channels_last)
+    if given.start:
+        net.load_state_dict(torch.load(given.start))
+    averaged = copy.deepcopy(net)
+    decayed = [p for p in net.parameters() if p.ndim > 1]
+    plain = [p for p in net.parameters() if p.ndim <= 1]
+    optimiser = torch.optim.AdamW(
+        [{"params": decayed, "weight_decay": DECAY}, {"params": plain, "weight_decay": 0}],
+        given.rate,
+    )
+    begin = judged_at = time.time()
+    number, parts, spent = 0, [], 0.0
+    while (done := (time.time() - begin) / (60 * given.minutes)) < 1:
+        rate = given.rate * min(1.0, (number + 1) / 150) * 0.5 * (1 + math.cos(math.pi * done))
+        for group in optimiser.param_groups:
+            group["lr"] = rate
+        net.train()
+        t = time.time()
+        batch = {k: torch.from_numpy(v) for k, v in sampler.batch(BATCH).items()}
+        spent += time.time() - t
+        x = batch.pop("x").to(memory_format=torch.channels_last)
+        with torch.autocast("cpu", torch.bfloat16):
+            out = net(x)
+        loss, values = loss_of(out.float(), batch)
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
+        optimiser.step()
+        parts.append(values)
+        number += 1
+        keep = min(AVERAGE, number / (number + 10))
+        with torch.no_grad():
+            for a, b in zip(averaged.state_dict().values(), net.state_dict().values(), strict=True):
+                if a.dtype.is_floating_point:
+                    a.lerp_(b, 1 - keep)
+        if number % 200 == 0:
+            took = (time.time() - begin) / 60
+            print(
+                f"{took:6.1f} min, step {number}, samples {spent / (60 * took):.0%}:",
+                np.round(np.mean(parts[-200:], axis=0), 4),
+                flush=True,
+            )
+        if time.time() - judged_at > 60 * given.judge_every:
+            judged_at = time.time()
+            torch.save(averaged.state_dict(), given.network.with_suffix(".pt"))
+            export(averaged, given.network)
+            print("   left out:", judged(averaged, pictures), flush=True)
+    torch.save(averaged.state_dict(), given.network.with_suffix(".pt"))
+    export(averaged, given.network)
+    print("   left out:", judged(averaged, pictures), flush=True)
+
+
+if __name__ == "__main__":
+    main()
