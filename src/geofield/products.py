@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import math
 import platform
+import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from geofield import schema
 from geofield.crs import authority_name
+from geofield.errors import FormatError
 from geofield.evaluation.driving import unseen
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
@@ -63,46 +66,83 @@ def write_products(
     list of Path
         In the order written.
     """
+    asked = [name for name in formats if not format_named(name).automatic]
     with (
         staged_folder(folder, overwrite=overwrite, inputs=inputs) as staging,
         ThreadPoolExecutor(max_workers=1) as beside,
     ):
         written: list[Path] = []
+        shown = {"scene": scene}
         if scene is not None:
-            from geofield.imagery import write_scene
-
-            write_scene(scene, staging / SCENE_FILE)
-            written.append(staging / SCENE_FILE)
-            dataset = replace(dataset, scene_path=staging / SCENE_FILE)
+            written += write_scene(dataset, staging, stem="", options=shown)
+            dataset = replace(dataset, scene_path=written[0])
         # Compressing the map takes as long as several formats, and holds no lock.
-        map_picture = beside.submit(_draw, dataset, scene, staging / MAP_FILE)
+        drawn = beside.submit(write_map, dataset, staging, stem="", options=shown)
         # What a format leaves out stands in the report: the GeoPackage beside it has all.
-        told = "gpkg" in formats
+        told = "gpkg" in asked
         written += write_dataset(
-            dataset, staging, formats, overwrite=True, options=options, tell_drops=not told
+            dataset, staging, asked, overwrite=True, options=options, tell_drops=not told
         )
-        map_picture.result()
-        report = json.dumps(
-            make_report(dataset, timings_s or {}, formats, changes),
-            indent=2,
-            ensure_ascii=False,
-            allow_nan=False,
-        )
-        (staging / REPORT_FILE).write_text(report + "\n", encoding="utf-8")
-        written += [staging / MAP_FILE, staging / REPORT_FILE]
+        written += drawn.result()
+        facts = {"timings_s": timings_s or {}, "formats": asked, "changes": changes}
+        written += write_report(dataset, staging, stem="", options=facts)
     return [folder / path.relative_to(staging) for path in written]
 
 
-def _draw(dataset: Dataset, scene: Scene | None, path: Path) -> None:
+def write_scene(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``scene.tif``: the picture at hand (option ``scene``), else that beside the plan."""
+    path = folder / SCENE_FILE
+    if options.get("scene") is not None:
+        from geofield.imagery import write_scene as write_picture
+
+        write_picture(options["scene"], path)
+    elif dataset.scene_path is not None:
+        shutil.copyfile(dataset.scene_path, path)
+    else:
+        raise FormatError(
+            "There is no picture beside this plan.", hint="Keep scene.tif beside field.gpkg."
+        )
+    return [path]
+
+
+def write_map(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Draw ``map.png``, on the picture at hand or beside the plan where there is one."""
     from geofield.mapping import draw_map
 
+    if not dataset.has(schema.FIELD.name):
+        raise FormatError("A map needs one field; there are 0.")
+    scene = options.get("scene")
+    if scene is None and dataset.scene_path is not None:
+        from geofield.imagery import read_scene
+
+        scene = read_scene(dataset.scene_path)
+    path = folder / MAP_FILE
     # Less than half the time of the usual level for a tenth more bytes.
     draw_map(dataset, scene).save(path, compress_level=3)
+    return [path]
+
+
+def write_report(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``report.json``; ``timings_s``, ``formats`` and ``changes`` are those of the run."""
+    if not dataset.has(schema.FIELD.name):
+        raise FormatError("A report needs one field; there are 0.")
+    facts = {key: options[key] for key in ("timings_s", "formats", "changes") if key in options}
+    report = make_report(dataset, **facts)
+    text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
+    path = folder / REPORT_FILE
+    path.write_text(text + "\n", encoding="utf-8")
+    return [path]
 
 
 def make_report(
     dataset: Dataset,
-    timings_s: Mapping[str, float],
+    timings_s: Mapping[str, float] = MappingProxyType({}),
     formats: Sequence[str] = (),
     changes: Sequence[str] = (),
 ) -> dict[str, Any]:

@@ -51,6 +51,9 @@ FormatName = Literal[
     "ntriples",
     "rdf-study",
     "study-xml",
+    "scene",
+    "map",
+    "report",
     "html",
 ]
 DirectionName = Literal["longest_edge", "hough", "fewest", "fewest_turns"]

@@ -22,7 +22,9 @@ def digests(folder):
     }
 
 
-@pytest.mark.parametrize("name", [name for name in FORMATS if name not in ("rdf", "rdf-study")])
+@pytest.mark.parametrize(
+    "name", [name for name in FORMATS if name not in ("rdf", "rdf-study", "scene")]
+)
 def test_byte_identical(tmp_path, name, monkeypatch):
     write_dataset(make_dataset(), tmp_path / "first", [name])
     # Another day, another time zone, another working folder.

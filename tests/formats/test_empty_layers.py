@@ -17,10 +17,10 @@ from geofield.formats import FORMATS, write_dataset
 from geofield.formats.shapefile_profiles import PROFILES
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
-PRODUCTS = [(name, {}) for name in FORMATS if name != "shapefile"]
+PRODUCTS = [(name, {}) for name in FORMATS if name not in ("shapefile", "scene")]
 PRODUCTS += [("shapefile", {"profile": profile}) for profile in PROFILES]
 #: A terminal's files and AgOpenGPS's are of one field, or none.
-ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps")
+ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "report")
 
 
 def without(case):

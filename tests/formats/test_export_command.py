@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import subprocess
 import sys
 import zipfile
@@ -198,3 +199,29 @@ def test_shapes_are_cut_at_the_180th_meridian(tmp_path, name):
     )
     assert {round(abs(x)) for x in shape.bounds[::2]} == {180}
     assert shape.is_valid
+
+
+def test_map_scene_and_report_are_products_like_others(tmp_path, simulated, simulated_tif):
+    done = geofield(
+        "run", simulated_tif, "--lat", simulated.lat, "--lon", simulated.lon,
+        "--out", tmp_path / "run", "--format", "gpkg", "--format", "map",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    done = geofield(
+        "export", tmp_path / "run" / "field.gpkg", "--format", "map", "--format", "scene",
+        "--format", "report", "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "cannot carry" not in done.stderr
+    for name in ("map.png", "scene.tif"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "run" / name).read_bytes()
+    reports = [json.loads((tmp_path / f / "report.json").read_text()) for f in ("run", "out")]
+    assert {key for key in reports[0] if reports[0][key] != reports[1][key]} == {
+        "formats", "timings_s"
+    }  # fmt: skip
+    (tmp_path / "run" / "scene.tif").unlink()
+    done = geofield(
+        "export", tmp_path / "run" / "field.gpkg", "-f", "scene", "--out", tmp_path / "none"
+    )
+    assert done.returncode == 1
+    assert "There is no picture" in done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from geofield.cli.console import echo_json, say
 Examples:
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/
   geofield export out/field.gpkg --format isoxml --format kml --out export/
+  geofield export out/field.gpkg -f map -f html --out pictures/
   geofield export out/field.gpkg -f shapefile --profile tracklead --out stick/
 `geofield formats` lists the formats and what each can carry.
 """
@@ -68,6 +70,7 @@ def export(
     """
     from geofield.formats import format_named, read_dataset, write_dataset
     from geofield.formats.export import unknown_option
+    from geofield.formats.gpkg_read import scene_beside
 
     given["zip"] = given.pop("zipped") or None
     options = {key: value for key, value in given.items() if value is not None}
@@ -80,6 +83,9 @@ def export(
     dataset = read_dataset(plan_file, crs=crs)
     for note in dataset.notes:
         say(note)
+    if plan_file.suffix.lower() == ".gpkg" and ("gpkg" not in names or "scene" in names):
+        # A project written without the picture must not look for it.
+        dataset = replace(dataset, scene_path=scene_beside(plan_file))
     written = write_dataset(
         dataset,
         folder,

@@ -87,7 +87,8 @@ def write_dataset(
                     )
                 written.append(place)
     for each in chosen if tell_drops else ():
-        words = dropped(dataset, each)
+        # Nobody takes the picture, map and report for a plan's whole content.
+        words = [] if each.automatic else dropped(dataset, each)
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
     return written

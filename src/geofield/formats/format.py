@@ -76,6 +76,8 @@ class Format:
         Whether its reader takes a ``crs`` for files that do not say theirs.
     reads_folders : bool
         Whether its reader takes a folder of files; else a folder must hold just one.
+    automatic : bool
+        Whether every run writes it, asked or not.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -95,6 +97,7 @@ class Format:
     asks_crs: bool = False
     validator: str | None = None
     reads_folders: bool = False
+    automatic: bool = False
 
     def load_writer(self) -> Writer:
         """The writer, imported."""
