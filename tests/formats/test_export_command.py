@@ -18,11 +18,13 @@ import shapely
 from formats_plan import UTM, X0, Y0, make_dataset
 from pyproj import CRS, Transformer
 
+from geofield import theme
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Provenance
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 GPX = "{http://www.topografix.com/GPX/1/1}"
+STATUSES = ["detected", "possible", "rejected", "added"]
 KML = "{http://www.opengis.net/kml/2.2}"
 
 
@@ -119,7 +121,7 @@ def test_undated_imagery_is_of_no_day(tmp_path):
 
 def test_kml_shows_what_tracks_run_through_apart(tmp_path):
     dataset = make_dataset(points=False)
-    dataset.tables["obstacles"]["status"] = ["detected", "possible", "rejected", "added"]
+    dataset.tables["obstacles"]["status"] = STATUSES
     write_dataset(dataset, tmp_path, ["kml"])
     root = ET.parse(tmp_path / "field.kml").getroot()
     styles = {style.get("id"): style for style in root.iter(f"{KML}Style")}
@@ -132,8 +134,10 @@ def test_kml_shows_what_tracks_run_through_apart(tmp_path):
     assert list(looks) == [
         "Obstacle 1", "Obstacle 2 (possible)", "Obstacle 3 (rejected)", "Obstacle 4"
     ]  # fmt: skip
-    assert looks["Obstacle 1"] == looks["Obstacle 4"]
-    assert len({*looks.values()}) == 3
+    # As everywhere else: the colours of the theme, here as alpha, blue, green, red.
+    for (name, (line, _)), status in zip(looks.items(), STATUSES, strict=True):
+        red, green, blue = theme.rgb(theme.STATUS[status].color)
+        assert line == f"ff{blue:02x}{green:02x}{red:02x}", name
     assert [fill[:2] == "00" for _, fill in looks.values()] == [False, True, True, False]
     assert sorted(read_dataset(tmp_path / "field.kml").table("obstacles")["obstacle_no"]) == [
         1, 2, 3, 4

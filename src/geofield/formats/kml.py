@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import pandas as pd
 import shapely
 
-from geofield import schema
+from geofield import schema, theme
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.formats.origin import lineage
@@ -26,14 +26,26 @@ DECIMALS = 9
 LAYERS = (schema.FIELD, schema.OBSTACLES, schema.TRACKS, schema.GAPS)
 
 _TYPES = {"int": "int", "float": "double", "str": "string", "date": "string"}
-# Colours are aabbggrr. Obstacles that tracks run through are outlines without a filling.
-_STYLES = {
-    "field": ("ff0ad6ff", 3.0, "00000000"),
-    "obstacles": ("ff1c1ae2", 1.5, "601c1ae2"),
-    "obstacles_possible": ("ff00a5ff", 2.0, "00000000"),
-    "obstacles_rejected": ("ff9e9e9e", 1.0, "00000000"),
-    "tracks": ("ffffe500", 1.5, None),
-    "gaps": ("ff0078ff", 1.0, None),
+
+
+def _abgr(color: str, alpha: str = "ff") -> str:
+    """A colour ``#rrggbb`` as KML has it."""
+    return f"{alpha}{color[5:7]}{color[3:5]}{color[1:3]}"
+
+
+# Colour, width in pixels, filling. Obstacles that tracks run through are hollow.
+_STYLES: dict[str, tuple[str, float, str | None]] = {
+    "field": (_abgr(theme.OUTLINE), 3.0, "00000000"),
+    "tracks": (_abgr(theme.TRACK), 1.5, None),
+    "gaps": (_abgr(theme.GAP), 1.0, None),
+    **{
+        f"obstacles_{status}": (
+            _abgr(look.color),
+            1.5,
+            "00000000" if status in schema.NOT_AVOIDED else _abgr(look.color, "60"),
+        )
+        for status, look in theme.STATUS.items()
+    },
 }
 #: What GDAL makes of a placemark besides its own columns.
 _DRIVER_COLUMNS = [
@@ -79,10 +91,11 @@ def read(path: Path) -> Dataset:
 
 
 def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
-    """Obstacles look as their status says, where tracks run through them."""
-    if layer.name == schema.OBSTACLES.name and _status(row) in schema.NOT_AVOIDED:
-        return f"{layer.name}_{_status(row)}"
-    return layer.name
+    """Obstacles look as their status says."""
+    if layer.name != schema.OBSTACLES.name:
+        return layer.name
+    status = _status(row)
+    return f"obstacles_{status if status in theme.STATUS else 'added'}"
 
 
 def _status(row: Mapping[str, Any]) -> str:
