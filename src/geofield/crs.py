@@ -129,6 +129,20 @@ def authority_name(crs: CRS) -> str:
     return ":".join(authority) if authority else str(crs.name)
 
 
+def northing_first(crs: CRS) -> bool:
+    """Whether the authority lists northing (or latitude) before easting.
+
+    WKT literals, WMS 1.3 boxes and WMTS corners follow the authority's order; geofield's arrays
+    are always x before y. Both axes of a polar system point the same way, along different
+    meridians: there only their names tell (EPSG:5041 is easting first, EPSG:32661 is not).
+    """
+    axes = crs.axis_info[:2]
+    directions = [str(axis.direction).lower() for axis in axes]
+    if len(set(directions)) == 1:
+        return str(axes[0].name).lower().startswith("northing")
+    return directions[:1] == ["north"]
+
+
 def grid_north_deg(crs: CRS, x: float, y: float) -> float:
     """The true heading of grid north at a place: degrees clockwise from true north.
 

@@ -282,7 +282,7 @@ def wms_server(server: TileServer, crs_name: str) -> None:
             return
         assert upper["MAP"] == "a"
         box = [float(part) for part in upper["BBOX"].split(",")]
-        if crs_name == "EPSG:31468":  # the authority lists northing first
+        if crs_name in ("EPSG:31468", "EPSG:32661"):  # the authority lists northing first
             box = [box[1], box[0], box[3], box[2]]
         width, height = int(upper["WIDTH"]), int(upper["HEIGHT"])
         transform = Affine(
@@ -300,6 +300,11 @@ def wms_server(server: TileServer, crs_name: str) -> None:
         ("EPSG:3857", LAT, LON, 18),
         ("EPSG:32633", 47.1, 15.4, None),
         ("EPSG:31468", 48.0, 12.1, None),
+        # Both axes of polar systems point south (or north): easting first but in 32661.
+        ("EPSG:3413", 72.6, -38.5, None),
+        ("EPSG:3031", -72.0, 2.5, None),
+        ("EPSG:5041", 83.5, 10.0, None),
+        ("EPSG:32661", 83.5, 10.0, None),
     ],
 )
 def test_wms(tmp_path: Path, crs_name: str, lat: float, lon: float, zoom: int | None) -> None:

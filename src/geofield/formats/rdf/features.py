@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, ground_areas_m2, transformer
+from geofield.crs import LONLAT, ground_areas_m2, northing_first, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import (
     CANDIDATE,
@@ -24,7 +24,7 @@ from geofield.formats.rdf.layers import (
     value_iri,
 )
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import CRS84, crs_iri, node, northing_first
+from geofield.formats.rdf.namespaces import CRS84, crs_iri, node
 from geofield.formats.rdf.triples import (
     Column,
     Group,

@@ -109,13 +109,3 @@ def crs_of_iri(iri: str) -> CRS | None:
         return CRS.from_user_input("OGC:CRS84")
     code = iri.removeprefix(_EPSG)
     return CRS.from_epsg(int(code)) if code != iri and code.isdecimal() else None
-
-
-def northing_first(crs: CRS) -> bool:
-    """Whether the authority's axis order is northing (latitude) before easting.
-
-    WKT literals follow the authority's order, geofield's arrays never do.
-    """
-    directions = [str(axis.direction).lower() for axis in crs.axis_info[:2]]
-    # Polar CRS name both axes "south" (or "north"); theirs is easting first.
-    return directions[0] in ("north", "south") and len(set(directions)) == 2

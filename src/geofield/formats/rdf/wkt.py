@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 from shapely.errors import ShapelyError
 
-from geofield.crs import transformer
+from geofield.crs import northing_first, transformer
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import CRS84, crs_of_iri, northing_first
+from geofield.formats.rdf.namespaces import CRS84, crs_of_iri
 
 _LITERAL = re.compile(r"\s*(?:<([^>]*)>)?\s*(.*)", re.DOTALL)
 

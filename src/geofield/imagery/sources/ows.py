@@ -111,11 +111,6 @@ def parse_ogc_crs(name: str) -> CRS | None:
         return None
 
 
-def north_first(crs: CRS) -> bool:
-    """Whether the authority lists northing (latitude) before easting."""
-    return bool(crs.axis_info) and crs.axis_info[0].direction.lower() in ("north", "south")
-
-
 def choose_layer(names: list[str], wanted: str, address: str) -> str:
     """The wanted layer, or the only one.
 

@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 from pyproj import CRS
 
-from geofield.crs import WEB_MERCATOR, is_metric, metric_crs
+from geofield.crs import WEB_MERCATOR, is_metric, metric_crs, northing_first
 from geofield.errors import ImageryError
 from geofield.imagery.client import Client
 from geofield.imagery.reach import Reach
@@ -16,7 +16,6 @@ from geofield.imagery.sources.ows import (
     children,
     choose_layer,
     link,
-    north_first,
     parse_ogc_crs,
     plain_address,
     query_value,
@@ -71,7 +70,7 @@ class WMSSource:
         east, south = west + width * level.resolution, north - height * level.resolution
         box = [west, south, east, north]
         newer = self.version >= "1.3"
-        if newer and self.crs_name != "CRS:84" and north_first(self.pyramid.crs):
+        if newer and self.crs_name != "CRS:84" and northing_first(self.pyramid.crs):
             box = [south, west, north, east]
         values = {
             "SERVICE": "WMS",

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 from pyproj import CRS
 
-from geofield.crs import WEB_MERCATOR, is_metric
+from geofield.crs import WEB_MERCATOR, is_metric, northing_first
 from geofield.errors import ImageryError
 from geofield.imagery.client import Client
 from geofield.imagery.reach import Reach
@@ -18,7 +18,6 @@ from geofield.imagery.sources.ows import (
     children,
     choose_layer,
     link,
-    north_first,
     parse_ogc_crs,
     plain_address,
     query_value,
@@ -155,7 +154,7 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
 def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
     # The corner follows the authority's axis order when the CRS is named as a URN.
-    swapped = north_first(crs) and "urn:" in text(element, "SupportedCRS")
+    swapped = northing_first(crs) and "urn:" in text(element, "SupportedCRS")
     rough = []
     for matrix in children(element, "TileMatrix"):
         scale = float(text(matrix, "ScaleDenominator"))
