@@ -56,7 +56,7 @@ FormatName = Literal[
     "report",
     "html",
 ]
-DirectionName = Literal["longest_edge", "hough", "fewest", "fewest_turns"]
+DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_turns"]
 
 
 def _direction(value: str) -> str:
@@ -231,8 +231,9 @@ class TrackSettings(Section):
     spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
     step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
     direction: Annotated[str, AfterValidator(_direction)] = Field(
-        "longest_edge",
-        description="Of the tracks: longest_edge, hough, fewest, fewest_turns, or a heading in "
+        "dominant",
+        description="Of the tracks: dominant (the way most of the border runs), longest_edge, "
+        "hough, fewest, fewest_turns, or a heading in "
         "degrees clockwise from true north.",
     )
     ab_lonlat: tuple[float, float, float, float] | None = Field(

@@ -128,6 +128,7 @@ def _row(plan: Plan, target: Path) -> dict[str, Any]:
         "file": str(target),
         "heading_deg": plan.tracks.heading_deg,
         "spacing_m": plan.tracks.spacing_m,
+        "direction_why": plan.tracks.direction_why,
         **figures,
         "notes": list(plan.tracks.notes),
     }
@@ -141,4 +142,6 @@ def _line(row: dict[str, Any]) -> str:
     )
     if "turn_count" in row:
         text += f", {row['turn_count']} turns ({row['turns_that_do_not_fit']} do not fit)"
+    if row["direction_why"]:
+        text += f" ({row['direction_why']})"
     return f"{text}; in {row['file']}"

@@ -49,6 +49,8 @@ class Tracks:
         Gives the points their pixel position.
     notes : tuple of str
         What the planner had to tell.
+    direction_why : str
+        Why the tracks run this way, where geofield chose it, and what `fewest` would save.
     outline : shapely.Polygon or None
         The field planned in, metric CRS; None where it is not known.
     blocked_count : int
@@ -69,6 +71,7 @@ class Tracks:
     step_m: float = 1.0
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
+    direction_why: str = ""
     outline: Polygon | None = None
     blocked_count: int = 0
     losses: tuple[ObstacleLoss, ...] = ()
@@ -124,6 +127,7 @@ class Tracks:
             "spacing_m": self.spacing_m,
             "step_m": self.step_m,
             "notes": list(self.notes),
+            "direction_why": self.direction_why,
             "blocked_count": self.blocked_count,
             "losses": [[each.obstacle_no, each.length_m, each.percent] for each in self.losses],
         }
@@ -147,6 +151,7 @@ class Tracks:
             step_m=float(evidence["step_m"]),
             grid=grid,
             notes=tuple(evidence.get("notes", ())),
+            direction_why=str(evidence.get("direction_why", "")),
             outline=outline,
             blocked_count=int(evidence.get("blocked_count", 0)),
             losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),

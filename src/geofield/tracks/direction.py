@@ -7,7 +7,7 @@ by the meridian convergence. Baselines are in the CRS; headings are converted he
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,11 @@ from geofield.errors import TrackError
 from geofield.grid import Grid
 from geofield.methods import LONGEST_EDGE, method
 from geofield.model.frame import picture_frame
+from geofield.tracks.dominant import dominant_edge
 from geofield.tracks.fewest import fewest_direction
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 
-METHODS = ("longest_edge", "hough", "fewest", "fewest_turns")
+METHODS = ("dominant", "longest_edge", "hough", "fewest", "fewest_turns")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +40,12 @@ class Baseline:
     left : bool
         Whether numbers grow to the left of the direction.
     edge : StraightRun or None
-        The edge of the outline that tracks are counted from, for `longest_edge` and `hough`.
+        The edge of the outline that tracks are counted from, for `dominant`,
+        `longest_edge` and `hough`.
     through : (float, float) or None
         A place in the CRS that a track passes through, for an A-B line.
+    why : str
+        Why this direction, where geofield chose it.
     """
 
     along: tuple[float, float]
@@ -49,6 +53,7 @@ class Baseline:
     left: bool = False
     edge: StraightRun | None = None
     through: tuple[float, float] | None = None
+    why: str = ""
 
 
 def find_baseline(
@@ -67,8 +72,8 @@ def find_baseline(
     polygon : shapely.Polygon
         The field, in a metric CRS.
     direction : str, float, LineString or pair of points
-        ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading in degrees, or an
-        A-B line in the CRS.
+        ``dominant``, ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading
+        in degrees, or an A-B line in the CRS.
     crs : CRS
     spacing_m : float
         Needed by ``fewest``.
@@ -86,10 +91,17 @@ def find_baseline(
     north = grid_north_deg(crs, centre.x, centre.y)
     scale = ground_scale(crs, centre.x, centre.y)
     if isinstance(direction, str):
-        if direction == "longest_edge":
+        if direction in ("dominant", "longest_edge"):
             frame = None if grid is None else picture_frame(grid, crs)
-            edge = longest_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
-            return _from_edge(edge, north)
+            if direction == "longest_edge":
+                edge = longest_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
+                return _from_edge(edge, north)
+            edge, share = dominant_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
+            why = (
+                f"along an edge of {edge.length / scale:.0f} m; {100.0 * share:.0f} % of the "
+                "border run that way"
+            )
+            return replace(_from_edge(edge, north), why=why)
         if direction in LONGEST_EDGE:
             line = method(LONGEST_EDGE, direction)(polygon)
             return _from_edge(StraightRun(*shapely.get_coordinates(line).ravel().tolist()), north)

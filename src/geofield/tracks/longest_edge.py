@@ -62,6 +62,14 @@ def longest_edge(
     -------
     StraightRun
     """
+    xy, barred = own_edges(polygon, tolerance, frame)
+    return longest_run(xy, tolerance, barred)
+
+
+def own_edges(
+    polygon: Polygon, tolerance: float, frame: Polygon | None
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Vertices of the outer ring, and which edges from them run along the picture's frame."""
     ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
     if shapely.get_num_coordinates(ring) > 400:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
@@ -73,9 +81,13 @@ def longest_edge(
         lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
         if lengths[~barred].sum() < _REAL_SHARE * lengths.sum():
             barred[:] = False
+    return xy, barred
+
+
+def longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) -> StraightRun:
+    """The longest straight run of a ring that goes over no barred edge, as a fitted line."""
     first, count = _longest_run(xy, tolerance, barred)
-    run = xy[np.arange(first, first + count + 1) % len(xy)]
-    return fit_run(run)
+    return fit_run(xy[np.arange(first, first + count + 1) % len(xy)])
 
 
 def fit_run(run: FloatArray) -> StraightRun:

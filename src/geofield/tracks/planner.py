@@ -19,6 +19,7 @@ from geofield.model.tracks import Tracks
 from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
+from geofield.tracks.dominant import fewest_tracks
 from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.headland import headland_table, headland_track_table, main_area
 from geofield.tracks.layout import LastStrip, on_the_border, track_positions
@@ -42,7 +43,7 @@ def plan_tracks(
     *,
     crs: Any,
     spacing_m: float,
-    direction: Any = "longest_edge",
+    direction: Any = "dominant",
     offset_m: float | None = None,
     through: Any = None,
     last_strip: LastStrip = "overrun",
@@ -69,9 +70,9 @@ def plan_tracks(
     spacing_m : float
         Between neighbouring tracks. This and all other lengths are metres on the ground.
     direction : str, float, LineString or pair of points
-        ``longest_edge`` (of the outer ring), ``hough`` (the study's way to it), ``fewest`` (tracks)
-        or ``fewest_turns`` (pieces), a heading in degrees clockwise from true north, or an A-B
-        line in `crs`.
+        ``dominant`` (the way most of the border runs), ``longest_edge`` (of the outer ring),
+        ``hough`` (the study's way to it), ``fewest`` (tracks) or ``fewest_turns`` (pieces), a
+        heading in degrees clockwise from true north, or an A-B line in `crs`.
     offset_m : float, optional
         Of the first track from the edge it is counted from; half a spacing when not given.
     through : (x, y) or shapely.Point, optional
@@ -91,10 +92,11 @@ def plan_tracks(
     step_m : float
         Between track points.
     straight_tolerance_m : float
-        How far the vertices of a straight edge may stray, for ``longest_edge``.
+        How far the vertices of a straight edge may stray, for ``dominant`` and
+        ``longest_edge``.
     grid : Grid, optional
         Of the picture: gives the track points their pixels; where the outline runs along the
-        picture's frame, that is no edge for ``longest_edge``.
+        picture's frame, that is no edge to follow.
 
     Returns
     -------
@@ -168,6 +170,7 @@ def plan_tracks(
         grid=grid,
         outline=outline,
         notes=(*notes, *more),
+        direction_why=_why(baseline, outline, spacing_m * scale, len(positions)),
         **optional,
     )
 
@@ -197,6 +200,16 @@ def _check_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
         if not (np.isfinite(value) and value > 0.0):
             raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
+
+
+def _why(baseline: Baseline, outline: Polygon, spacing: float, count: int) -> str:
+    """Why this direction was chosen, and what another would save."""
+    if not baseline.why:
+        return ""
+    least = fewest_tracks(outline, spacing)
+    if least >= count:
+        return f"{baseline.why}; no heading needs fewer tracks"
+    return f"{baseline.why}; direction fewest would need {least} tracks instead of {count}"
 
 
 def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float) -> None:

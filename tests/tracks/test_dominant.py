@@ -1,0 +1,101 @@
+"""The way tracks run: the same though a border is cut into many edges, and why is told."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import warnings
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import rasterio
+import shapely
+from click.testing import CliRunner
+from rasterio.warp import transform
+
+from geofield.cli.main import cli
+from geofield.errors import FieldWarning
+from geofield.field import extract_field
+from geofield.imagery import read_scene
+from geofield.tracks import plan_tracks
+
+CRS = 32611
+SHARED = Path(os.environ.get("GEOFIELD_SHARED", Path(__file__).parents[2].parent / "shared"))
+TREES = SHARED / "data" / "trees"
+
+
+def meadow(*, pieces: int) -> shapely.Polygon:
+    """60 m by 107 m; the long eastern border is cut into pieces that stray by some degrees."""
+    y = np.linspace(0.0, 107.0, pieces + 1)
+    x = 60.0 + np.where(np.arange(pieces + 1) % 2, 0.0, 2.2)
+    x[[0, -1]] = 60.0
+    # The western border bends, so that the short southern one is the longest straight edge.
+    west = [(0.0, 107.0), (9.0, 72.0), (8.0, 36.0), (0.0, 0.0)]
+    ring = np.array([*zip(x, y, strict=True), *west])
+    return shapely.Polygon(ring + np.array([440_000, 3_770_000]))
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 6])
+def test_a_border_cut_into_pieces_counts_as_one(pieces: int) -> None:
+    outline = meadow(pieces=pieces)
+    heading = plan_tracks(outline, crs=CRS, spacing_m=3.0).heading_deg
+    assert abs((heading + 90.0) % 180.0 - 90.0) < 10.0
+    if pieces == 6:
+        edge = plan_tracks(outline, crs=CRS, spacing_m=3.0, direction="longest_edge").heading_deg
+        assert edge == pytest.approx(90.0, abs=1.0)
+
+
+def test_why_is_told_and_what_fewest_would_save(tmp_path: Path) -> None:
+    corners = [
+        (0, 0),
+        (60, 0),
+        (60, 30),
+        (10, 30),
+        (10, 34),
+        (60, 34),
+        (60, 66),
+        (10, 66),
+        (10, 70),
+    ]
+    comb = np.array([*corners, (60, 70), (60, 100), (0, 100)])
+    outline = shapely.Polygon(comb + np.array([440_000, 3_770_000]))
+    gpd.GeoDataFrame(geometry=[outline], crs=CRS).to_file(tmp_path / "comb.gpkg", layer="parcel")
+    told = []
+    for direction in ("dominant", "fewest"):
+        done = CliRunner().invoke(
+            cli,
+            ["tracks", str(tmp_path / "comb.gpkg"), "--spacing", "4", "--direction", direction,
+             "-o", str(tmp_path / f"{direction}.gpkg"), "--json"],
+        )  # fmt: skip
+        assert done.exception is None, done.output
+        told.append(json.loads(done.stdout)["fields"][0])
+    ours, fewest = told
+    assert ours["track_count"] > fewest["track_count"]
+    assert "% of the border run that way" in ours["direction_why"]
+    saved = f"fewest would need {fewest['track_count']} tracks instead of {ours['track_count']}"
+    assert ours["direction_why"].endswith(saved)
+    assert fewest["direction_why"] == ""
+
+
+@pytest.mark.real
+@pytest.mark.skipif(not TREES.is_dir(), reason=f"no real pictures in {TREES}")
+def test_a_meadow_photographed_in_three_years_is_worked_the_same_way() -> None:
+    with (TREES / "field_truth.csv").open() as file:
+        row = next(r for r in csv.DictReader(file) if r["image"] == "claremont_2020_75")
+    headings = []
+    for year in (2016, 2018, 2020):
+        path = TREES / f"claremont_{year}_75.tif"
+        with rasterio.open(path) as picture:
+            x, y = picture.transform @ (float(row["seed_x_px"]), float(row["seed_y_px"]))
+            (lon,), (lat,) = transform(picture.crs, "EPSG:4326", [x], [y])
+        scene = read_scene(path, lat=lat, lon=lon)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FieldWarning)
+            field = extract_field(scene, lat=lat, lon=lon)
+        tracks = plan_tracks(field.polygon, crs=field.crs, spacing_m=4.0, grid=scene.grid)
+        headings.append(tracks.heading_deg)
+    turn = (np.subtract.outer(headings, headings) + 90.0) % 180.0 - 90.0
+    assert np.abs(turn).max() < 3.0, headings
