@@ -87,6 +87,15 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("tracks text.gpkg -o new.gpkg", "tracks out/field.gpkg --spacing 5000 -o new.gpkg"),
         ("tracks out/field.gpkg", "tracks out/field.gpkg --spacing wide -o new.gpkg"),
     ),
+    "undo": (
+        (
+            "tracks out/field.gpkg --spacing 9 -o undone.gpkg",
+            "tracks undone.gpkg --spacing 8 -o undone.gpkg",
+            "undo undone.gpkg",
+        ),
+        ("undo text.gpkg",),
+        ("undo", "undo missing.gpkg"),
+    ),
     "export": (
         ("export out/field.gpkg -f kml --out export",),
         ("export text.gpkg -f kml --out new", "export missing.gpkg -f kml --out new"),

@@ -270,3 +270,30 @@ def test_a_plan_without_a_record_of_what_was_written(folder: Path, made: Simulat
     after = rows(plan_in(folder))
     assert after.geometry[1].area == pytest.approx(before.geometry[1].buffer(3).area, rel=1e-6)
     assert after["status"].tolist() == ["confirmed", *["detected"] * (len(before) - 1)]
+
+
+def test_one_generation_back(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    first = plan_in(folder)
+    rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
+    geofield("tracks", file, "--spacing", 9, "-o", file)
+    assert plan_in(folder).tracks != first.tracks
+    geofield("undo", file)
+    # As the person left it, before the tracks were planned again.
+    assert 6 not in rows(plan_in(folder)).index
+    assert plan_in(folder).settings == first.settings
+    geofield("undo", file)
+    later = plan_in(folder)
+    assert later.settings is not None
+    assert later.settings.tracks.spacing_m == 9
+    run(folder, made, "--overwrite")
+    assert 6 not in rows(plan_in(folder)).index
+    geofield("undo", file)
+    assert plan_in(folder) == later
+
+
+def test_nothing_to_undo(folder: Path) -> None:
+    command = [sys.executable, "-m", "geofield", "undo", str(folder / "out/field.gpkg")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no earlier plan" in done.stderr

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.errors import FormatError
+from geofield.generations import keep_earlier
+from geofield.staging import staged_folder
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -40,4 +42,6 @@ def save_plan(
     if read_from is not None and output.resolve().parent == read_from.resolve().parent:
         # The project goes on showing the picture that lies there.
         dataset = replace(dataset, scene_path=scene_beside(read_from))
-    write_dataset(dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite or same)
+    with staged_folder(output.parent, overwrite=overwrite or same) as staging:
+        keep_earlier(output, staging)
+        write_dataset(dataset, staging, ["gpkg"], stem=output.stem)

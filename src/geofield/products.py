@@ -20,10 +20,12 @@ from geofield.errors import FormatError
 from geofield.evaluation.driving import unseen
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
+from geofield.generations import keep_earlier
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.staging import staged_folder
 
+PLAN_FILE = "field.gpkg"
 SCENE_FILE = "scene.tif"
 MAP_FILE = "map.png"
 REPORT_FILE = "report.json"
@@ -73,6 +75,8 @@ def write_products(
     ):
         written: list[Path] = []
         shown = {"scene": scene}
+        if "gpkg" in asked:
+            keep_earlier(folder / PLAN_FILE, staging)
         if scene is not None:
             written += write_scene(dataset, staging, stem="", options=shown)
             dataset = replace(dataset, scene_path=written[0])

@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "obstacles": ("geofield.cli.obstacles:obstacles", "Stage 3: find the obstacles in it."),
     "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
     "review": ("geofield.cli.review:review", "Correct a plan on a page in the browser."),
+    "undo": ("geofield.cli.undo:undo", "Bring back the plan before the last run."),
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
     "import": ("geofield.cli.import_:import_", "Read other programs' boundaries and lines."),
     "validate": ("geofield.cli.validate:validate", "Check products against their formats."),

@@ -173,6 +173,10 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
             say(f"           {note}")
     if plan.changes:
         say(f"Changes    {'; '.join(plan.changes)}")
+        say(
+            "           the earlier plan is kept: geofield undo "
+            + str(files[0].parent / "field.gpkg")
+        )
     if timings:
         say("Time       " + ", ".join(f"{stage} {value:.1f} s" for stage, value in timings.items()))
     folder = files[0].parent
