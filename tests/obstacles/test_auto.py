@@ -10,6 +10,7 @@ from geofield import schema
 from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
+from geofield.obstacles.costs import thresholds
 from geofield.obstacles.detect import STRATEGIES
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -190,6 +191,78 @@ def test_a_pond_becomes_a_polygon():
     shape = other.geometry.iloc[0]
     assert shape.intersection(truth).area / shape.union(truth).area > 0.7
     assert np.isnan(other["radius_m"].iloc[0])
+
+
+def painted(field, *things):
+    """The field's picture with boxes (x, y, half width, half height, grey level) and shadows."""
+    bands = field.scene.bands.copy()
+    yy, xx = np.mgrid[: bands.shape[1], : bands.shape[2]]
+    for x, y, wide, high, grey in things:
+        shadow = (np.abs(xx - x - 4) <= wide + 2) & (np.abs(yy - y) <= high)
+        bands[:, shadow] = (bands[:, shadow] * 0.45).astype(np.uint8)
+        bands[:, (np.abs(xx - x) <= wide) & (np.abs(yy - y) <= high)] = grey
+    return Scene(field.scene.grid, bands, field.scene.roles, field.scene.valid)
+
+
+def test_what_stands_there_is_found_with_a_probability_and_the_border_is_none():
+    settings = SimulationSettings(width_px=400, height_px=400, obstacles=0, climate="temperate")
+    field = simulate_field(12, settings)
+    grid = field.scene.grid
+    x, y = (float(v) for v in grid.from_lonlat(field.lon, field.lat))
+    edge = field.field.polygon.exterior.interpolate(0.3, normalized=True)
+    u, v = (float(w) for w in grid.from_crs(edge.x, edge.y, field.field.crs))
+    # A hut and a truck in the field, a hut on its border.
+    scene = painted(field, (x, y, 5, 4, 210), (x + 30, y + 12, 6, 2, 235), (u, v, 2, 2, 220))
+    found = gf.detect_obstacles(scene, field.field, buffer_m=0)
+    other = active(found[found["kind"] == "other"])
+    assert len(other) == 2
+    for place in ((x, y), (x + 30, y + 12)):
+        hit = other[other.contains(shapely.Point(grid.to_crs(*place, field.field.crs)))]
+        assert len(hit) == 1
+        assert hit["confidence"].iloc[0] > 0.3
+    careful = gf.detect_obstacles(scene, field.field, buffer_m=0, careful=True)
+    assert set(careful["status"]) == {"detected"}
+
+
+def test_the_cost_of_a_miss_moves_the_line(simulated):
+    counts = []
+    for cost in (3, 30, 300):
+        found = gf.detect_obstacles(simulated.scene, simulated.field, cost_missed=cost)
+        told = found.attrs["detection"]
+        assert told["possible_from"] <= told["threshold"]
+        counts.append((len(active(found)), len(found)))
+    assert counts == sorted(counts)
+    assert thresholds(30) == pytest.approx((1 / 11, 1 / 21))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda b: 0.5 * b + 60,
+        lambda b: 0.6 * b + 0.4 * 190,
+        lambda b: 0.6 * b,
+    ],
+    ids=["half contrast", "haze", "dark"],
+)
+@pytest.mark.parametrize("bands", [4, 3, 1])
+def test_light_and_haze_do_not_blind_it(simulated, change, bands):
+    grey = np.rint(simulated.scene.grey)[None] if bands == 1 else simulated.scene.bands[:bands]
+    changed = np.clip(np.rint(change(grey.astype(float))), 0, 255).astype(np.uint8)
+    roles = ("grey",) if bands == 1 else simulated.scene.roles[:bands]
+    scene = Scene(simulated.scene.grid, changed, roles, simulated.scene.valid)
+    found = gf.detect_obstacles(scene, simulated.field)
+    assert gf.evaluate(found, simulated.obstacles, distance_m=3.6).pooled.f1 > 0.85
+
+
+def test_grey_in_three_equal_bands_is_grey(simulated):
+    grey = np.clip(np.rint(simulated.scene.grey), 0, 255).astype(np.uint8)[None]
+    scene = simulated.scene
+    one = Scene(scene.grid, grey, ("grey",), scene.valid)
+    three = Scene(scene.grid, np.repeat(grey, 3, axis=0), scene.roles[:3], scene.valid)
+    a, b = (gf.detect_obstacles(s, simulated.field) for s in (one, three))
+    assert len(a) == len(b) > 3
+    assert a["x_px"].to_numpy() == pytest.approx(b["x_px"].to_numpy(), abs=0.05)
+    assert b.attrs["detection"]["method"] == "network_grey"
 
 
 def test_pixel_transform_is_that_of_the_grid(simulated, detected):

@@ -108,19 +108,19 @@ def detect_by_default(
     tone = tone_of(picture)
     notes = _doubts(tone, resolution, factor, radius_m)
     facts = network(NETWORK).facts
-    standing = None
+    standing = outline = None
     if others and area is not None:
-        bounds = (np.array(area.polygon_px(picture.grid).bounds) / factor).clip(0)
-        standing = StandingMap.over(*bounds.tolist())
+        outline = shapely.transform(area.polygon_px(picture.grid), lambda c: c / factor)
+        standing = StandingMap.over(*np.clip(outline.bounds, 0, None).tolist())
         if standing is None:
             notes.append("The field is too large to search it for what is no tree.")
     crowns = _look(picture, area, tone, factor, polarity, standing, progress)
     crowns = once_each(crowns, **facts["suppression"])
     shapes: list[shapely.Polygon] = []
     shape_confidence = np.empty(0)
-    if standing is not None:
+    if standing is not None and outline is not None:
         sure = crowns.take(crowns.strength >= facts["explains"])
-        shapes, answers_there = standing.things(sure, facts["standing"]["least"])
+        shapes, answers_there = standing.things(outline, sure, facts["standing"]["least"])
         shape_confidence = calibrated(np.array(answers_there), facts["standing"]["calibration"])
         likely = np.flatnonzero(shape_confidence >= least)
         shapes = [shapely.transform(shapes[i], lambda c: c * factor) for i in likely]

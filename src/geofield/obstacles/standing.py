@@ -23,6 +23,9 @@ MAX_CELLS = 100e6
 """Larger fields are searched for trees alone, for their cells would not fit into memory."""
 RIM = 0.5
 """A thing reaches as far as its cells are at least this share of its clearest ones."""
+BORDER_CELLS, DEEP_CELLS = 2.5, 7.5
+"""What begins within 3 m of the field's border and ends within 9 m is the border: a road's edge,
+a ditch, the neighbour's wall."""
 _EXPLAINED = 0.5
 _CLEAR_CELLS = 3
 
@@ -63,11 +66,15 @@ class StandingMap:
             # Where windows overlap they agree, but for those whose region ends there.
             np.maximum(self.cells[part], values[r0:r1, c0:c1], out=self.cells[part])
 
-    def things(self, trees: Circles, least: float) -> tuple[list[shapely.Polygon], list[float]]:
+    def things(
+        self, field: shapely.Polygon, trees: Circles, least: float
+    ) -> tuple[list[shapely.Polygon], list[float]]:
         """Return what stands there beside the trees, and how probable each is.
 
         Parameters
         ----------
+        field : Polygon
+            Its outer ring, working pixels; along it there is its border.
         trees : Circles
             Working pixels.
         least : float
@@ -85,10 +92,14 @@ class StandingMap:
         if not count:
             return [], []
         known = self._discs(trees)
+        depth = self._depth(field)
         polygons, probabilities = [], []
         for number, where in enumerate(ndimage.find_objects(labels), start=1):
             part = labels[where] == number
             if float(known[where][part].mean()) >= _EXPLAINED:
+                continue
+            deep = depth[where][part]
+            if float(deep.min()) <= BORDER_CELLS and float(deep.max()) <= DEEP_CELLS:
                 continue
             clearest = np.sort(p[where][part])[-_CLEAR_CELLS:]
             thing = part & (p[where] >= RIM * float(clearest.mean()))
@@ -98,6 +109,14 @@ class StandingMap:
             polygons.append(shapely.Polygon((corners + place) * CELL_PX))
             probabilities.append(float(clearest.mean()))
         return polygons, probabilities
+
+    def _depth(self, field: shapely.Polygon) -> Image:
+        """Return how many cells each lies inside the field."""
+        ring = shapely.get_coordinates(field.exterior) / CELL_PX - [self.col, self.row]
+        inside = np.zeros(np.add(self.cells.shape, 2), np.uint8)
+        cv2.fillPoly(inside, [np.rint(ring * 16 + 8).astype(np.int32)], 1, cv2.LINE_8, 4)
+        depth = cv2.distanceTransform(inside, cv2.DIST_L2, 5)[1:-1, 1:-1]
+        return np.asarray(depth, dtype=np.float32)
 
     def _discs(self, trees: Circles) -> NDArray[np.bool_]:
         mask = np.zeros(self.cells.shape, np.uint8)
