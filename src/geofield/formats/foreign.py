@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 __all__ = ["RawLayer", "layer_names", "read_foreign", "read_vector"]
 
 
+#: No coordinate of a metric CRS is larger.
+_FAR_M = 1e8
+
+
 def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     """A layer of a file that GDAL reads, without its empty rows.
 
@@ -51,7 +55,8 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
                 frame = pyogrio.read_dataframe(path, layer=layer)
             except GEOSException:
                 frame = _mended(path, layer)
-    except (DataSourceError, DataLayerError, FeatureError, GeometryError) as error:
+    except (DataSourceError, DataLayerError, FeatureError, GeometryError, IndexError) as error:
+        # IndexError: GDAL opened the file, and there was no layer in it.
         raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
     except UnicodeDecodeError as error:
         raise FormatError(
@@ -142,6 +147,11 @@ def read_foreign(
     notes: list[str] = []
     for each in present:
         frame = each.frame.to_crs(metric)
+        # Not a number fails this, too.
+        if not (np.abs(shapely.get_coordinates(frame.geometry.to_numpy())) < _FAR_M).all():
+            raise FormatError(
+                f"{path.name}: {each.name} has coordinates that are no place near its field."
+            )
         layer = _own_layer(each)
         if layer is None:
             foreign.append(RawLayer(each.name, frame))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -15,6 +16,9 @@ from geofield.errors import FormatError
 _ZERO = (1980, 1, 1)
 #: More than this is no archive of one field, bytes.
 MAX_BYTES = 4 * 2**30
+MAX_ENTRIES = 10_000
+#: An archive that unpacks to more than this, and to so many times its size, is a bomb.
+BOMB_BYTES, BOMB_RATIO = 100e6, 50
 
 
 def archived(
@@ -65,8 +69,17 @@ def unpacked(path: Path) -> Iterator[Path]:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
-            if sum(entry.file_size for entry in entries) > MAX_BYTES:
+            size = sum(entry.file_size for entry in entries)
+            if size > MAX_BYTES:
                 raise FormatError(f"{path} unpacks to more than {MAX_BYTES / 2**30:.0f} GB.")
+            if len(entries) > MAX_ENTRIES or (
+                size > BOMB_BYTES and size > BOMB_RATIO * path.stat().st_size
+            ):
+                raise FormatError(
+                    f"{path} unpacks to {len(entries)} files of {size / 1e6:.0f} MB, far more than "
+                    "it holds: refused.",
+                    hint="Unpack it yourself if you trust it.",
+                )
             for entry in entries:
                 parts = PurePosixPath(entry.filename.replace("\\", "/")).parts
                 if ".." in parts or PurePosixPath(entry.filename).is_absolute():
@@ -78,7 +91,7 @@ def unpacked(path: Path) -> Iterator[Path]:
                 with archive.open(entry) as source, target.open("wb") as out:
                     shutil.copyfileobj(source, out)
             yield _innermost(folder)
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError) as error:
         raise FormatError(f"{path} cannot be unpacked: {error}.", hint="Is it whole?") from error
 
 

@@ -92,7 +92,10 @@ def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int]]:
         parts = line.split(",", 7)
         match = _FLAG.match(parts[-1]) if len(parts) == 8 else None
         if match is not None:
-            placed = plane.to_plane(float(parts[1]), float(parts[0]))
+            try:
+                placed = plane.to_plane(float(parts[1]), float(parts[0]))
+            except ValueError:
+                raise FormatError(f"{path}: {line[:60]!r} is no flag.") from None
             found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), int(match.group(1))))
     return found
 

@@ -34,7 +34,8 @@ def check(path: Path) -> Iterator[Finding]:
 
 
 def _check_boundary(path: Path) -> Iterator[Finding]:
-    lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    lines = [line.strip() for line in text.splitlines()]
     if not lines or lines[0] != "$Boundary":
         yield Finding("error", path.name, "the first line is not $Boundary")
         return

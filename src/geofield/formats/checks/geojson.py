@@ -22,7 +22,7 @@ def check(path: Path) -> Iterator[Finding]:
 def _check_file(file: Path) -> Iterator[Finding]:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         yield Finding("error", file.name, f"not JSON in UTF-8: {error}")
         return
     if not isinstance(content, dict) or content.get("type") not in ("FeatureCollection", "Feature"):
