@@ -20,7 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 PRODUCTS = [(name, {}) for name in FORMATS if name not in ("shapefile", "scene")]
 PRODUCTS += [("shapefile", {"profile": profile}) for profile in PROFILES]
 #: A terminal's files and AgOpenGPS's are of one field, or none.
-ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "report")
+ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "report", "html")
 
 
 def without(case):

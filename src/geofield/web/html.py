@@ -16,6 +16,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.crs import ground_scale_of
+from geofield.errors import FormatError
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
@@ -36,6 +37,8 @@ LONG_SIDE_PX = 1600
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``{stem}.html``; the picture comes along where it lies beside the plan."""
+    if not dataset.has(schema.FIELD.name):
+        raise FormatError("A web page needs one field; there are 0.")
     path = folder / f"{stem}.html"
     path.write_text(document(dataset), encoding="utf-8")
     return [path]
