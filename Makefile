@@ -13,7 +13,7 @@ SAMPLE := sample_data/field_1.tif --lat 35.075373 --lon 33.531142
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test check pytest format lock bench docs notebooks pictures clean
+.PHONY: help demo test check pytest format lock bench docs notebooks pictures plugin clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
@@ -54,6 +54,11 @@ lock:  ## refresh the locked dependencies from pyproject.toml (needs uv)
 	  -o requirements/run.txt --custom-compile-command "make lock"
 	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \
 	  --group dev -o requirements/dev.txt --custom-compile-command "make lock"
+
+plugin: $(VENV)/dev.stamp  ## build the QGIS plugin's zip and the engine's wheel into dist/
+	$(BIN)/python plugin/describe.py
+	$(BIN)/python plugin/translate.py de
+	$(BIN)/python plugin/package.py dist
 
 clean:  ## remove the environment and everything made
 	rm -rf $(VENV) out site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -121,6 +121,7 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("info text.gpkg", "info text.tif", "info missing.tif"),
         ("info", "info out/field.gpkg --deep"),
     ),
+    "live": (("live",), (), ("live all",)),
     "settings": (("settings", "settings --json"), (), ("settings tracks",)),
     "formats": (("formats", "formats --json"), (), ("formats gpkg",)),
     "sources": (("sources --json",), (), ("sources naip",)),

@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
     "review": ("geofield.cli.review:review", "Correct a plan on a page in the browser."),
     "undo": ("geofield.cli.undo:undo", "Bring back the plan before the last run."),
+    "live": ("geofield.cli.live:live", ""),  # for programs: not in the list that people see
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
     "import": ("geofield.cli.import_:import_", "Read other programs' boundaries and lines."),
     "validate": ("geofield.cli.validate:validate", "Check products against their formats."),
@@ -73,7 +74,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of commands, without importing any."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items() if text])
 
 
 @click.group(

@@ -104,6 +104,10 @@ def _kind(parameter: click.Parameter) -> dict[str, Any]:
     row: dict[str, Any] = {"type": "flag" if is_flag else kind.name, "multiple": False}
     if isinstance(kind, click.Choice):
         row |= {"type": "choice", "choices": [str(each) for each in kind.choices]}
+    if isinstance(kind, click.FloatRange | click.IntRange):
+        row["type"] = "integer" if isinstance(kind, click.IntRange) else "float"
+        limits = {"above" if kind.min_open else "minimum": kind.min, "maximum": kind.max}
+        row |= {name: limit for name, limit in limits.items() if limit is not None}
     if isinstance(kind, click.types.CompositeParamType):
         row |= {"type": "numbers", "count": kind.arity}
     if is_flag and isinstance(parameter, click.Option) and parameter.secondary_opts:

@@ -1,0 +1,409 @@
+"""The algorithms: which command each runs, what it takes and what it makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsFields,
+    QgsGeometry,
+    QgsProcessingOutputNumber,
+    QgsProcessingOutputString,
+    QgsProcessingParameterExtent,
+    QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterFolderDestination,
+    QgsProcessingParameterMultipleLayers,
+    QgsProcessingParameterRasterDestination,
+    QgsProcessingParameterRasterLayer,
+    QgsVectorFileWriter,
+    QgsWkbTypes,
+)
+
+from . import compat, sources
+from .algorithm import GeofieldAlgorithm
+from .engine import EngineError
+from .words import tr
+
+FIELD = ("field", "Plan a field")
+STAGES = ("stages", "Stage by stage")
+FILES = ("files", "Files and checks")
+#: Plans that are loaded at most when many fields were planned at once.
+MOST_LOADED = 20
+
+
+class PlanAlgorithm(GeofieldAlgorithm):
+    """The main job: picture and point in, all products out."""
+
+    identifier, title, section, command = "plan", "Plan a field", FIELD, "run"
+    own = GeofieldAlgorithm.own | {"imagery", "lat", "lon", "out", "boundary", "boundary_layer"}
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Picture, point and folder."""
+        self.add_picture()
+        self.add_point(tr("A point in the field"))
+        self.add_boundary()
+        self.addParameter(
+            QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder for the products"))
+        )
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words, environment = self.picture_words(values, context)
+        words += self.point_words(values, context)
+        words += ["--out", self.parameterAsString(values, "OUTPUT", context), "--json"]
+        words += self.source_words("BOUNDARY", "--boundary", values, context, feedback, folder)
+        return words, environment
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        folder = self.parameterAsString(values, "OUTPUT", context)
+        return {
+            "OUTPUT": folder,
+            **self.plan_outputs(Path(folder) / "field.gpkg", values, context),
+        }
+
+
+class OutlineAlgorithm(GeofieldAlgorithm):
+    """The outline of the field around a point."""
+
+    identifier, title, section, command = "outline", "Find the outline", STAGES, "field"
+    own = GeofieldAlgorithm.own | {
+        "imagery", "lat", "lon", "output", "boundary", "boundary_layer", "list_regions",
+    }  # fmt: skip
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Picture, point and GeoPackage."""
+        self.add_picture()
+        self.add_point(tr("A point in the field"))
+        self.add_boundary()
+        _add_geopackage(self)
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words, environment = self.picture_words(values, context)
+        words += self.point_words(values, context)
+        words += ["-o", self.parameterAsString(values, "OUTPUT", context)]
+        words += self.source_words("BOUNDARY", "--boundary", values, context, feedback, folder)
+        return words, environment
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        return _geopackage(self, values, context)
+
+
+class ObstaclesAlgorithm(GeofieldAlgorithm):
+    """The obstacles in a field whose outline is known."""
+
+    identifier, title, section, command = "obstacles", "Find the obstacles", STAGES, "obstacles"
+    own = GeofieldAlgorithm.own | {"imagery", "plan_file", "output"}
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Picture, plan and GeoPackage."""
+        self.add_picture()
+        self.add_plan()
+        _add_geopackage(self)
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words, environment = self.picture_words(values, context)
+        output = self.parameterAsString(values, "OUTPUT", context)
+        return [*words, self.plan_path(values, context), "-o", output], environment
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        return _geopackage(self, values, context)
+
+
+class TracksAlgorithm(GeofieldAlgorithm):
+    """Tracks on any polygons, or on a plan with all that a person changed in it."""
+
+    identifier, title, section, command = "tracks", "Plan the tracks", STAGES, "tracks"
+    own = GeofieldAlgorithm.own | {"file", "output", "obstacle_file", "crs"}
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Polygons, obstacles and folder."""
+        self.addParameter(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Fields"), [compat.POLYGONS])
+        )
+        self.addParameter(
+            QgsProcessingParameterFeatureSource(
+                "OBSTACLES_TO_AVOID",
+                tr("Obstacles to avoid: polygons, points with radius_m, lines"),
+                [compat.VECTORS],
+                optional=True,
+            )
+        )
+        self.addParameter(
+            QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder for the plans"))
+        )
+        self.addOutput(QgsProcessingOutputNumber("FIELDS", tr("Fields planned")))
+        self.addOutput(QgsProcessingOutputNumber("LENGTH_M", tr("Length of all segments, metres")))
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        layer = self.parameterAsVectorLayer(values, "INPUT", context)
+        sources.refuse_unsaved(layer)
+        plan = sources.plan_file(layer)
+        obstacles = self.source_words(
+            "OBSTACLES_TO_AVOID", "--obstacles", values, context, feedback, folder
+        )
+        # The field layer of a plan stands for the plan: its obstacles count, too.
+        words = (
+            [plan]
+            if plan is not None
+            else self.source_words("INPUT", "", values, context, feedback, folder)
+        )
+        output = self.parameterAsString(values, "OUTPUT", context)
+        Path(output).mkdir(parents=True, exist_ok=True)
+        return [*words, "-o", output, *obstacles, "--json"], {}
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        rows = (result.data or {}).get("fields", [])
+        made: dict[str, Any] = {
+            "OUTPUT": self.parameterAsString(values, "OUTPUT", context),
+            "FIELDS": len(rows),
+            "LENGTH_M": sum(row["length_m"] for row in rows),
+        }
+        for row in rows[MOST_LOADED:]:
+            feedback.pushInfo(row["file"])
+        for row in reversed(rows[:MOST_LOADED]):
+            made |= self.plan_outputs(row["file"], values, context)
+        return made
+
+
+class RouteAlgorithm(TracksAlgorithm):
+    """Tracks with the order of work and the turns between them."""
+
+    identifier, title = "route", "Plan tracks and route"
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The order of work is asked for with another default."""
+        return [
+            {**row, "default": None, "choices": [c for c in row["choices"] if c != "none"]}
+            if row.get("setting") == "tracks.route"
+            else row
+            for row in super().rows()
+        ]
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """As for tracks; without another word the shortest route."""
+        words, environment = super().words(values, context, feedback, folder)
+        if values.get("ROUTE") in (None, ""):
+            words += ["--route", "shortest"]
+        return words, environment
+
+
+class ImageryAlgorithm(GeofieldAlgorithm):
+    """The picture of a place from any source."""
+
+    identifier, title, section, command = "imagery", "Get imagery", STAGES, "tiles"
+    own = GeofieldAlgorithm.own | {"source", "lat", "lon", "area", "out"}
+
+    def add_inputs(self) -> None:
+        """Source, place and GeoTIFF."""
+        self.add_picture()
+        self.add_point(tr("Centre"), optional=True)
+        self.addParameter(QgsProcessingParameterExtent("EXTENT", tr("Or an extent"), optional=True))
+        self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Picture")))
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words, environment = self.picture_words(values, context)
+        if values.get("EXTENT") not in (None, ""):
+            lonlat = QgsCoordinateReferenceSystem("EPSG:4326")
+            extent = self.parameterAsExtent(values, "EXTENT", context, lonlat)
+            words += ["--area", _extent_file(extent, lonlat, folder, context)]
+        elif values.get("POINT") not in (None, ""):
+            words += self.point_words(values, context)
+        else:
+            raise EngineError(tr("Give a centre or an extent."))
+        output = self.parameterAsOutputLayer(values, "OUTPUT", context)
+        return [*words, "-o", output, "--json"], environment
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        return {"OUTPUT": self.parameterAsOutputLayer(values, "OUTPUT", context)}
+
+
+class ExportAlgorithm(GeofieldAlgorithm):
+    """A plan in the formats of terminals and other programs."""
+
+    identifier, title, section, command = "export", "Export for terminals", FILES, "export"
+    own = GeofieldAlgorithm.own | {"plan_file", "folder", "crs"}
+
+    def add_inputs(self) -> None:
+        """Plan and folder."""
+        self.add_plan()
+        self.addParameter(
+            QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder for the products"))
+        )
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The formats come first: nothing is exported without one."""
+        return sorted(super().rows(), key=lambda row: row["name"] != "formats")
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        output = self.parameterAsString(values, "OUTPUT", context)
+        return [self.plan_path(values, context), "--out", output, "--json"], {}
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        for file in (result.data or {}).get("files", []):
+            feedback.pushInfo(file)
+        return {"OUTPUT": self.parameterAsString(values, "OUTPUT", context)}
+
+
+class ImportAlgorithm(GeofieldAlgorithm):
+    """Other programs' boundaries, obstacles and lines as a plan."""
+
+    identifier, title, section, command = "import", "Import boundaries", FILES, "import"
+    own = GeofieldAlgorithm.own | {"files", "output"}
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Files and GeoPackage."""
+        self.addParameter(QgsProcessingParameterMultipleLayers("FILES", tr("Files"), compat.FILES))
+        _add_geopackage(self)
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        files = self.parameterAsFileList(values, "FILES", context)
+        return [*files, "-o", self.parameterAsString(values, "OUTPUT", context)], {}
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        return _geopackage(self, values, context)
+
+
+class ValidateAlgorithm(GeofieldAlgorithm):
+    """Products checked against their formats."""
+
+    identifier, title, section, command = "validate", "Check products", FILES, "validate"
+    own = GeofieldAlgorithm.own | {"files"}
+    fine = (0, 1)
+
+    def add_inputs(self) -> None:
+        """Files."""
+        self.addParameter(QgsProcessingParameterMultipleLayers("FILES", tr("Files"), compat.FILES))
+        self.addOutput(QgsProcessingOutputNumber("ERRORS", tr("Errors")))
+        self.addOutput(QgsProcessingOutputNumber("WARNINGS", tr("Warnings")))
+        self.addOutput(QgsProcessingOutputString("FINDINGS", tr("Findings")))
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        return [*self.parameterAsFileList(values, "FILES", context), "--json"], {}
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        if result.data is None:
+            raise EngineError(" ".join(result.lines) or tr("The engine gave no answer."))
+        lines, levels = [], []
+        for file, findings in result.data.items():
+            for each in findings:
+                levels.append(each["level"])
+                lines.append(f"{file}: {each['level']}: {each['where']}: {each['message']}")
+        for line in lines or [tr("No fault found.")]:
+            feedback.pushInfo(line)
+        return {
+            "ERRORS": levels.count("error"),
+            "WARNINGS": levels.count("warning"),
+            "FINDINGS": "\n".join(lines),
+        }
+
+
+class EvaluateAlgorithm(GeofieldAlgorithm):
+    """Detected obstacles against a truth."""
+
+    identifier, title, section, command = "evaluate", "Compare with a truth", FILES, "evaluate"
+    own = GeofieldAlgorithm.own | {
+        "detected", "truth", "layer", "truth_layer", "picture", "scene_file",
+    }  # fmt: skip
+    figures = ("precision", "recall", "f1")
+
+    def add_inputs(self) -> None:
+        """Two layers, and a picture to draw."""
+        for name, label in (("DETECTED", tr("Detected obstacles")), ("TRUTH", tr("Truth"))):
+            self.addParameter(QgsProcessingParameterFeatureSource(name, label, [compat.VECTORS]))
+        self.addParameter(
+            QgsProcessingParameterRasterLayer("SCENE", tr("Picture to draw on"), optional=True)
+        )
+        self.addParameter(
+            QgsProcessingParameterFileDestination(
+                "PICTURE", tr("Drawing of hits and misses"), "PNG (*.png)", None, True, False
+            )
+        )
+        for figure in self.figures:
+            self.addOutput(QgsProcessingOutputNumber(figure.upper(), figure))
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words = []
+        for name in ("DETECTED", "TRUTH"):
+            words += self.source_words(name, "", values, context, feedback, folder)
+        words += ["--layer", "detected", "--json"]
+        picture = self.parameterAsString(values, "PICTURE", context)
+        if picture:
+            words += ["--picture", picture]
+        scene = self.parameterAsRasterLayer(values, "SCENE", context)
+        if scene is not None:
+            words += ["--scene", sources.imagery(scene)[0]]
+        return words, {}
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        found = result.data or {}
+        for name, value in found.items():
+            feedback.pushInfo(f"{name}: {value}")
+        made = {figure.upper(): found.get(figure) for figure in self.figures}
+        picture = self.parameterAsString(values, "PICTURE", context)
+        return {**made, "PICTURE": picture} if picture else made
+
+
+ALGORITHMS = (
+    PlanAlgorithm,
+    OutlineAlgorithm,
+    ObstaclesAlgorithm,
+    TracksAlgorithm,
+    RouteAlgorithm,
+    ImageryAlgorithm,
+    ExportAlgorithm,
+    ImportAlgorithm,
+    ValidateAlgorithm,
+    EvaluateAlgorithm,
+)
+
+
+def _add_geopackage(algorithm: GeofieldAlgorithm) -> None:
+    algorithm.addParameter(
+        QgsProcessingParameterFileDestination("OUTPUT", tr("Plan"), "GeoPackage (*.gpkg)")
+    )
+
+
+def _geopackage(algorithm: GeofieldAlgorithm, values: Any, context: Any) -> dict[str, Any]:
+    path = algorithm.parameterAsString(values, "OUTPUT", context)
+    return {"OUTPUT": path, **algorithm.plan_outputs(path, values, context)}
+
+
+def _extent_file(extent: Any, crs: QgsCoordinateReferenceSystem, folder: str, context: Any) -> str:
+    """An extent as a file with one polygon."""
+    path = str(Path(folder) / "extent.gpkg")
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    options.driverName, options.layerName = "GPKG", "extent"
+    writer = QgsVectorFileWriter.create(
+        path, QgsFields(), QgsWkbTypes.Type.Polygon, crs, context.transformContext(), options
+    )
+    feature = QgsFeature()
+    feature.setGeometry(QgsGeometry.fromRect(extent))
+    writer.addFeature(feature)
+    del writer  # closes the file
+    return path

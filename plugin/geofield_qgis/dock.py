@@ -1,0 +1,460 @@
+"""The review panel: obstacles in the order of doubt, decided by keys, tracks that follow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import (
+    NULL,
+    QgsCoordinateTransform,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProject,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+from qgis.PyQt.QtCore import Qt, QTimer
+from qgis.PyQt.QtGui import QKeySequence
+from qgis.PyQt.QtWidgets import (
+    QDockWidget,
+    QGridLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from . import plan_files
+from .algorithm import path_of
+from .compat import QShortcut
+from .jobs import Live
+from .map_tools import CircleTool, PointTool, band
+from .review import OPEN, Review, by_doubt, counts, value
+from .words import tr
+
+#: Edits that follow each other this closely are planned once, milliseconds.
+_PAUSE_MS = 60
+#: How much of the map around an obstacle is shown, in its own diameters.
+_AROUND = 7.0
+_STEP_M = 0.25
+
+
+class ReviewDock(QDockWidget):
+    """A panel for one plan: the one of the active layer, or the first of the project."""
+
+    def __init__(self, iface: Any) -> None:
+        super().__init__(tr("Review of a field"), iface.mainWindow())
+        self.setObjectName("geofield_review")
+        self.iface, self.canvas = iface, iface.mapCanvas()
+        self.review: Review | None = None
+        self.path = ""
+        self.current: int | None = None
+        self.live = Live(self)
+        self.live.failed.connect(self._trouble)
+        self._released: plan_files.Released | None = None
+        self._connections: list[tuple[Any, Any]] = []
+        lines = QgsWkbTypes.GeometryType.LineGeometry
+        self._mark = band(self.canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
+        self._bands = {
+            "segments": band(self.canvas, lines, "#ffffff", 2),
+            "gaps": band(self.canvas, lines, "#ff80ab", 2),
+        }
+        self._hidden: list[str] = []
+        self._build()
+        self._keys()
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_PAUSE_MS)
+        self._timer.timeout.connect(self.replan)
+        QgsProject.instance().layersWillBeRemoved.connect(self._layers_go)
+
+    # -- the panel ---------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        body = QWidget(self)
+        box = QVBoxLayout(body)
+        self.title, self.doubts, self.count = QLabel(), QLabel(), QLabel()
+        self.here, self.figures = QLabel(), QLabel()
+        self.doubts.setStyleSheet("color: #b26a00")
+        self.here.setStyleSheet("font-weight: bold")
+        for label in (self.title, self.doubts, self.count, self.here, self.figures):
+            label.setWordWrap(True)
+            box.addWidget(label)
+        grid = QGridLayout()
+        self.buttons: dict[str, QPushButton] = {}
+        rows = (
+            ("open", tr("Review the plan of the active layer"), "", self.open),
+            ("previous", tr("Previous"), "K", lambda: self.step(-1)),
+            ("next", tr("Next"), "J", lambda: self.step(1)),
+            ("confirm", tr("Confirm"), "C", lambda: self.decide("confirmed")),
+            ("reject", tr("Reject"), "R", lambda: self.decide("rejected")),
+            ("smaller", tr("Smaller"), "-", lambda: self.resize_by(-_STEP_M)),
+            ("larger", tr("Larger"), "+", lambda: self.resize_by(_STEP_M)),
+            ("move", tr("Move: click its middle"), "M", self.begin_move),
+            ("draw", tr("Draw: drag a circle"), "D", self.begin_draw),
+            ("undo", tr("Undo"), "U", self.undo),
+            ("save", tr("Save and plan again"), "S", self.save),
+        )
+        for number, (name, text, key, action) in enumerate(rows):
+            button = QPushButton(f"{text}  ({key})" if key else text)
+            button.clicked.connect(action)
+            self.buttons[name] = button
+            if name == "open":
+                grid.addWidget(button, 0, 0, 1, 2)
+            else:
+                grid.addWidget(button, (number + 1) // 2, (number + 1) % 2)
+        self._actions = {name: (key, action) for name, _, key, action in rows if key}
+        box.addLayout(grid)
+        box.addStretch(1)
+        self.setWidget(body)
+        self._tell()
+
+    def _keys(self) -> None:
+        """The keys work where the hands are: on the map and in the panel."""
+        self._shortcuts = []
+        for place in (self.canvas, self):
+            for key, action in self._actions.values():
+                shortcut = QShortcut(QKeySequence(key), place)
+                shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+                shortcut.activated.connect(action)
+                self._shortcuts.append(shortcut)
+        self.visibilityChanged.connect(self._enable_keys)
+        self._enable_keys(False)
+
+    def _enable_keys(self, _: bool = True) -> None:
+        for shortcut in self._shortcuts:
+            shortcut.setEnabled(self.isVisible() and self.review is not None)
+
+    def _tell(self) -> None:
+        """What the panel says of the plan as it is now."""
+        ready = self.review is not None
+        for name, button in self.buttons.items():
+            button.setEnabled(ready or name == "open")
+        if self.review is None:
+            self.title.setText(tr("Choose a layer of a plan, then press the button."))
+            for label in (self.doubts, self.count, self.here, self.figures):
+                label.setText("")
+            return
+        self._tell_outline()
+        found = counts(self.review.layer)
+        left = sum(found.get(status, 0) for status in OPEN)
+        words = {
+            "confirmed": tr("{0} confirmed"),
+            "rejected": tr("{0} rejected"),
+            "added": tr("{0} added"),
+        }
+        parts = [tr("{0} left to look at").format(left)]
+        parts += [text.format(found[name]) for name, text in words.items() if found.get(name)]
+        self.count.setText(", ".join(parts))
+        feature = None if self.current is None else self.review.layer.getFeature(self.current)
+        if feature is None or not feature.isValid():
+            self.here.setText("")
+            return
+        radius_m, confidence = value(feature, "radius_m"), value(feature, "confidence")
+        parts = [tr("Obstacle {0}").format(value(feature, "obstacle_no", tr("new")))]
+        parts.append(str(value(feature, "status", "added")))
+        if radius_m is not None:
+            parts.append(tr("radius {0:.2f} m").format(radius_m))
+        if confidence is not None:
+            parts.append(tr("confidence {0:.0%}").format(confidence))
+        self.here.setText(", ".join(parts))
+
+    def _tell_outline(self) -> None:
+        field = plan_files.layers_of(self.path).get("field")
+        row = None if field is None else next(field.getFeatures(), None)
+        if row is None:
+            self.title.setText(self.path)
+            self.doubts.setText("")
+            return
+        text = f"{value(row, 'name', '')}, {value(row, 'area_ha', 0.0):.2f} ha"
+        certainty = value(row, "certainty")
+        if certainty is not None:
+            text += tr(", outline {0:.0%} certain").format(certainty)
+        self.title.setText(text)
+        self.doubts.setText(str(value(row, "doubts", "")))
+
+    # -- which plan --------------------------------------------------------------------------
+
+    def open(self, path: str = "") -> bool:
+        """Review a plan: the one named, that of the active layer, or the first one there is."""
+        active = path_of(self.iface.activeLayer()) if self.iface.activeLayer() else ""
+        others = [path_of(layer) for layer in QgsProject.instance().mapLayers().values()]
+        for candidate in (path or "", active, *others):
+            layers = plan_files.layers_of(candidate) if candidate else {}
+            if {"obstacles", "field"} <= set(layers):
+                self._take(candidate, layers["obstacles"])
+                return True
+        self._trouble(tr("There is no plan in this project: plan a field first."))
+        return False
+
+    def _take(self, path: str, layer: QgsVectorLayer) -> None:
+        self.close_review()
+        self.path, self.review = path, Review(layer)
+        self._connect(layer.undoStack().indexChanged, self._edited)
+        self._connect(layer.afterCommitChanges, self._saved)
+        self._connect(layer.afterRollBack, self._edited)
+        self._enable_keys()
+        self.current = None
+        self._tell()
+        self.step(1)
+        self.replan(preview=False)
+
+    def _connect(self, signal: Any, slot: Any) -> None:
+        signal.connect(slot)
+        self._connections.append((signal, slot))
+
+    def close_review(self) -> None:
+        """Let the plan go; what is in the edit buffer stays there."""
+        for signal, slot in self._connections:
+            try:
+                signal.disconnect(slot)
+            except (TypeError, RuntimeError):
+                continue  # the layer is gone
+        self._connections = []
+        self.review, self.current = None, None
+        self._timer.stop()
+        self._clear_preview()
+        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._enable_keys()
+        self._tell()
+
+    def _layers_go(self, ids: list[str]) -> None:
+        if self.review is not None and self.review.layer.id() in ids:
+            self.close_review()
+
+    def remove(self) -> None:
+        """Leave nothing in the window."""
+        QgsProject.instance().layersWillBeRemoved.disconnect(self._layers_go)
+        self.close_review()
+        self.live.close()
+        for shortcut in self._shortcuts:
+            shortcut.deleteLater()
+        scene = self.canvas.scene()
+        for each in (self._mark, *self._bands.values()):
+            scene.removeItem(each)
+        self.iface.removeDockWidget(self)
+        self.deleteLater()
+
+    # -- what the keys do --------------------------------------------------------------------
+
+    def step(self, by: int) -> None:
+        """Go to the next or previous obstacle in the order of doubt."""
+        if self.review is None:
+            return
+        queue = by_doubt(self.review.layer)
+        if not queue:
+            return
+        at = queue.index(self.current) + by if self.current in queue else 0
+        self._go(queue[at % len(queue)])
+
+    def decide(self, status: str) -> None:
+        """Confirm or reject the obstacle, and go to the most doubtful one that is left."""
+        if self.review is None or self.current is None:
+            return
+        self.review.set_status(self.current, status)
+        for feature_id in by_doubt(self.review.layer):
+            if value(self.review.layer.getFeature(feature_id), "status", "added") in OPEN:
+                self._go(feature_id)
+                return
+        self._go(self.current)
+
+    def resize_by(self, by_m: float) -> None:
+        """Make the obstacle a little larger or smaller."""
+        if self.review is None or self.current is None:
+            return
+        if self.review.resize(self.current, by_m) is None:
+            self._trouble(tr("This obstacle is not round: use QGIS's vertex tool."))
+        self._show_mark()
+
+    def begin_move(self) -> None:
+        """The next click on the map is the obstacle's middle."""
+        if self.review is not None and self.current is not None:
+            self._use(PointTool(self.canvas, self._move_to, self._drop_tool))
+
+    def _move_to(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
+        self._drop_tool()
+        self.review.move(self.current, self._to_layer(point))
+        self._show_mark()
+
+    def begin_draw(self) -> None:
+        """The next drag on the map is a new obstacle."""
+        if self.review is not None:
+            self._use(CircleTool(self.canvas, self._drawn))
+
+    def _drawn(self, middle: QgsPointXY, edge: QgsPointXY) -> None:
+        self._drop_tool()
+        middle, edge = self._to_layer(middle), self._to_layer(edge)
+        self.review.add(middle, middle.distance(edge))
+
+    def undo(self) -> None:
+        """Take the last edit back; it is the layer's own undo."""
+        if self.review is not None:
+            self.review.undo()
+            self._show_mark()
+
+    def save(self) -> None:
+        """Save the edits into the plan's file; the tracks in it follow."""
+        if self.review is None:
+            return
+        layer = self.review.layer
+        if layer.isEditable():
+            if not layer.commitChanges():
+                self._trouble("; ".join(layer.commitErrors()))
+        else:
+            self._saved()
+
+    # -- tracks that follow ------------------------------------------------------------------
+
+    def _edited(self, *_: Any) -> None:
+        self._timer.start()
+        self.review.layer.triggerRepaint()
+        self._tell()
+
+    def replan(self, *, preview: bool = True) -> None:
+        """Ask for the tracks of the layers as they are now, saved or not."""
+        if self.review is None:
+            return
+        layer = self.review.layer
+        rows = []
+        for feature in layer.getFeatures():
+            row = {
+                name: found
+                for name, found in zip(layer.fields().names(), feature.attributes())
+                if isinstance(found, (int, float, str)) and found != NULL
+            }
+            rows.append({**row, "wkb": _hex(feature.geometry())})
+        question = {"do": "plan", "file": self.path, "obstacles": rows}
+        field = plan_files.layers_of(self.path).get("field")
+        outline = None if field is None else next(field.getFeatures(), None)
+        if outline is not None:
+            question["outline"] = _hex(outline.geometry())
+        self.live.ask(question, self._show_tracks if preview else self._show_figures)
+
+    def _show_tracks(self, answer: dict[str, Any]) -> None:
+        if self.review is None or not self._show_figures(answer):
+            return
+        crs = self.review.layer.crs()
+        lines = QgsWkbTypes.GeometryType.LineGeometry
+        for name, sketch in self._bands.items():
+            sketch.reset(lines)
+            ends = [[QgsPointXY(x0, y0), QgsPointXY(x1, y1)] for x0, y0, x1, y1 in answer[name]]
+            if ends:
+                sketch.addGeometry(QgsGeometry.fromMultiPolylineXY(ends), crs)
+        if not self._hidden:
+            # The tracks in the file are those of before the edits.
+            root = QgsProject.instance().layerTreeRoot()
+            for name in ("tracks", "segments", "gaps", "track_points"):
+                layer = plan_files.layers_of(self.path).get(name)
+                node = None if layer is None else root.findLayer(layer.id())
+                if node is not None and node.isVisible():
+                    node.setItemVisibilityChecked(False)
+                    self._hidden.append(layer.id())
+
+    def _show_figures(self, answer: dict[str, Any]) -> bool:
+        if "error" in answer:
+            self._trouble(answer["error"]["message"])
+            return False
+        figures = answer["figures"]
+        self.figures.setText(
+            tr("{0} tracks in {1} segments, {2:.2f} km").format(
+                figures["tracks"], figures["segments"], figures["length_m"] / 1000
+            )
+        )
+        return True
+
+    def _clear_preview(self) -> None:
+        for sketch in self._bands.values():
+            sketch.reset(QgsWkbTypes.GeometryType.LineGeometry)
+        root = QgsProject.instance().layerTreeRoot()
+        for layer_id in self._hidden:
+            node = root.findLayer(layer_id)
+            if node is not None:
+                node.setItemVisibilityChecked(True)
+        self._hidden = []
+
+    def _saved(self) -> None:
+        # After the signal: QGIS is still at work on the layer while it is sent.
+        QTimer.singleShot(0, self._write)
+
+    def _write(self) -> None:
+        if self.review is None or self._released is not None:
+            return
+        field = plan_files.layers_of(self.path).get("field")
+        if field is not None and field.isEditable() and field.isModified():
+            self._trouble(tr("The outline has edits that are not saved: save them, too."))
+            return
+        self._timer.stop()
+        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._released = plan_files.Released(self.path)
+        self.live.ask({"do": "write", "file": self.path}, self._written)
+
+    def _written(self, answer: dict[str, Any]) -> None:
+        self._take_back()
+        if self._show_figures(answer):
+            self._clear_preview()
+        self.current = None
+        self.step(1)
+        self._tell()
+
+    def _take_back(self) -> None:
+        released, self._released = self._released, None
+        if released is not None:
+            released.back()
+            # The layer has another edit buffer and undo stack now.
+            self._connections = [each for each in self._connections if each[1] != self._edited]
+            layer = self.review.layer
+            self._connect(layer.undoStack().indexChanged, self._edited)
+            self._connect(layer.afterRollBack, self._edited)
+
+    # -- the map -----------------------------------------------------------------------------
+
+    def _go(self, feature_id: int) -> None:
+        self.current = feature_id
+        feature = self.review.layer.getFeature(feature_id)
+        box = feature.geometry().boundingBox()
+        turned = QgsCoordinateTransform(
+            self.review.layer.crs(),
+            self.canvas.mapSettings().destinationCrs(),
+            QgsProject.instance(),
+        )
+        box = turned.transformBoundingBox(box)
+        box.scale(_AROUND)
+        self.canvas.setExtent(box)
+        self.canvas.refresh()
+        self._show_mark()
+        self._tell()
+
+    def _show_mark(self) -> None:
+        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        if self.review is None or self.current is None:
+            return
+        feature = self.review.layer.getFeature(self.current)
+        if feature.isValid():
+            self._mark.addGeometry(QgsGeometry(feature.geometry()), self.review.layer.crs())
+
+    def _to_layer(self, point: QgsPointXY) -> QgsPointXY:
+        return QgsCoordinateTransform(
+            self.canvas.mapSettings().destinationCrs(),
+            self.review.layer.crs(),
+            QgsProject.instance(),
+        ).transform(point)
+
+    def _use(self, tool: Any) -> None:
+        self._before = self.canvas.mapTool()
+        self._tool = tool
+        self.canvas.setMapTool(tool)
+
+    def _drop_tool(self) -> None:
+        self.canvas.unsetMapTool(self._tool)
+        if self._before is not None:
+            self.canvas.setMapTool(self._before)
+
+    def _trouble(self, text: str) -> None:
+        if self._released is not None:
+            self._take_back()
+        self.iface.messageBar().pushWarning("geofield", text)
+
+
+def _hex(geometry: QgsGeometry) -> str:
+    """Well-known binary, for the engine; curves and measures are none of its business."""
+    return bytes(geometry.asWkb()).hex()

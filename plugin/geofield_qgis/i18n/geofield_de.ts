@@ -1,0 +1,1077 @@
+<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE TS>
+<TS version="2.1" language="de" sourcelanguage="en">
+  <context>
+    <name>geofield</name>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Show the layers in the map</source>
+      <translation>Die Layer in der Karte zeigen</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Picture</source>
+      <translation>Bild</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Another picture: a file, a folder, a tile address or a source's name</source>
+      <translation>Ein anderes Bild: Datei, Ordner, Kacheladresse oder Name einer Quelle</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Own parcels: the one with the point is the field</source>
+      <translation>Eigene Schläge: der mit dem Punkt ist das Feld</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Plan: a layer of its GeoPackage</source>
+      <translation>Plan: ein Layer seines GeoPackage</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Choose a picture.</source>
+      <translation>Wählen Sie ein Bild.</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Choose a layer of a plan.</source>
+      <translation>Wählen Sie einen Layer eines Plans.</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
+      <source>Plan (GeoPackage)</source>
+      <translation>Plan (GeoPackage)</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Plan a field</source>
+      <translation>Ein Feld planen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Stage by stage</source>
+      <translation>Schritt für Schritt</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Files and checks</source>
+      <translation>Dateien und Prüfungen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Find the outline</source>
+      <translation>Umriss finden</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Find the obstacles</source>
+      <translation>Hindernisse finden</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Plan the tracks</source>
+      <translation>Fahrspuren planen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Plan tracks and route</source>
+      <translation>Fahrspuren und Fahrweg planen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Get imagery</source>
+      <translation>Luftbild holen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Export for terminals</source>
+      <translation>Export für Terminals</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Import boundaries</source>
+      <translation>Feldgrenzen einlesen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Check products</source>
+      <translation>Ergebnisse prüfen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Compare with a truth</source>
+      <translation>Mit der Wahrheit vergleichen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>A point in the field</source>
+      <translation>Ein Punkt im Feld</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Centre</source>
+      <translation>Mitte</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Plan</source>
+      <translation>Plan</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Folder for the products</source>
+      <translation>Ordner für die Ergebnisse</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Fields</source>
+      <translation>Felder</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Obstacles to avoid: polygons, points with radius_m, lines</source>
+      <translation>Zu meidende Hindernisse: Flächen, Punkte mit radius_m, Linien</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Folder for the plans</source>
+      <translation>Ordner für die Pläne</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Fields planned</source>
+      <translation>Geplante Felder</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Length of all segments, metres</source>
+      <translation>Länge aller Abschnitte, Meter</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Or an extent</source>
+      <translation>Oder ein Ausschnitt</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Files</source>
+      <translation>Dateien</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Errors</source>
+      <translation>Fehler</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Warnings</source>
+      <translation>Warnungen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Findings</source>
+      <translation>Befunde</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>No fault found.</source>
+      <translation>Kein Fehler gefunden.</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Detected obstacles</source>
+      <translation>Gefundene Hindernisse</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Truth</source>
+      <translation>Wahrheit</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Picture to draw on</source>
+      <translation>Bild als Untergrund</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Drawing of hits and misses</source>
+      <translation>Zeichnung der Treffer und Fehler</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Give a centre or an extent.</source>
+      <translation>Geben Sie eine Mitte oder einen Ausschnitt an.</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>The engine gave no answer.</source>
+      <translation>Das Rechenprogramm gab keine Antwort.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Review of a field</source>
+      <translation>Durchsicht eines Feldes</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>{0} confirmed</source>
+      <translation>{0} bestätigt</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>{0} rejected</source>
+      <translation>{0} verworfen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>{0} added</source>
+      <translation>{0} ergänzt</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>There is no plan in this project: plan a field first.</source>
+      <translation>In diesem Projekt ist kein Plan: planen Sie zuerst ein Feld.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Review the plan of the active layer</source>
+      <translation>Plan des aktiven Layers durchsehen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Previous</source>
+      <translation>Zurück</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Next</source>
+      <translation>Weiter</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Confirm</source>
+      <translation>Bestätigen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Reject</source>
+      <translation>Verwerfen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Smaller</source>
+      <translation>Kleiner</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Larger</source>
+      <translation>Größer</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Move: click its middle</source>
+      <translation>Versetzen: Mitte anklicken</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Draw: drag a circle</source>
+      <translation>Zeichnen: Kreis aufziehen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Undo</source>
+      <translation>Rückgängig</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Save and plan again</source>
+      <translation>Speichern, neu planen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Choose a layer of a plan, then press the button.</source>
+      <translation>Wählen Sie einen Layer eines Plans und drücken Sie den Knopf.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>This obstacle is not round: use QGIS's vertex tool.</source>
+      <translation>Dieses Hindernis ist nicht rund: nehmen Sie das Stützpunktwerkzeug von QGIS.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>The outline has edits that are not saved: save them, too.</source>
+      <translation>Der Umriss hat Änderungen, die nicht gespeichert sind: speichern Sie auch diese.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>{0} left to look at</source>
+      <translation>{0} noch anzusehen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>Obstacle {0}</source>
+      <translation>Hindernis {0}</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>new</source>
+      <translation>neu</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>, outline {0:.0%} certain</source>
+      <translation>, Umriss zu {0:.0%} sicher</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>{0} tracks in {1} segments, {2:.2f} km</source>
+      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>radius {0:.2f} m</source>
+      <translation>Radius {0:.2f} m</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
+      <source>confidence {0:.0%}</source>
+      <translation>Sicherheit {0:.0%}</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>geofield's engine is not there: install it or name it under Plugins &gt; geofield &gt; Engine...</source>
+      <translation>Das Rechenprogramm von geofield fehlt: installieren oder benennen Sie es unter Erweiterungen &gt; geofield &gt; Rechenprogramm...</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>Stopped; nothing half-written is left.</source>
+      <translation>Angehalten; nichts halb Geschriebenes bleibt zurück.</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>The engine {command} is version {found}, but this plugin belongs to {wanted}: update it under Plugins &gt; geofield &gt; Engine...</source>
+      <translation>Das Rechenprogramm {command} hat Version {found}, die Erweiterung gehört zu {wanted}: aktualisieren Sie es unter Erweiterungen &gt; geofield &gt; Rechenprogramm...</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>The engine does not start: {0}</source>
+      <translation>Das Rechenprogramm startet nicht: {0}</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>The engine ended unexpectedly (code {0}).</source>
+      <translation>Das Rechenprogramm endete unerwartet (Code {0}).</translation>
+    </message>
+    <message>
+      <location filename="engine.py" />
+      <source>The engine {command} does not start: repair it under Plugins &gt; geofield &gt; Engine...</source>
+      <translation>Das Rechenprogramm {command} startet nicht: richten Sie es unter Erweiterungen &gt; geofield &gt; Rechenprogramm...</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>geofield's engine</source>
+      <translation>Rechenprogramm von geofield</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Engine</source>
+      <translation>Rechenprogramm</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>The geofield command</source>
+      <translation>Der Befehl geofield</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Install or update</source>
+      <translation>Installieren oder erneuern</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Install from a file...</source>
+      <translation>Aus einer Datei installieren...</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Use another command...</source>
+      <translation>Anderen Befehl benutzen...</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Find it by itself</source>
+      <translation>Selbst suchen</translation>
+    </message>
+    <message>
+      <location filename="engine_dialog.py" />
+      <source>Ready: {0}, version {1}</source>
+      <translation>Bereit: {0}, Version {1}</translation>
+    </message>
+    <message>
+      <location filename="install.py" />
+      <source>The engine will be fetched from the Python package index (about {0} MB) and put into {2} ({1} MB there). The Python of QGIS is not touched, and removing that folder removes everything.</source>
+      <translation>Das Rechenprogramm wird vom Python-Paketverzeichnis geholt (etwa {0} MB) und in {2} abgelegt (dort {1} MB). Das Python von QGIS bleibt unberührt; wer den Ordner löscht, hat alles entfernt.</translation>
+    </message>
+    <message>
+      <location filename="install.py" />
+      <source>This copy of the plugin carries no list of requirements.</source>
+      <translation>Diese Kopie der Erweiterung enthält keine Paketliste.</translation>
+    </message>
+    <message>
+      <location filename="install.py" />
+      <source>No Python of version 3.11 or newer was found: install one from python.org.</source>
+      <translation>Es wurde kein Python ab Version 3.11 gefunden: installieren Sie eines von python.org.</translation>
+    </message>
+    <message>
+      <location filename="install.py" />
+      <source>It ended unexpectedly.</source>
+      <translation>Es endete unerwartet.</translation>
+    </message>
+    <message>
+      <location filename="jobs.py" />
+      <source>The engine ended unexpectedly; the next edit starts it again.</source>
+      <translation>Das Rechenprogramm endete unerwartet; die nächste Änderung startet es wieder.</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>Finding the outline...</source>
+      <translation>Der Umriss wird gesucht...</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>Finding the obstacles...</source>
+      <translation>Hindernisse werden gesucht...</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>Planning the tracks...</source>
+      <translation>Fahrspuren werden geplant...</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>Stop</source>
+      <translation>Anhalten</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>There is no picture here: add a raster layer of the place first.</source>
+      <translation>Hier ist kein Bild: laden Sie zuerst einen Rasterlayer der Gegend.</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>This engine has no points to include or exclude.</source>
+      <translation>Dieses Rechenprogramm kennt keine Punkte, die dazugehören oder nicht.</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
+      <source>{0} tracks, {1:.1f} km. Shift+click adds ground, Alt+click takes it away.</source>
+      <translation>{0} Spuren, {1:.1f} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
+    </message>
+    <message>
+      <location filename="review.py" />
+      <source>Move obstacle</source>
+      <translation>Hindernis versetzen</translation>
+    </message>
+    <message>
+      <location filename="review.py" />
+      <source>Radius of obstacle</source>
+      <translation>Radius des Hindernisses</translation>
+    </message>
+    <message>
+      <location filename="review.py" />
+      <source>Draw obstacle</source>
+      <translation>Hindernis zeichnen</translation>
+    </message>
+    <message>
+      <location filename="review.py" />
+      <source>Status {0}</source>
+      <translation>Status {0}</translation>
+    </message>
+    <message>
+      <location filename="sources.py" />
+      <source>The layer {0} has edits that are not saved: save them first.</source>
+      <translation>Der Layer {0} hat Änderungen, die nicht gespeichert sind: speichern Sie zuerst.</translation>
+    </message>
+    <message>
+      <location filename="sources.py" />
+      <source>{0} has no features to work on.</source>
+      <translation>{0} hat keine Objekte.</translation>
+    </message>
+    <message>
+      <location filename="window.py" />
+      <source>Plan the field here</source>
+      <translation>Das Feld hier planen</translation>
+    </message>
+    <message>
+      <location filename="window.py" />
+      <source>Click in a field. Shift+click adds ground, Alt+click takes it away.</source>
+      <translation>Klicken Sie in ein Feld. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
+    </message>
+    <message>
+      <location filename="window.py" />
+      <source>Review obstacles</source>
+      <translation>Hindernisse durchsehen</translation>
+    </message>
+    <message>
+      <location filename="window.py" />
+      <source>Engine...</source>
+      <translation>Rechenprogramm...</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Side of the window read around the point, metres; all of a small picture.</source>
+      <translation>Seite des Ausschnitts um den Punkt, Meter; kleine Bilder ganz.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>What the picture's bands show, in order: red, green, blue, nir, grey, other.</source>
+      <translation>Was die Kanäle des Bildes zeigen, der Reihe nach: red, green, blue, nir, grey, other.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>CRS of a picture that does not say its own, e.g. EPSG:32633.</source>
+      <translation>KBS eines Bildes, das seines nicht nennt, z. B. EPSG:32633.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How the outline is found: auto (colour, near infrared, edges) or study (brightness threshold).</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>What becomes of crowns, huts and ponds inside: fill (the way of auto) or keep as holes (the way of study).</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Holes below this size are filled, square metres.</source>
+      <translation>Löcher unter dieser Größe werden gefüllt, Quadratmeter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How far the straightened outline may leave the pixels; 0 keeps them all.</source>
+      <translation>Wie weit der begradigte Umriss von den Pixeln abweichen darf; 0 behält alle.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Smoothing of the picture first; diffusion is anisotropic.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How obstacles are found: auto, or a way of the study.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Smallest and largest crown radius, metres; 1 to 15 with auto, 2 to 9 with the study's strategies by default.</source>
+      <translation>Kleinster und größter Kronenradius, Meter; sonst 1 bis 15 mit auto, 2 bis 9 mit den Verfahren der Studie.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Safety margin around each obstacle, metres.</source>
+      <translation>Sicherheitsabstand um jedes Hindernis, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>auto: what driving into a thing costs, against a look at one place of the map; it decides what is detected, and what only possible.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>auto: drive around what is only possible, too.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>auto: confidence from which a thing is driven around, instead of the cost.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>auto: crowns darker or brighter than what is around them.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>auto: find what is not round, too: ponds, huts, clumps.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The study's strategies: edge method.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>single: edge threshold.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The study's strategies: circle transform.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The study's strategies: of the circle transform.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Drop discs brighter than 127.37 (absolute) or than the field (relative).</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Distance between tracks, metres.</source>
+      <translation>Abstand der Fahrspuren, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Distance between track points, metres.</source>
+      <translation>Abstand der Spurpunkte, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of the tracks: dominant (the way most of the border runs), longest_edge, hough, fewest, fewest_turns, or a heading in degrees clockwise from true north.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>A-B line to follow: longitude and latitude of A, then of B.</source>
+      <translation>A-B-Linie: Länge und Breite von A, dann von B.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Longitude and latitude of a place that a track passes through.</source>
+      <translation>Ein Ort, durch den eine Spur geht.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of the first track from its edge, metres; half the spacing by default.</source>
+      <translation>Abstand der ersten Spur vom Rand, Meter; sonst der halbe Spurabstand.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The rest at the far side: overrun the border, leave it, shift the last track back, or spread all tracks evenly.</source>
+      <translation>Der Rest am anderen Rand: überfahren, lassen, letzte Spur zurücksetzen oder alle gleich verteilen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Width of the headland along the border, metres.</source>
+      <translation>Breite des Vorgewendes, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>A headland around the field's holes too.</source>
+      <translation>Vorgewende auch um Löcher im Feld.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Shorter segments are not driven, metres.</source>
+      <translation>Kürzere Abschnitte werden nicht gefahren, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Distance to keep from obstacles, on top of their margin, metres.</source>
+      <translation>Abstand zu Hindernissen über deren Rand hinaus, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How far the vertices of a straight edge may stray, metres.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Order of work, with the ways between segments.</source>
+      <translation>Reihenfolge der Arbeit mit den Wegen dazwischen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Tracks left out at each turn of the route skip.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of the machine, metres: turns become curves.</source>
+      <translation>Wenderadius der Maschine, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Turns forwards only, or with reversing.</source>
+      <translation>Wenden nur vorwärts oder mit Zurücksetzen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How far turns may reach beyond the border, metres.</source>
+      <translation>Wie weit Wenden über den Rand reichen dürfen, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Longitude and latitude of the place where the route begins.</source>
+      <translation>Ort, an dem der Fahrweg beginnt.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Formats of the products.</source>
+      <translation>Formate der Ergebnisse.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Track points in linked data, too: most of its bytes.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Tiles fetched at once.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder of the tile caches; the user's cache folder by default.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Tiles kept per source at most, megabytes.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Tiles are fetched anew after, days.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder or address that a VRT, tile index, STAC file, capabilities document or redirect may lead to; repeat for several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Keys by source name; GEOFIELD_KEY_NAME in the environment wins.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Sources of your own, by name: [fetch.sources.NAME] in the settings file.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Latitude of a point in the field.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Longitude of a point in the field.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder for the products; made when it does not exist.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace earlier products there; reviewed obstacles and a moved outline are kept.</source>
+      <translation>Frühere Ergebnisse dort ersetzen; Durchgesehenes und ein verschobener Umriss bleiben.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>With --overwrite: forget what a person edited there.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>You have permission to derive geodata, though the source's terms forbid it.</source>
+      <translation>Sie haben die Erlaubnis, Geodaten abzuleiten, obwohl die Bedingungen der Quelle es verbieten.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print the report as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Your own parcels (any vector file, any CRS): the one with the point is taken.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Layer of --boundary, where it has several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Take the parcel of this name or id instead.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>TOML file with a table per stage; geofield.toml here is read by itself.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>GeoPackage to write; an outline that a person drew in it is kept.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace the output where it exists.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Show the study's numbered regions instead of extracting; draws them with --pictures.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Take this numbered region of the study's method; repeat to join several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder for the study's pictures: grey, binary, numbered regions, reconstruction.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print what was found as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>GeoPackage to write; may be the one that was read.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace another file than the one that was read.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>GeoPackage to write, may be FILE; for several fields a folder, one file each.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>File of what to avoid: polygons, points with a radius_m, lines.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>CRS of files that do not say theirs, e.g. EPSG:32633.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace files that are there already.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print the figures as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Latitude of the centre.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Longitude of the centre.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Vector file whose extent is fetched, instead of a square around a point.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Zoom of tiled sources: a number, max, or fit (the largest at which --size-m or --area fits 640 px); by default as --resolution needs.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Wanted metres per pixel on the ground, when no zoom is given.</source>
+      <translation>Gewünschte Meter je Pixel am Boden, wenn kein Zoom angegeben ist.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Side of the square, pixels.  [default: 640]</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Side of the square, metres on the ground.</source>
+      <translation>Seite des Quadrats, Meter am Boden.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Keep the touched tiles whole.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Layer of a WMS or WMTS.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>What to do about tiles that cannot be had: stop, or leave no-data.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Work from the tile cache alone.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Neither read nor keep tiles.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder of the tile caches.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The GeoTIFF (COG) to write.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace an existing file.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print what was made as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Format; may be repeated.</source>
+      <translation>Formate.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder for the products.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Name of single files.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>CRS of PLAN where the file does not say it, e.g. EPSG:32633.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Customer's name, for terminals.</source>
+      <translation>Name des Kunden, für Terminals.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Farm's name, for terminals.</source>
+      <translation>Name des Betriebs, für Terminals.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Names and columns of Shapefiles.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Shapefiles or ISOXML in one archive.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Track points: by default in the GeoPackage and the study's files, not in other RDF.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Further option of a format.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace products that are there already.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print the files as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>GeoPackage to write.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The field's name.</source>
+      <translation>Name des Feldes.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Replace a file that is there already.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Print the findings as JSON on stdout.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Distance between centres within which a detection is a hit, metres.</source>
+      <translation>Abstand der Mitten, bis zu dem ein Fund ein Treffer ist, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Layer of DETECTED.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Layer of TRUTH; its first one when not given.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Also what a driver loses: DETECTED is a plan with its field and tracks.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of the bootstrap.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>PNG to write: hits, misses and false detections.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Picture to draw them on.</source>
+      <translation type="unfinished" />
+    </message>
+  </context>
+</TS>

@@ -1,0 +1,248 @@
+"""Plan the field here: a click, and outline, obstacles and tracks come up one after the other."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsCsException,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProject,
+    QgsRasterLayer,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+from qgis.PyQt.QtCore import QObject, QSettings, QStandardPaths, pyqtSignal
+from qgis.PyQt.QtWidgets import QProgressBar, QPushButton
+
+from . import description, engine, plan_files, results, sources
+from .jobs import Job
+from .map_tools import band
+from .words import tr
+
+LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
+#: Distance between the tracks that a click plans, metres; the last one that was chosen.
+SPACING = "geofield/spacing_m"
+
+
+class Planner(QObject):
+    """One field being planned from clicks on the map.
+
+    The stages run one after the other in the engine; what is known already is sketched on the
+    map. A further click with Shift says that more ground belongs to the field, with Alt that
+    some does not: the outline is then found anew, and all after it.
+    """
+
+    finished = pyqtSignal(str)
+
+    def __init__(self, iface: Any) -> None:
+        super().__init__(iface.mainWindow())
+        self.iface = iface
+        canvas = iface.mapCanvas()
+        self._sketch = {
+            "field": band(canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#ffd54f", 3),
+            "obstacles": band(canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#ff7043"),
+        }
+        self._points = band(canvas, QgsWkbTypes.GeometryType.PointGeometry, "#00c853", 6)
+        self._job: Job | None = None
+        self._item: Any = None
+        self._bar: QProgressBar | None = None
+        self._target: Path | None = None
+        self._here: QgsPointXY | None = None
+        self._ground: dict[str, list[QgsPointXY]] = {"include": [], "exclude": []}
+        self._begun_s = 0.0
+        #: Seconds from the click to the sketch of the outline, of the last field.
+        self.outline_s: float | None = None
+
+    def click(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
+        """A click on the map, in its CRS."""
+        if (shift or alt) and self._here is not None:
+            if "field.include" not in description.settings():
+                self._say(tr("This engine has no points to include or exclude."))
+                return
+            self._ground["exclude" if alt else "include"].append(point)
+        else:
+            self._here, self._target = point, None
+            self._ground = {"include": [], "exclude": []}
+            self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
+        self._points.addPoint(point)
+        self.stop()
+        self._begin()
+
+    def stop(self) -> None:
+        """End what runs; what was planned before stays."""
+        if self._job is not None:
+            self._job.stop()
+            self._job = None
+        self._clear_message()
+
+    def clear(self) -> None:
+        """Stop, and take the sketches off the map."""
+        self.stop()
+        for each in self._sketch.values():
+            each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
+        self._here = None
+
+    def remove(self) -> None:
+        """Leave nothing on the map."""
+        self.clear()
+        scene = self.iface.mapCanvas().scene()
+        for each in (*self._sketch.values(), self._points):
+            scene.removeItem(each)
+
+    # -- the stages --------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        picture = self._picture()
+        if picture is None:
+            self._say(tr("There is no picture here: add a raster layer of the place first."))
+            return
+        try:
+            self._imagery, self._environment = sources.imagery(picture)
+            engine.require_engine()
+        except engine.EngineError as error:
+            self._say(str(error))
+            return
+        if self._target is None:
+            self._target = _folder() / time.strftime("field_%Y%m%d_%H%M%S.gpkg")
+        for each in self._sketch.values():
+            each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._begun_s = time.monotonic()
+        self._show_progress()
+        self._forget_layers()
+        lonlat = self._lonlat(self._here)
+        words = ["--lat", f"{lonlat.y():.9f}", "--lon", f"{lonlat.x():.9f}"]
+        for name, points in self._ground.items():
+            for point in points:
+                lonlat = self._lonlat(point)
+                words += [f"--{name}-lonlat", f"{lonlat.x():.9f},{lonlat.y():.9f}"]
+        words += ["-o", str(self._target), "--overwrite", "--fresh", "--json"]
+        self._run("field", ["field", self._imagery, *words])
+
+    def _run(self, stage: str, words: list[str]) -> None:
+        titles = {
+            "field": tr("Finding the outline..."),
+            "obstacles": tr("Finding the obstacles..."),
+            "tracks": tr("Planning the tracks..."),
+        }
+        self._clear_message()
+        self._show_progress(titles[stage])
+        try:
+            job = Job(words, self._environment, self)
+        except engine.EngineError as error:
+            self._fail(str(error))
+            return
+        job.progressed.connect(self._progress)
+        job.failed.connect(self._fail)
+        job.done.connect(lambda result: self._done(stage, result))
+        self._job = job
+
+    def _done(self, stage: str, result: engine.Result) -> None:
+        target = str(self._target)
+        if stage == "field":
+            self._draw("field")
+            self.outline_s = time.monotonic() - self._begun_s
+            self._run("obstacles", ["obstacles", self._imagery, target, "-o", target])
+        elif stage == "obstacles":
+            self._draw("obstacles")
+            spacing_m = float(QSettings().value(SPACING, 4.0))
+            self._run(
+                "tracks", ["tracks", target, "-o", target, "--spacing", f"{spacing_m:g}", "--json"]
+            )
+        else:
+            self._job = None
+            self._clear_message()
+            results.show(target)
+            for each in self._sketch.values():
+                each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+            (row,) = result.data["fields"]
+            self._say(
+                tr(
+                    "{0} tracks, {1:.1f} km. Shift+click adds ground, Alt+click takes it away."
+                ).format(row["track_count"], row["length_m"] / 1000),
+                good=True,
+            )
+            self.finished.emit(target)
+
+    def _draw(self, name: str) -> None:
+        """Sketch a layer of the file as it is now, and let go of the file."""
+        layer = QgsVectorLayer(f"{self._target}|layername={name}", name, "ogr")
+        sketch = self._sketch[name]
+        sketch.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        for feature in layer.getFeatures():
+            sketch.addGeometry(QgsGeometry(feature.geometry()), layer.crs())
+
+    def _forget_layers(self) -> None:
+        """Layers of the same plan, planned anew now, leave the project."""
+        for layer in plan_files.layers_of(str(self._target)).values():
+            QgsProject.instance().removeMapLayer(layer.id())
+
+    def _picture(self) -> QgsRasterLayer | None:
+        """The picture at the place: the active layer, or the topmost one that shows it."""
+        canvas = self.iface.mapCanvas()
+        for layer in [self.iface.activeLayer(), *canvas.layers()]:
+            if not isinstance(layer, QgsRasterLayer) or not layer.isValid():
+                continue
+            crs = canvas.mapSettings().destinationCrs()
+            turned = QgsCoordinateTransform(crs, layer.crs(), QgsProject.instance())
+            try:
+                if layer.extent().contains(turned.transform(self._here)):
+                    return layer
+            except QgsCsException:
+                continue
+        return None
+
+    def _lonlat(self, point: QgsPointXY) -> QgsPointXY:
+        crs = self.iface.mapCanvas().mapSettings().destinationCrs()
+        return QgsCoordinateTransform(crs, LONLAT, QgsProject.instance()).transform(point)
+
+    # -- what the person sees ----------------------------------------------------------------
+
+    def _show_progress(self, title: str = "") -> None:
+        if self._item is not None or not title:
+            return
+        messages = self.iface.messageBar()
+        self._item = messages.createMessage("geofield", title)
+        self._bar = QProgressBar()
+        self._bar.setRange(0, 0)
+        self._bar.setMaximumWidth(160)
+        button = QPushButton(tr("Stop"))
+        button.clicked.connect(self.clear)
+        self._item.layout().addWidget(self._bar)
+        self._item.layout().addWidget(button)
+        messages.pushWidget(self._item)
+
+    def _progress(self, done: int, total: int, what: str) -> None:
+        if self._bar is not None and total > 1:
+            self._bar.setRange(0, total)
+            self._bar.setValue(done)
+
+    def _clear_message(self) -> None:
+        item, self._item, self._bar = self._item, None, None
+        if item is not None:
+            self.iface.messageBar().popWidget(item)
+
+    def _fail(self, why: str) -> None:
+        self._job = None
+        self._clear_message()
+        self._say(why)
+
+    def _say(self, text: str, *, good: bool = False) -> None:
+        bar = self.iface.messageBar()
+        (bar.pushSuccess if good else bar.pushWarning)("geofield", text)
+
+
+def _folder() -> Path:
+    """Where clicked plans go: beside the project, or among the person's documents."""
+    home = QgsProject.instance().homePath() or QStandardPaths.writableLocation(
+        QStandardPaths.StandardLocation.DocumentsLocation
+    )
+    folder = Path(home) / "geofield"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

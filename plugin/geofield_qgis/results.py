@@ -1,0 +1,149 @@
+"""Products in the project: styled, in their group, in the order of the plan's own QGIS project."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from qgis.core import (
+    QgsLayerTreeGroup,
+    QgsMapLayer,
+    QgsProcessingContext,
+    QgsProcessingLayerPostProcessorInterface,
+    QgsProject,
+    QgsRasterLayer,
+    QgsVectorLayer,
+)
+from qgis.PyQt.QtXml import QDomDocument
+
+#: Kept alive until QGIS has shown the layers: it holds no reference of its own.
+_WAITING: list[Placing] = []
+
+
+class Entry:
+    """A layer of a plan as its own project shows it."""
+
+    def __init__(self, name: str, source: str, is_raster: bool, shown: bool) -> None:
+        self.name, self.source, self.is_raster, self.shown = name, source, is_raster, shown
+
+    def open(self) -> QgsMapLayer:
+        """The layer, with the style that lies in its file."""
+        if self.is_raster:
+            return QgsRasterLayer(self.source, self.name)
+        return QgsVectorLayer(self.source, self.name, "ogr")
+
+
+def entries(plan: str | Path) -> tuple[str, list[Entry]]:
+    """The name of a plan and its layers from top to bottom, as its QGIS project lists them."""
+    plan = Path(plan)
+    project = plan.with_suffix(".qgz")
+    if not project.is_file():
+        return plan.stem, []
+    with zipfile.ZipFile(project) as archive:
+        text = archive.read(next(n for n in archive.namelist() if n.endswith(".qgs")))
+    document = QDomDocument()
+    document.setContent(text.decode("utf-8"))
+    nodes = document.elementsByTagName("layer-tree-layer")
+    found = []
+    for number in range(nodes.count()):
+        node = nodes.at(number).toElement()
+        path, bar, rest = node.attribute("source").partition("|")
+        file = (plan.parent / path).resolve()
+        if file.is_file():
+            found.append(
+                Entry(
+                    node.attribute("name"),
+                    f"{file}{bar}{rest}",
+                    node.attribute("providerKey") == "gdal",
+                    node.attribute("checked") == "Qt::Checked",
+                )
+            )
+    title = document.elementsByTagName("title").at(0).toElement().text()
+    return title or plan.stem, found
+
+
+class Placing(QgsProcessingLayerPostProcessorInterface):
+    """Puts a layer that Processing loaded into the group of its plan, at its place."""
+
+    def __init__(self, group: str, place: int, shown: bool) -> None:
+        super().__init__()
+        self.group, self.place, self.shown = group, place, shown
+
+    def postProcessLayer(
+        self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: Any
+    ) -> None:
+        """Move the layer, which QGIS has put at the top of its tree."""
+        if isinstance(layer, QgsVectorLayer):
+            # Processing loads layers bare; the style lies in the file.
+            layer.loadDefaultStyle()
+        project = context.project() or QgsProject.instance()
+        place_layer(project, layer, self.group, self.place, self.shown)
+
+
+def place_layer(
+    project: QgsProject, layer: QgsMapLayer, group_name: str, place: int, shown: bool
+) -> None:
+    """Put a layer into a group; a lower place is nearer to the top."""
+    root = project.layerTreeRoot()
+    group = root.findGroup(group_name) or root.insertGroup(0, group_name)
+    layer.setCustomProperty("geofield/place", place)
+    old = root.findLayer(layer.id())
+    index = sum(
+        1
+        for node in group.findLayers()
+        if node.layer() is not None
+        and int(node.layer().customProperty("geofield/place", 99)) <= place
+        and node.layerId() != layer.id()
+    )
+    node = group.insertLayer(index, layer)
+    node.setItemVisibilityChecked(shown)
+    node.setExpanded(False)
+    if old is not None:
+        (old.parent() or root).removeChildNode(old)
+
+
+def load_on_completion(plan: str | Path, context: QgsProcessingContext) -> None:
+    """Have Processing load the layers of a plan when the algorithm has ended."""
+    group, found = entries(plan)
+    project = context.project()
+    if project is None:
+        return
+    for place, entry in reversed(list(enumerate(found))):
+        details = QgsProcessingContext.LayerDetails(entry.name, project, entry.name)
+        placing = Placing(group, place, entry.shown)
+        _WAITING.append(placing)
+        del _WAITING[:-200]
+        details.setPostProcessor(placing)
+        context.addLayerToLoadOnCompletion(entry.source, details)
+
+
+def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMapLayer]:
+    """Load the layers of a plan at once; those that are there already are read again.
+
+    Returns
+    -------
+    dict
+        The layers by their names in the file (`field`, `obstacles`, ...).
+    """
+    project = project or QgsProject.instance()
+    group_name, found = entries(plan)
+    shown: dict[str, QgsMapLayer] = {}
+    known = {layer.source(): layer for layer in project.mapLayers().values()}
+    for place, entry in enumerate(found):
+        layer = known.get(entry.source)
+        if layer is None:
+            layer = entry.open()
+            project.addMapLayer(layer, False)
+            place_layer(project, layer, group_name, place, entry.shown)
+        else:
+            layer.reload()
+        _, _, name = entry.source.rpartition("layername=")
+        shown["scene" if entry.is_raster else name] = layer
+    return shown
+
+
+def group_of(project: QgsProject, layer: QgsMapLayer) -> QgsLayerTreeGroup | None:
+    """The group that a layer stands in."""
+    node = project.layerTreeRoot().findLayer(layer.id())
+    return node.parent() if node is not None else None

@@ -1,0 +1,117 @@
+"""Layers of the project as what the command reads: files, and addresses with their terms."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, unquote
+
+from qgis.core import (
+    QgsDataSourceUri,
+    QgsFeatureRequest,
+    QgsMapLayer,
+    QgsProcessingFeatureSource,
+    QgsProviderRegistry,
+    QgsRasterLayer,
+    QgsVectorFileWriter,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+
+from .engine import EngineError
+from .words import tr
+
+#: Name under which the address of a layer is told to the command.
+LAYER_SOURCE = "qgis_layer"
+
+
+def imagery(layer: QgsRasterLayer) -> tuple[str, dict[str, str]]:
+    """What names the picture on the command line, and the variables that go with it.
+
+    A WMS, WMTS or XYZ layer is told by its address with what the layer says of its rights; what
+    its terms allow is not known, so deriving needs the person's own word.
+    """
+    if layer.providerType() != "wms":
+        source = layer.source().split("|", 1)[0]
+        decoded = QgsProviderRegistry.instance().decodeUri(layer.providerType(), source)
+        return str(decoded.get("path") or source), {}
+    uri = QgsDataSourceUri()
+    uri.setEncodedUri(layer.source())
+    given = parse_qs(layer.source())
+    kind = "xyz" if uri.param("type") == "xyz" else "wms"
+    if uri.param("tileMatrixSet"):
+        kind = "wmts"
+    source = {
+        "url": unquote(uri.param("url")),
+        "kind": kind,
+        "attribution": layer.attribution() or "; ".join(layer.metadata().rights()),
+        "licence": "; ".join(layer.metadata().licenses()),
+        "layer": uri.param("layers"),
+    }
+    for name in ("zmin", "zmax"):
+        if given.get(name):
+            source["min_zoom" if name == "zmin" else "max_zoom"] = int(given[name][0])
+    sources = json.dumps({LAYER_SOURCE: source})
+    return LAYER_SOURCE, {"GEOFIELD_FETCH__SOURCES": sources}
+
+
+def refuse_unsaved(layer: QgsMapLayer | None) -> None:
+    """Refuse a layer whose edits lie in no file yet: the command would not see them."""
+    if isinstance(layer, QgsVectorLayer) and layer.isEditable() and layer.isModified():
+        raise EngineError(
+            tr("The layer {0} has edits that are not saved: save them first.").format(layer.name())
+        )
+
+
+def plan_file(layer: QgsMapLayer | None) -> str | None:
+    """The GeoPackage of geofield that a layer belongs to; None for any other layer."""
+    if not isinstance(layer, QgsVectorLayer) or layer.providerType() != "ogr":
+        return None
+    decoded = QgsProviderRegistry.instance().decodeUri("ogr", layer.source())
+    path = str(decoded.get("path") or "")
+    if not path.lower().endswith(".gpkg") or decoded.get("layerName") != "field":
+        return None
+    details = QgsProviderRegistry.instance().querySublayers(path)
+    own = {"field", "obstacles"} <= {each.name() for each in details}
+    whole = not layer.subsetString() and layer.selectedFeatureCount() == 0
+    return path if own and whole and layer.fields().indexOf("field_id") >= 0 else None
+
+
+def written(
+    source: QgsProcessingFeatureSource, folder: str | Path, name: str, context: Any, feedback: Any
+) -> str:
+    """The features of a source as a file: what is filtered, selected or in memory only."""
+    path = Path(folder) / f"{name}.gpkg"
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    options.driverName, options.layerName = "GPKG", name
+    fields = source.fields()
+    if fields.indexOf("fid") >= 0:
+        # The file numbers its rows itself; two sources joined may have the same number.
+        fields.remove(fields.indexOf("fid"))
+    kept = [source.fields().indexOf(each.name()) for each in fields]
+    writer = QgsVectorFileWriter.create(
+        str(path),
+        fields,
+        QgsWkbTypes.multiType(source.wkbType()),
+        source.sourceCrs(),
+        context.transformContext(),
+        options,
+    )
+    count = 0
+    for feature in source.getFeatures(QgsFeatureRequest()):
+        if feedback.isCanceled():
+            break
+        values = feature.attributes()
+        geometry = feature.geometry()
+        geometry.convertToMultiType()
+        feature.setFields(fields, True)
+        feature.setAttributes([values[each] for each in kept])
+        feature.setGeometry(geometry)
+        if not writer.addFeature(feature):
+            raise EngineError(writer.errorMessage())
+        count += 1
+    del writer  # closes the file
+    if not count:
+        raise EngineError(tr("{0} has no features to work on.").format(source.sourceName()))
+    return str(path)

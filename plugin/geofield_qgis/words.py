@@ -1,0 +1,55 @@
+"""Translation: one context for all words of the plugin, read from Qt's own .ts files.
+
+The files of translators are read as they are: nothing needs compiling, and the package carries
+no binaries.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qgis.PyQt.QtCore import QCoreApplication, QTranslator
+from qgis.PyQt.QtXml import QDomDocument
+
+CONTEXT = "geofield"
+FOLDER = Path(__file__).with_name("i18n")
+
+
+def tr(text: str) -> str:
+    """A text in the language of QGIS."""
+    return QCoreApplication.translate(CONTEXT, text)
+
+
+class Words(QTranslator):
+    """The words of one language.
+
+    Parameters
+    ----------
+    language : str
+        Two letters, such as ``de``.
+    """
+
+    def __init__(self, language: str) -> None:
+        super().__init__()
+        self.words: dict[str, str] = {}
+        file = FOLDER / f"geofield_{language}.ts"
+        if not file.is_file():
+            return
+        document = QDomDocument()
+        document.setContent(file.read_text(encoding="utf-8"))
+        nodes = document.elementsByTagName("message")
+        for number in range(nodes.count()):
+            node = nodes.at(number)
+            target = node.firstChildElement("translation")
+            if target.attribute("type") != "unfinished" and target.text():
+                self.words[node.firstChildElement("source").text()] = target.text()
+
+    def isEmpty(self) -> bool:
+        """Whether there is no translation at all."""
+        return not self.words
+
+    def translate(
+        self, context: str, text: str, disambiguation: str | None = None, number: int = -1
+    ) -> str:
+        """The translation of a text; nothing for what is not the plugin's."""
+        return self.words.get(text, "") if context == CONTEXT else ""

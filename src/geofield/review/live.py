@@ -1,0 +1,124 @@
+"""Tracks at once for another program: a question in a line of JSON, the answer in another.
+
+A geographic information system whose user edits a plan's layers asks for the tracks after each
+edit. Python and its libraries stay loaded between the questions, and the plan as it lies in its
+file is read once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shapely
+
+from geofield.errors import GeofieldError
+from geofield.review.session import Step, planned
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from geofield.plan import Plan
+
+
+class LivePlans:
+    """Answers questions about plans; keeps the one asked about last."""
+
+    def __init__(self) -> None:
+        self._key: tuple[Path, int] | None = None
+        self._plan: Plan | None = None
+
+    def answer(self, question: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to a question, plain JSON values; an error is an answer, too.
+
+        Parameters
+        ----------
+        question : mapping
+            ``do`` is ``plan`` (the tracks for ``obstacles`` and ``outline`` as they are in the
+            editor) or ``write`` (plan what lies in the file, and write it); ``file`` is the
+            GeoPackage. ``obstacles`` are rows with the layer's columns and ``wkb``; ``outline``
+            is the WKB of the field; both in the plan's metric CRS, hexadecimal.
+        """
+        try:
+            if question.get("do") not in ("plan", "write"):
+                raise GeofieldError(f"There is no question {question.get('do')!r}.")
+            path = Path(question["file"])
+            if question["do"] == "write":
+                return self._written(path)
+            return _told(planned(_edited(self._read(path), question), None))
+        except GeofieldError as error:
+            return {"error": {"message": error.message, "hint": error.hint or ""}}
+        except (KeyError, ValueError, TypeError, shapely.errors.GEOSException) as error:
+            return {"error": {"message": f"The question cannot be understood: {error}", "hint": ""}}
+
+    def _read(self, path: Path) -> Plan:
+        from geofield.plan import read_plan
+
+        try:
+            key = (path, path.stat().st_mtime_ns)
+        except OSError as error:
+            raise GeofieldError(f"{path} cannot be read: {error.strerror}.") from None
+        if self._plan is None or key != self._key:
+            self._plan, self._key = read_plan(path), key
+        return self._plan
+
+    def _written(self, path: Path) -> dict[str, Any]:
+        from geofield.plan_files import save_plan
+
+        step = planned(self._read(path), None)
+        save_plan(step.plan, path, read_from=path)
+        return _told(step)
+
+
+def _edited(plan: Plan, question: Mapping[str, Any]) -> Plan:
+    """The plan with the rows and the outline of an editor."""
+    if "obstacles" in question:
+        plan = replace(plan, obstacles=_obstacles(plan, question["obstacles"]))
+    if "outline" in question:
+        outline = shapely.from_wkb(question["outline"])
+        parts = shapely.get_parts(outline)
+        if len(parts) != 1 or not isinstance(parts[0], shapely.Polygon):
+            raise GeofieldError("The outline is not one polygon.")
+        if not shapely.equals_exact(parts[0], plan.field.polygon, tolerance=1e-9):
+            plan = replace(plan, field=replace(plan.field, polygon=parts[0]))
+    return plan
+
+
+def _obstacles(plan: Plan, rows: list[Mapping[str, Any]]) -> gpd.GeoDataFrame:
+    """The rows of the layer as the file would give them, had they been saved."""
+    import geopandas as gpd
+    import pandas as pd
+
+    from geofield import schema
+
+    names = [column.name for column in schema.OBSTACLES.columns]
+    columns = {name: [row.get(name) for row in rows] for name in names}
+    shapes = shapely.from_wkb([row["wkb"] for row in rows])
+    frame = gpd.GeoDataFrame(pd.DataFrame(columns), geometry=shapes, crs=plan.field.crs)
+    return schema.conform(schema.OBSTACLES, frame)
+
+
+def _told(step: Step) -> dict[str, Any]:
+    tracks = step.plan.tracks
+    if tracks is None:
+        raise GeofieldError("There are no tracks.")
+    return {
+        "segments": _lines(tracks.segments),
+        "gaps": _lines(tracks.gaps),
+        "figures": {
+            "tracks": len(tracks.lines),
+            "segments": len(tracks.segments),
+            "length_m": float(tracks.segments["length_m"].sum()),
+        },
+        "notes": [*step.notes, *tracks.notes],
+    }
+
+
+def _lines(table: gpd.GeoDataFrame) -> list[list[float]]:
+    """Ends of straight lines, metric CRS: x, y, x, y; to the millimetre."""
+    return [
+        [round(float(value), 3) for place in (line.coords[0], line.coords[-1]) for value in place]
+        for line in table.geometry
+    ]

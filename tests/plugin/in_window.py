@@ -1,0 +1,223 @@
+"""What a person does with the plugin, in QGIS's real window; run by `qgis --code`.
+
+GEOFIELD_TEST names a JSON file with `picture`, `lat`, `lon`, `folder`; the answer goes into
+`answer.json` of that folder, pictures of the window beside it.
+"""
+
+import json
+import os
+import time
+import traceback
+from pathlib import Path
+
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsPointXY,
+    QgsProject,
+    QgsRasterLayer,
+    QgsRectangle,
+)
+from qgis.PyQt.QtCore import QPoint, Qt, QTimer
+from qgis.PyQt.QtTest import QTest
+from qgis.PyQt.QtWidgets import QApplication
+from qgis.utils import iface, plugins, reloadPlugin
+
+ASKED = json.loads(Path(os.environ["GEOFIELD_TEST"]).read_text())
+FOLDER = Path(ASKED["folder"])
+ANSWER = {"steps": []}
+
+
+def until(true, seconds, what):
+    """Let QGIS work until something is so."""
+    begun = time.monotonic()
+    while not true():
+        if time.monotonic() - begun > seconds:
+            raise TimeoutError(what)
+        QTest.qWait(20)
+    return time.monotonic() - begun
+
+
+def screenshot(name):
+    canvas = iface.mapCanvas()
+    canvas.refreshAllLayers()
+    QTest.qWait(300)
+    until(lambda: not canvas.isDrawing(), 60, "drawing")
+    QTest.qWait(300)
+    iface.mainWindow().grab().save(str(FOLDER / f"{name}.png"))
+
+
+def pixel_of(lon, lat):
+    canvas = iface.mapCanvas()
+    turned = QgsCoordinateTransform(
+        QgsCoordinateReferenceSystem("EPSG:4326"),
+        canvas.mapSettings().destinationCrs(),
+        QgsProject.instance(),
+    ).transform(QgsPointXY(lon, lat))
+    place = canvas.getCoordinateTransform().transform(turned)
+    return QPoint(round(place.x()), round(place.y()))
+
+
+def key(which, modifier=Qt.KeyboardModifier.NoModifier):
+    canvas = iface.mapCanvas()
+    QApplication.setActiveWindow(iface.mainWindow())
+    canvas.setFocus()
+    QTest.keyClick(canvas, which, modifier)
+    QTest.qWait(10)
+
+
+def statuses(layer):
+    return {each["obstacle_no"]: each["status"] for each in layer.getFeatures()}
+
+
+def work():
+    project, canvas = QgsProject.instance(), iface.mapCanvas()
+    window = iface.mainWindow()
+    window.resize(1360, 860)
+    picture = QgsRasterLayer(ASKED["picture"], "Picture of the farm")
+    project.addMapLayer(picture)
+    project.write(str(FOLDER / "farm.qgz"))
+    QTest.qWait(500)  # QGIS takes the CRS of the first layer a little later
+    project.setCrs(QgsCoordinateReferenceSystem("EPSG:3857"))  # not that of the picture
+    QTest.qWait(200)
+    extent = QgsCoordinateTransform(picture.crs(), project.crs(), project).transformBoundingBox(
+        picture.extent()
+    )
+    canvas.setExtent(QgsRectangle(extent))
+    canvas.refresh()
+    QTest.qWait(500)
+    plugin = plugins["geofield_qgis"]
+    ours = plugin.window
+
+    # One click: outline, obstacles, tracks.
+    ours.plan.trigger()
+    finished = []
+    ours.planner.finished.connect(finished.append)
+    QTest.mouseClick(
+        canvas.viewport(),
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+        pixel_of(ASKED["lon"], ASKED["lat"]),
+    )
+    until(lambda: ours.planner.outline_s is not None, 200, "outline")
+    screenshot("outline")
+    until(lambda: finished, 200, "tracks")
+    ANSWER["outline_s"] = ours.planner.outline_s
+    ANSWER["plan"] = finished[0]
+    ANSWER["project_crs"] = project.crs().authid()
+    ANSWER["groups"] = {
+        group.name(): [node.name() for node in group.findLayers()]
+        for group in project.layerTreeRoot().findGroups()
+    }
+    dock = ours.dock
+    until(dock.figures.text, 200, "figures")
+    screenshot("planned")
+
+    # Review by keys.
+    layer = dock.review.layer
+    before = statuses(layer)
+    ANSWER["before"], ANSWER["count_before"] = before, dock.count.text()
+    first = layer.getFeature(dock.current)["obstacle_no"]
+    key(Qt.Key.Key_R)
+    second = layer.getFeature(dock.current)["obstacle_no"]
+    key(Qt.Key.Key_C)
+    answered = []
+    shown = dock._show_tracks
+
+    def hear(told):
+        shown(told)
+        answered.append(time.monotonic())
+
+    dock._show_tracks = hear
+    until(lambda: dock._hidden, 100, "preview")
+    edited = time.monotonic()
+    key(Qt.Key.Key_R)
+    until(lambda: answered, 100, "second preview")
+    ANSWER["replan_s"] = answered[-1] - edited
+    ANSWER["decided"] = {first: statuses(layer)[first], second: statuses(layer)[second]}
+    key(Qt.Key.Key_U)
+    after = statuses(layer)
+    ANSWER["changed"] = sorted(no for no in before if before[no] != after[no])
+    ANSWER["undo_steps"] = layer.undoStack().count()
+    dock.step(1)
+    number = layer.getFeature(dock.current)["obstacle_no"]
+    radius = layer.getFeature(dock.current)["radius_m"]
+    area = layer.getFeature(dock.current).geometry().area()
+    key(Qt.Key.Key_Plus)
+    ANSWER["larger"] = [
+        layer.getFeature(dock.current)["radius_m"] - radius,
+        layer.getFeature(dock.current).geometry().area() > area,
+        layer.getFeature(dock.current)["status"],
+    ]
+    middle = layer.getFeature(dock.current).geometry().centroid().asPoint()
+    key(Qt.Key.Key_M)
+    centre = canvas.viewport().rect().center()
+    QTest.mouseClick(
+        canvas.viewport(),
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+        centre + QPoint(60, 0),
+    )
+    moved = layer.getFeature(dock.current).geometry().centroid().asPoint()
+    ANSWER["moved"] = [number, moved.distance(middle)]
+    rows = layer.featureCount()
+    key(Qt.Key.Key_D)
+    QTest.mousePress(canvas.viewport(), Qt.MouseButton.LeftButton, pos=centre - QPoint(120, 90))
+    QTest.mouseMove(canvas.viewport(), centre - QPoint(100, 80))
+    QTest.mouseRelease(canvas.viewport(), Qt.MouseButton.LeftButton, pos=centre - QPoint(90, 70))
+    ANSWER["drawn"] = layer.featureCount() - rows
+    QTest.qWait(200)  # longer than the pause after which an edit is planned
+    until(lambda: not dock.live.busy and not dock._timer.isActive(), 60, "tracks after drawing")
+    canvas.zoomByFactor(2.0)
+    screenshot("review")
+
+    # Saving plans again, into the file that QGIS had open.
+    ANSWER["unsaved"] = layer.isModified()
+    key(Qt.Key.Key_S)
+    until(lambda: dock._released is None and not dock._hidden, 200, "saved")
+    QTest.qWait(200)
+    ANSWER["saved"] = {
+        "provider": layer.providerType(),
+        "rows": layer.featureCount(),
+        "statuses": statuses(layer),
+        "renderer": type(layer.renderer()).__name__,
+        "figures": dock.figures.text(),
+        "messages": [item.text() for item in iface.messageBar().items()],
+    }
+    # All the rest by keys, timed.
+    begun, presses = time.monotonic(), 0
+    while any(each in ("detected", "possible") for each in statuses(layer).values()):
+        key(Qt.Key.Key_C if presses % 3 else Qt.Key.Key_R)
+        presses += 1
+    ANSWER["by_keys"] = [presses, time.monotonic() - begun]
+    ANSWER["count_after"] = dock.count.text()
+    key(Qt.Key.Key_S)
+    until(lambda: dock._released is None and not dock._hidden, 200, "saved again")
+    canvas.setExtent(QgsRectangle(extent))
+    screenshot("saved")
+
+    # Reloaded and unloaded, it leaves nothing.
+    reloadPlugin("geofield_qgis")
+    QTest.qWait(300)
+    from qgis.PyQt.QtWidgets import QDockWidget, QToolBar
+
+    names = lambda kind: [  # noqa: E731
+        each.objectName() for each in window.findChildren(kind) if "geofield" in each.objectName()
+    ]
+    ANSWER["after_reload"] = [len(names(QDockWidget)), len(names(QToolBar))]
+    plugins["geofield_qgis"].unload()
+    QTest.qWait(300)
+    ANSWER["after_unload"] = [len(names(QDockWidget)), len(names(QToolBar))]
+
+
+def begin():
+    try:
+        work()
+    except BaseException:  # noqa: BLE001 - told to the test
+        ANSWER["error"] = traceback.format_exc()
+        iface.mainWindow().grab().save(str(FOLDER / "error.png"))
+    (FOLDER / "answer.json").write_text(json.dumps(ANSWER, default=str))
+    os._exit(0)
+
+
+QTimer.singleShot(2000, begin)

@@ -1,0 +1,238 @@
+"""Every algorithm in a real QGIS, beside the command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from plugin_place import PLUGINS, POINT, ROOT, SAMPLE
+
+from geofield.formats import read_dataset
+
+sys.path.insert(0, str(PLUGINS))
+import describe
+
+
+def same_tables(one, other, layers):
+    one, other = read_dataset(Path(one)), read_dataset(Path(other))
+    for layer in layers:
+        left, right = one.table(layer), other.table(layer)
+        assert len(left) > 0
+        assert left.geometry.geom_equals(right.geometry).all(), layer
+
+
+@pytest.fixture
+def sample_plan(tmp_path):
+    """A copy: QGIS alters a GeoPackage when it opens it."""
+    return shutil.copy(ROOT / "sample_data" / "field_1.gpkg", tmp_path / "sample.gpkg")
+
+
+@pytest.fixture(scope="module")
+def known(qgis):
+    return qgis("parameters")
+
+
+@pytest.fixture(scope="module")
+def plan(geofield, tmp_path_factory):
+    """The command line's own answer for the sample field."""
+    folder = tmp_path_factory.mktemp("plan") / "out"
+    geofield(
+        "run", SAMPLE, "--lat", 35.075373, "--lon", 33.531142, "--spacing", 4, "--buffer", 1.5,
+        "--out", folder,
+    )  # fmt: skip
+    return folder
+
+
+def test_the_description_is_that_of_the_command_line():
+    shipped = json.loads(describe.TARGET.read_text(encoding="utf-8"))
+    assert shipped == describe.described(), "run: python plugin/describe.py"
+
+
+def test_no_setting_is_unreachable(known):
+    reached = {name for each in known["algorithms"].values() for name in each["settings"]}
+    assert set(known["settings"]) - reached == set(known["in_file"])
+    # What is in no form can still be said in a settings file.
+    assert "SETTINGS_FILE" in known["algorithms"]["geofield:plan"]["parameters"]
+
+
+def test_algorithms_have_all_that_a_dialogue_shows(known):
+    assert set(known["algorithms"]) == {
+        f"geofield:{name}"
+        for name in (
+            "plan", "outline", "obstacles", "tracks", "route", "imagery", "export", "import",
+            "validate", "evaluate",
+        )
+    }  # fmt: skip
+    for name, algorithm in known["algorithms"].items():
+        assert algorithm["can"] == [True, ""], name
+        assert algorithm["icon"], name
+        assert len(algorithm["help"]) > 100, name
+    parameters = known["algorithms"]["geofield:plan"]["parameters"]
+    usual = [name for name, (_, advanced, _) in parameters.items() if not advanced]
+    assert usual[:4] == ["IMAGERY", "POINT", "OUTPUT", "SIZE_M"]
+    assert parameters["EDGE_METHOD"][1]  # the study's own settings are advanced
+    assert parameters["START_LONLAT"][0] == "point"
+    assert parameters["SPACING_M"][2] == "Distance between tracks, metres."
+
+
+def test_plan_by_qgis_process(qgis_environment, plan, tmp_path):
+    subprocess.run(
+        ["/usr/bin/qgis_process.bin", "plugins", "enable", "geofield_qgis"],
+        env=qgis_environment,
+        capture_output=True,
+        check=True,
+    )
+    out = tmp_path / "Ergebnis für Anna" / "out"  # a space and an umlaut
+    begun = time.monotonic()
+    done = subprocess.run(
+        [
+            "/usr/bin/qgis_process.bin", "--json", "run", "geofield:plan", f"--IMAGERY={SAMPLE}",
+            f"--POINT={POINT}", "--SPACING_M=4", "--BUFFER_M=1.5", f"--OUTPUT={out}",
+        ],
+        env=qgis_environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert time.monotonic() > begun
+    results = json.loads(done.stdout[done.stdout.index("{") :])["results"]
+    assert results["TRACKS"] == f"{out}/field.gpkg|layername=tracks"
+    same_tables(plan / "field.gpkg", out / "field.gpkg", ["field", "obstacles", "segments"])
+
+
+def test_stages_give_what_the_command_line_gives(qgis, plan, geofield, sample_plan, tmp_path):
+    lon, lat = 33.531142, 35.075373
+    answers = qgis(
+        "several",
+        requests=[
+            {"do": "run", "algorithm": "geofield:outline", "project_crs": "EPSG:3857", "values": {
+                "IMAGERY": {"raster": str(SAMPLE)},
+                "POINT": "3732669.65316,4174128.75706 [EPSG:3857]",
+                "OUTPUT": str(tmp_path / "outline.gpkg")}},
+            {"do": "run", "algorithm": "geofield:obstacles", "values": {
+                "IMAGERY": str(SAMPLE), "PLAN": f"{tmp_path}/outline.gpkg|layername=field",
+                "BUFFER_M": 1.5, "OUTPUT": str(tmp_path / "obstacles.gpkg")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": f"{tmp_path}/obstacles.gpkg|layername=field", "SPACING_M": 4,
+                "OUTPUT": str(tmp_path / "tracks")}},
+            {"do": "run", "algorithm": "geofield:route", "values": {
+                "INPUT": f"{tmp_path}/obstacles.gpkg|layername=field", "SPACING_M": 12,
+                "HEADLAND_M": 8, "START_LONLAT": f"{lon},{lat} [EPSG:4326]",
+                "OUTPUT": str(tmp_path / "route")}},
+            {"do": "run", "algorithm": "geofield:export", "values": {
+                "PLAN": f"{tmp_path}/tracks/obstacles.gpkg|layername=field",
+                "FORMATS": ["isoxml", "kml"], "FARM": "Hof", "OUTPUT": str(tmp_path / "export")}},
+            {"do": "run", "algorithm": "geofield:validate", "values": {
+                "FILES": [str(tmp_path / "export/isoxml/TASKDATA/TASKDATA.XML")]}},
+            {"do": "run", "algorithm": "geofield:import", "values": {
+                "FILES": [str(tmp_path / "export/field.kml")],
+                "OUTPUT": str(tmp_path / "imported.gpkg")}},
+            {"do": "run", "algorithm": "geofield:imagery", "values": {
+                "IMAGERY": str(SAMPLE), "POINT": f"{lon},{lat} [EPSG:4326]", "SIZE_M": 100,
+                "OUTPUT": str(tmp_path / "cut.tif")}},
+            {"do": "run", "algorithm": "geofield:evaluate", "values": {
+                "DETECTED": f"{tmp_path}/obstacles.gpkg|layername=obstacles",
+                "TRUTH": f"{sample_plan}|layername=obstacles",
+                "PICTURE": str(tmp_path / "hits.png")}},
+        ],
+    )  # fmt: skip
+    assert [each.get("error") for each in answers] == [None] * 9
+    same_tables(
+        plan / "field.gpkg",
+        tmp_path / "tracks" / "obstacles.gpkg",
+        ["field", "obstacles", "segments"],
+    )
+    assert len(read_dataset(tmp_path / "route" / "obstacles.gpkg").table("route")) > 0
+    assert (tmp_path / "export" / "field.kml").is_file()
+    assert answers[5]["result"]["ERRORS"] == 0
+    assert len(read_dataset(tmp_path / "imported.gpkg").table("field")) == 1
+    assert (tmp_path / "cut.tif").is_file()
+    done = geofield(
+        "evaluate", tmp_path / "obstacles.gpkg", sample_plan, "--truth-layer", "obstacles", "--json"
+    )
+    assert answers[8]["result"]["F1"] == pytest.approx(json.loads(done.stdout)["f1"])
+    assert (tmp_path / "hits.png").is_file()
+
+
+def test_any_polygon_layer(qgis, sample_plan, tmp_path):
+    """From memory, filtered, with some features selected; several fields at once."""
+    square = "POLYGON(({0} 0, {0} 90, {1} 90, {1} 0, {0} 0))"
+    memory = {
+        "memory": "parcels", "kind": "Polygon", "crs": "EPSG:32633", "fields": ["name"],
+        "rows": [
+            {"wkt": square.format(500000 + 200 * n, 500080 + 200 * n), "name": f"Acker {n}"}
+            for n in range(4)
+        ],
+    }  # fmt: skip
+    trees = {
+        "memory": "trees", "kind": "Point", "crs": "EPSG:32633", "fields": ["radius_m"],
+        "rows": [{"wkt": "POINT(500044 45)", "radius_m": 3.0}],
+    }  # fmt: skip
+    every, some, edited, filtered = qgis(
+        "several",
+        requests=[
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": memory, "OBSTACLES_TO_AVOID": trees, "SPACING_M": 10,
+                "OUTPUT": str(tmp_path / "all")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**memory, "select": "name in ('Acker 1', 'Acker 3')"},
+                "SPACING_M": 10, "OUTPUT": str(tmp_path / "some")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**memory, "edit": True}, "SPACING_M": 10,
+                "OUTPUT": str(tmp_path / "edited")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {"vector": f"{sample_plan}|layername=obstacles",
+                          "filter": "obstacle_no < 4"},
+                "SPACING_M": 1, "OUTPUT": str(tmp_path / "filtered")}},
+        ],
+    )  # fmt: skip
+    assert every["result"]["FIELDS"] == 4
+    assert some["result"]["FIELDS"] == 2
+    assert sorted(each.stem for each in (tmp_path / "some").glob("*.gpkg")) == [
+        "Acker_1",
+        "Acker_3",
+    ]
+    assert len(read_dataset(tmp_path / "all" / "Acker_0.gpkg").table("gaps")) > 0
+    assert "not saved" in edited["error"]
+    assert filtered["result"]["FIELDS"] == 3
+
+
+def test_in_a_model(qgis, plan, tmp_path):
+    qgis("model", folder=str(tmp_path), imagery=str(SAMPLE), point=POINT)
+    made = read_dataset(tmp_path / "tracks" / "obstacles.gpkg")
+    assert len(made.table("tracks")) == len(read_dataset(plan / "field.gpkg").table("tracks"))
+
+
+def test_layers_come_styled_in_their_group(qgis, sample_plan, tmp_path):
+    answer = qgis(
+        "loaded",
+        algorithm="geofield:tracks",
+        values={
+            "INPUT": f"{sample_plan}|layername=field",
+            "SPACING_M": 4,
+            "OUTPUT": str(tmp_path / "out"),
+        },
+    )
+    (layers,) = answer["groups"].values()
+    names = [name for name, _, _ in layers]
+    assert names.index("Obstacles") < names.index("Tracks") < names.index("Field")
+    assert {kind for name, _, kind in layers if name != "Picture"} == {"QgsRuleBasedRenderer"}
+    assert answer["loose"] == []
+
+
+def test_a_stopped_run_leaves_nothing(qgis, tmp_path):
+    answer = qgis(
+        "run",
+        algorithm="geofield:plan",
+        values={"IMAGERY": str(SAMPLE), "POINT": POINT, "OUTPUT": str(tmp_path / "out")},
+        stop_after_s=4.0,
+    )
+    assert "Stopped" in answer["error"]
+    assert answer["after_stop_s"] < 6.0  # two on a machine that has nothing else to do
+    assert not any((tmp_path / "out").glob("*"))

@@ -1,0 +1,108 @@
+"""One click and a review by keys in QGIS's real window, under a display of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from plugin_place import CLIENT, SAMPLE
+
+from geofield.formats import read_dataset
+
+SCRIPT = CLIENT.with_name("in_window.py")
+INI = """[PythonPlugins]
+geofield_qgis=true
+processing=true
+
+[qgis]
+showTips=false
+enableVersionCheck=false
+"""
+
+
+@pytest.fixture(scope="module")
+def seen(qgis_environment, tmp_path_factory):
+    """What the window showed and did, see in_window.py."""
+    if shutil.which("xvfb-run") is None or not Path("/usr/bin/qgis").exists():
+        if os.environ.get("CI"):
+            pytest.fail("a display is missing: apt-get install qgis xvfb xauth")
+        pytest.skip("needs QGIS and a display: apt-get install qgis xvfb xauth")
+    folder = tmp_path_factory.mktemp("window")
+    profile = folder / "p" / "profiles" / "default" / "QGIS"
+    profile.mkdir(parents=True)
+    (profile / "QGIS3.ini").write_text(INI)
+    asked = {"picture": str(SAMPLE), "lat": 35.075373, "lon": 33.531142, "folder": str(folder)}
+    (folder / "asked.json").write_text(json.dumps(asked))
+    environment = {
+        name: value for name, value in qgis_environment.items() if name != "QT_QPA_PLATFORM"
+    }
+    done = subprocess.run(
+        [
+            "xvfb-run", "-a", "-s", "-screen 0 1440x900x24", "/usr/bin/qgis", "--nologo",
+            "--noversioncheck", "--profiles-path", folder / "p", "--code", SCRIPT,
+        ],
+        env={**environment, "GEOFIELD_TEST": str(folder / "asked.json")},
+        capture_output=True,
+        text=True,
+        timeout=540,
+        check=False,
+    )  # fmt: skip
+    assert (folder / "answer.json").exists(), done.stderr[-3000:]
+    answer = json.loads((folder / "answer.json").read_text())
+    assert "error" not in answer, answer["error"]
+    return answer
+
+
+def test_a_click_plans_the_field(seen):
+    assert seen["project_crs"] == "EPSG:3857"
+    plan = read_dataset(Path(seen["plan"]))
+    assert 3.5 < plan.table("field")["area_ha"].iloc[0] < 3.8
+    (layers,) = seen["groups"].values()
+    assert layers.index("Obstacles") < layers.index("Tracks") < layers.index("Field")
+    # Four seconds on a machine that has nothing else to do.
+    assert seen["outline_s"] < 60.0
+
+
+def test_keys_confirm_reject_and_undo(seen):
+    assert seen["count_before"] == f"{len(seen['before'])} left to look at"
+    assert sorted(seen["decided"].values()) == ["confirmed", "rejected"]
+    # The third decision was undone by the layer's own undo.
+    assert seen["changed"] == sorted(int(number) for number in seen["decided"])
+    assert seen["undo_steps"] == 3
+    assert seen["replan_s"] < 15.0  # one on a machine that has nothing else to do
+
+
+def test_keys_resize_move_and_draw(seen):
+    assert seen["larger"] == [pytest.approx(0.25), True, "confirmed"]
+    assert seen["moved"][1] > 1.0
+    assert seen["drawn"] == 1
+
+
+def test_saving_plans_again_in_the_open_file(seen):
+    saved = seen["saved"]
+    assert seen["unsaved"]
+    assert saved["messages"] == []
+    assert saved["provider"] == "ogr"
+    assert saved["renderer"] == "QgsRuleBasedRenderer"
+    assert saved["rows"] == len(seen["before"]) + 1
+    assert sorted(saved["statuses"].values()).count("added") == 1
+    for number, status in seen["decided"].items():
+        assert saved["statuses"][number] == status
+    assert saved["statuses"][str(seen["moved"][0])] == "confirmed"
+
+
+def test_a_whole_review_by_keys(seen):
+    presses, wall_s = seen["by_keys"]
+    assert seen["count_after"].startswith("0 left to look at")
+    assert wall_s / presses < 2.0  # thirty in a minute
+    statuses = read_dataset(Path(seen["plan"])).table("obstacles")["status"]
+    assert not statuses.isin(["detected", "possible"]).any()
+
+
+def test_nothing_is_left_after_unloading(seen):
+    assert seen["after_reload"] == [1, 1]
+    assert seen["after_unload"] == [0, 0]

@@ -1,0 +1,74 @@
+"""Tracks at once for another program, by lines of JSON."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from geofield.formats import read_dataset
+from geofield.review.live import LivePlans
+
+GEOFIELD = Path(sys.executable).with_name("geofield")
+SAMPLE = Path(__file__).parents[2] / "sample_data" / "field_1.gpkg"
+
+
+@pytest.fixture
+def plan(tmp_path):
+    return Path(shutil.copy(SAMPLE, tmp_path / "field.gpkg"))
+
+
+def rows_of(path, **changed):
+    table = read_dataset(path).table("obstacles")
+    rows = []
+    for _, row in table.iterrows():
+        values = {
+            "obstacle_no": int(row["obstacle_no"]),
+            "status": changed.get(f"no_{row['obstacle_no']}", row["status"]),
+            "kind": row["kind"],
+            "radius_m": float(row["radius_m"]),
+            "buffer_m": float(row["buffer_m"]),
+            "wkb": row.geometry.wkb_hex,
+        }
+        rows.append(values)
+    return rows
+
+
+def test_rejecting_what_stands_in_the_way_closes_gaps(plan):
+    live = LivePlans()
+    before = live.answer({"do": "plan", "file": str(plan)})
+    rejected = {f"no_{row['obstacle_no']}": "rejected" for row in rows_of(plan)}
+    question = {"do": "plan", "file": str(plan), "obstacles": rows_of(plan, **rejected)}
+    after = live.answer(question)
+    assert before["figures"]["tracks"] == after["figures"]["tracks"]
+    assert len(after["segments"]) < len(before["segments"])
+    assert after["figures"]["length_m"] > before["figures"]["length_m"]
+    drawn = [*rows_of(plan), {"wkb": rows_of(plan)[0]["wkb"]}]  # no number, no status
+    assert "error" not in live.answer({**question, "obstacles": drawn})
+
+
+def test_the_command_answers_line_by_line_and_writes(plan):
+    obstacles = rows_of(plan)
+    questions = [
+        {"do": "plan", "file": str(plan), "obstacles": obstacles},
+        {"do": "nonsense"},
+        {"do": "plan", "file": str(plan), "outline": "00"},
+        {"do": "write", "file": str(plan)},
+    ]
+    text = "".join(json.dumps(each) + "\n" for each in questions) + "no json\n"
+    done = subprocess.run(
+        [GEOFIELD, "live", "--progress", "json"],
+        input=text, capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    first, nonsense, broken, written, last = map(json.loads, done.stdout.splitlines())
+    assert first["segments"] == written["segments"]
+    assert "nonsense" in nonsense["error"]["message"]
+    assert "cannot be understood" in broken["error"]["message"]
+    assert "error" in last
+    lines = read_dataset(plan).table("segments")
+    assert len(lines) == len(written["segments"])
+    assert lines["length_m"].sum() == pytest.approx(written["figures"]["length_m"])
