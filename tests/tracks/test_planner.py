@@ -17,6 +17,7 @@ from shapely import Polygon
 from geofield import schema
 from geofield.errors import CRSError, CRSMismatchError, ObstacleError, TrackError, TrackWarning
 from geofield.grid import Grid
+from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
 from geofield.tracks import longest_edge, plan_tracks
 
@@ -58,6 +59,14 @@ def test_a_plain_field() -> None:
     assert figures.coverage_percent == pytest.approx(100.0, abs=1e-6)
     assert figures.overlap_percent == pytest.approx(0.0, abs=1e-6)
     assert pickle.loads(pickle.dumps(tracks)).segments.equals(tracks.segments)
+
+
+def test_a_field_knows_its_own_crs() -> None:
+    field = Field(box(0, 0, 100, 40), CRS)
+    own = plan_tracks(field, spacing_m=4.0)
+    assert own.segments.equals(plan_tracks(field.polygon, crs=CRS, spacing_m=4.0).segments)
+    with pytest.raises(CRSMismatchError, match="not in the CRS given"):
+        plan_tracks(field, crs=32633, spacing_m=4.0)
 
 
 def test_circles_are_cut_as_circles_and_named() -> None:

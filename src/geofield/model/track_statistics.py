@@ -10,7 +10,8 @@ import shapely
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    from shapely import Polygon
+
+    from geofield.model.tracks import Tracks
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,26 +75,16 @@ class TrackStatistics:
     losses: tuple[ObstacleLoss, ...]
 
 
-def track_statistics(
-    *,
-    lines: gpd.GeoDataFrame,
-    segments: gpd.GeoDataFrame,
-    gaps: gpd.GeoDataFrame,
-    headland_tracks: gpd.GeoDataFrame | None,
-    outline: Polygon | None,
-    spacing_m: float,
-    scale: float,
-    blocked_count: int,
-    losses: tuple[ObstacleLoss, ...],
-) -> TrackStatistics:
-    """Compute the figures of planned tracks; parameters as the attributes of `Tracks`."""
-    length = segments["length_m"].to_numpy(dtype=np.float64)
-    gap = gaps["length_m"].to_numpy(dtype=np.float64)
+def track_statistics(tracks: Tracks) -> TrackStatistics:
+    """Compute the figures of planned tracks."""
+    outline, scale = tracks.outline, tracks.ground_scale
+    length = tracks.segments["length_m"].to_numpy(dtype=np.float64)
+    gap = tracks.gaps["length_m"].to_numpy(dtype=np.float64)
     nan = float("nan")
     area = worked = coverage = overlap = nan
     if outline is not None:
         area = float(outline.area)
-        strips = _strips(segments, headland_tracks, spacing_m * scale)
+        strips = _strips(tracks.segments, tracks.headland_tracks, tracks.spacing_m * scale)
         together = shapely.union_all(strips)
         union = shapely.intersection(together, outline).area
         single = union
@@ -104,11 +95,11 @@ def track_statistics(
         coverage = 100.0 * worked / area
         overlap = 100.0 * max(0.0, single - worked) / area
     return TrackStatistics(
-        track_count=len(lines),
+        track_count=len(tracks.lines),
         segment_count=len(length),
         gap_count=len(gap),
-        point_count=int(lines["point_count"].sum()),
-        blocked_count=blocked_count,
+        point_count=int(tracks.lines["point_count"].sum()),
+        blocked_count=tracks.blocked_count,
         length_m=float(length.sum()),
         gap_length_m=float(gap.sum()),
         mean_segment_m=float(length.mean()) if len(length) else nan,
@@ -118,7 +109,7 @@ def track_statistics(
         worked_ha=worked / scale**2 / 10_000.0,
         coverage_percent=coverage,
         overlap_percent=overlap,
-        losses=losses,
+        losses=tracks.losses,
     )
 
 

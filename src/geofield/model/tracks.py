@@ -173,17 +173,7 @@ class Tracks:
     @cached_property
     def statistics(self) -> TrackStatistics:
         """Counts, lengths and areas, computed when first asked for."""
-        return track_statistics(
-            lines=self.lines,
-            segments=self.segments,
-            gaps=self.gaps,
-            headland_tracks=self.headland_tracks,
-            outline=self.outline,
-            spacing_m=self.spacing_m,
-            scale=self.ground_scale,
-            blocked_count=self.blocked_count,
-            losses=self.losses,
-        )
+        return track_statistics(self)
 
     @cached_property
     def points(self) -> gpd.GeoDataFrame:

@@ -57,7 +57,7 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     if not isinstance(polygon, BaseGeometry):
         raise TrackError(
             f"The field must be a shapely polygon, not {type(polygon).__name__}.",
-            hint="For a Field, give field.polygon and crs=field.crs.",
+            hint="Give a shapely polygon with its CRS, or a geofield Field.",
         )
     if polygon.is_empty:
         raise TrackError("The field's outline is empty.")

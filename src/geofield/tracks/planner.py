@@ -11,8 +11,9 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale
-from geofield.errors import TrackError, TrackWarning
+from geofield.errors import CRSMismatchError, TrackError, TrackWarning
 from geofield.grid import Grid
+from geofield.model.field import Field
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
@@ -38,10 +39,10 @@ MOST_PIECES = 10_000_000
 
 
 def plan_tracks(
-    polygon: Polygon,
+    polygon: Polygon | Field,
     obstacles: Any = None,
     *,
-    crs: Any,
+    crs: Any = None,
     spacing_m: float,
     direction: Any = "dominant",
     offset_m: float | None = None,
@@ -59,14 +60,14 @@ def plan_tracks(
 
     Parameters
     ----------
-    polygon : shapely.Polygon
-        The field, with or without holes, in `crs`.
+    polygon : shapely.Polygon or Field
+        The field, with or without holes; a polygon is in `crs`.
     obstacles : GeoDataFrame, GeoSeries, shapely geometries or None
         What no vehicle may enter, avoided exactly as drawn: circles of geofield's own tables as
         true circles, a person's polygons as polygons. Rows with status ``rejected`` do not count.
         A table in another CRS is reprojected.
     crs : CRS, str or int
-        Of the field; projected, in metres (usually the UTM zone).
+        Of the polygon; projected, in metres (usually the UTM zone). A Field has its own.
     spacing_m : float
         Between neighbouring tracks. This and all other lengths are metres on the ground.
     direction : str, float, LineString or pair of points
@@ -109,6 +110,13 @@ def plan_tracks(
     TrackError
         When the field or a setting is unfit.
     """
+    if isinstance(polygon, Field):
+        if crs is not None and metric(crs) != polygon.crs:
+            raise CRSMismatchError(
+                f"The field is in {polygon.crs.name}, not in the CRS given.",
+                hint="Leave crs out: a Field has its own.",
+            )
+        crs, polygon = polygon.crs, polygon.polygon
     metric_crs = metric(crs)
     _check_lengths(spacing_m=spacing_m, step_m=step_m)
     outline, notes = clean_outline(polygon)
