@@ -80,6 +80,16 @@ def test_a_window_is_read_once(
     assert len(sizes) == len(set(sizes))
 
 
+def test_a_window_grows_with_its_field(simulated: SimulatedField, simulated_tif: Path) -> None:
+    where = {"lat": simulated.lat, "lon": simulated.lon}
+    whole = plan_field(simulated_tif, **where, settings=SETTINGS)
+    grown = plan_field(simulated_tif, **where, settings=SETTINGS, size_m=60.0)
+    assert grown.grid is not None
+    assert grown.grid.width_px * grown.grid.ground_resolution_m > 100.0
+    common = grown.field.polygon.intersection(whole.field.polygon).area
+    assert common / grown.field.polygon.union(whole.field.polygon).area > 0.9
+
+
 def test_a_plan_is_read_back_equal(plan: Plan, file: Path) -> None:
     again = read_plan(file)
     assert again == plan

@@ -446,6 +446,40 @@ def test_offline_works_from_the_cache_alone(tmp_path: Path) -> None:
         acquire(source, HERE, tmp_path / "c.tif", options=replace(FAST, offline=True))
 
 
+def test_offline_takes_tiles_past_their_time_and_online_asks_anew(tmp_path: Path) -> None:
+    cached = replace(FAST, cache_dir=tmp_path / "cache")
+    short = replace(cached, cache_max_age_s=0.5)
+    with serving() as server:
+        source = _named(server)
+        first = acquire(source, HERE, tmp_path / "a.tif", options=cached)
+        time.sleep(2.0)
+        again = acquire(source, HERE, tmp_path / "b.tif", options=replace(short, offline=True))
+        assert again.report.cached == again.report.wanted
+        assert sha(first.path) == sha(again.path)
+        anew = acquire(source, HERE, tmp_path / "c.tif", options=short)
+        assert anew.report.downloaded == anew.report.wanted
+
+
+def test_what_had_arrived_when_the_work_stopped_is_kept(tmp_path: Path) -> None:
+    cached = replace(FAST, cache_dir=tmp_path / "cache")
+    with serving() as server:
+
+        def stop_when_all_is_there(done: int, total: int, what: str) -> None:
+            before = -1
+            while before != len(server.asked):
+                before = len(server.asked)
+                time.sleep(0.5)
+            raise KeyboardInterrupt
+
+        source = _named(server)
+        with pytest.raises(KeyboardInterrupt):
+            acquire(
+                source, _WIDE, tmp_path / "a.tif", options=cached, progress=stop_when_all_is_there
+            )
+        assert len(server.asked) > 20
+        assert cache_infos(tmp_path / "cache")[0].tiles == len(server.asked)
+
+
 def test_no_network_names_the_host_and_the_way_out(tmp_path: Path) -> None:
     with serving() as server:
         source = _named(server)

@@ -124,7 +124,7 @@ class TileFetcher:
                 while submitted < block.rows and len(pending) < ahead:
                     pending.append((submitted, self._submitted(executor, block, submitted)))
                     submitted += 1
-                row, futures = pending.popleft()
+                row, futures = pending[0]
                 valid: NDArray[np.bool_] | None = None
                 keep: list[tuple[int, int, int, bytes]] = []
                 try:
@@ -150,6 +150,7 @@ class TileFetcher:
                     # Also when this stops here: a restart then fetches only the rest.
                     if self._cache is not None:
                         self._cache.put(keep)
+                pending.popleft()
                 yield row, strip, valid
         except BaseException:
             if self._client is not None:
