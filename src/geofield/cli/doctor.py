@@ -25,7 +25,6 @@ _LIBRARIES = (
     "pyogrio",
     "pyarrow",
     "rdflib",
-    "pyshacl",
     "pillow",
     "pydantic",
     "click",
