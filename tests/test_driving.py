@@ -98,6 +98,9 @@ def test_the_command_tells_what_a_driver_loses(simulated, simulated_tif, tmp_pat
     assert lost["things"] >= 0.8 * len(truth)
     assert lost["driven_through"] <= 0.15 * lost["things"]
     assert 0 <= lost["share_lost"] < 0.04
+    report = json.loads((tmp_path / "report.json").read_text())
+    unseen = report["obstacles"]["expected_unseen_per_ha"]
+    assert unseen == pytest.approx(lost["expected_unseen_per_ha"], abs=2e-3)
     # Without obstacles the same tracks run through the trees.
     gone = gf.read_plan(plan)
     empty = gf.plan_tracks(

@@ -38,7 +38,7 @@ BANDS = {"nir": ("red", "green", "blue", "nir"), "rgb": ("red", "green", "blue")
 HIT_PX = 10.0
 OPEN_PX, OPEN_TREES = 96, 5
 BIN_HITS = 60
-THINGS, PAINTED_EVERY = 120, 3
+THINGS, PAINTED_EVERY = 240, 5
 TOLD = 0.05
 SAME = {"answer": [0.0, 1.0], "probability": [0.0, 1.0]}
 
@@ -183,7 +183,7 @@ def main() -> None:
     facts["calibration"] = curves
     answer, right = things()
     print(f"things: {right.sum()} of {len(right)} answers right")
-    facts["standing"]["calibration"] = curve(answer, right, 12)
+    facts["standing"]["calibration"] = curve(answer, right, 8)
     network.cache_clear()
     text = json.dumps(facts, indent=1)
     FACTS.write_text(text + "\n", encoding="utf-8")

@@ -17,7 +17,6 @@ from typing import Any
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
-from geofield.evaluation.driving import unseen
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
 from geofield.generations import keep_earlier
@@ -151,6 +150,8 @@ def make_report(
     changes: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Counts, lengths, areas, timings, settings, versions and terms, as plain JSON values."""
+    from geofield.evaluation.driving import unseen
+
     field = dataset.table(schema.FIELD.name).iloc[0]
     obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
     segments, gaps = dataset.table("segments"), dataset.table("gaps")

@@ -26,7 +26,8 @@ RIM = 0.5
 BORDER_CELLS, DEEP_CELLS = 2.5, 7.5
 """What begins within 3 m of the field's border and ends within 9 m is the border: a road's edge,
 a ditch, the neighbour's wall."""
-_EXPLAINED = 0.5
+_EXPLAINED, _CROWN_REACH = 0.5, 1.2
+"""Of a thing's cells within so many radii of a tree: then it is the tree, or its shade."""
 _CLEAR_CELLS = 3
 
 
@@ -125,7 +126,8 @@ class StandingMap:
             centre = [
                 round(16 * (v / CELL_PX - o - 0.5)) for v, o in ((x, self.col), (y, self.row))
             ]
-            cv2.circle(mask, centre, round(16 * radius / CELL_PX), 1, -1, cv2.LINE_8, 4)
+            reach = round(16 * _CROWN_REACH * radius / CELL_PX)
+            cv2.circle(mask, centre, reach, 1, -1, cv2.LINE_8, 4)
         return mask.astype(bool)
 
 
