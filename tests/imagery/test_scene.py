@@ -467,3 +467,19 @@ def test_an_existing_file_is_refused_and_nothing_is_left(tmp_path: Path, rgb: st
     with pytest.raises(FormatError, match="folder exists"):
         write_scene(scene, tmp_path / "no" / "out.tif")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.tif", "rgb.tif"]
+
+
+def test_near_infrared_tagged_as_alpha_in_degrees(tmp_path: Path) -> None:
+    """GDAL writes the fourth band of a camera as alpha; degrees are reprojected."""
+    path = tmp_path / "camera.tif"
+    values = np.random.default_rng(0).integers(1, 255, (4, 300, 300), dtype=np.uint8)
+    transform = Affine(6e-6, 0, 10.0, 0, -5e-6, 60.0)
+    profile = {"driver": "GTiff", "width": 300, "height": 300, "count": 4, "dtype": "uint8"}
+    place = {"crs": "EPSG:4326", "transform": transform}
+    with rasterio.open(path, "w", **profile, **place, photometric="RGB", alpha="YES") as data:
+        data.write(values)
+    scene = read_scene(path, lat=59.99925, lon=10.0009)
+    assert scene.roles == ("red", "green", "blue", "nir")
+    assert scene.valid.mean() > 0.9
+    near = scene.bands[3][scene.valid]
+    assert near.mean() == pytest.approx(values[3].mean(), abs=2)

@@ -8,15 +8,17 @@ reprojected to the metric CRS, because the trees in it would not be round.
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import rasterio.shutil
 from affine import Affine
 from numpy.typing import NDArray
-from rasterio.enums import MaskFlags, Resampling
+from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
@@ -359,11 +361,37 @@ class SceneReader:
             if alpha is not None
             else {"add_alpha": True}
         )
-        with WarpedVRT(
-            dataset,
-            crs=to_rasterio(self.grid.crs),
-            resampling=Resampling.nearest if self.palette else Resampling.bilinear,
-            src_nodata=self.nodata,
-            **options,
-        ) as warped:
+        with (
+            _as_it_is_taken(dataset, alpha) as plain,
+            WarpedVRT(
+                plain,
+                crs=to_rasterio(self.grid.crs),
+                resampling=Resampling.nearest if self.palette else Resampling.bilinear,
+                src_nodata=self.nodata,
+                **options,
+            ) as warped,
+        ):
             yield warped
+
+
+@contextmanager
+def _as_it_is_taken(dataset: Any, alpha: int | None) -> Iterator[Any]:
+    """The dataset; where a band that is no mask is tagged as one, a view without the tag.
+
+    GDAL's warper takes every band that is tagged as alpha for a mask, near infrared too.
+    """
+    if alpha is not None or ColorInterp.alpha not in dataset.colorinterp:
+        yield dataset
+        return
+    view = f"/vsimem/{uuid.uuid4().hex}.vrt"
+    rasterio.shutil.copy(dataset, view, driver="VRT")
+    try:
+        with rasterio.open(view, "r+") as plain:
+            plain.colorinterp = [
+                ColorInterp.undefined if each is ColorInterp.alpha else each
+                for each in plain.colorinterp
+            ]
+        with rasterio.open(view) as plain:
+            yield plain
+    finally:
+        rasterio.shutil.delete(view)
