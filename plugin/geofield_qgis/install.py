@@ -11,6 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from qgis.core import QgsSettings
 from qgis.PyQt.QtCore import QObject, QProcess, pyqtSignal
@@ -21,7 +22,7 @@ from .words import tr
 #: Locked requirements of the engine with their hashes; `make plugin` puts them here.
 REQUIREMENTS = Path(__file__).with_name("requirements.txt")
 #: Download and disk space, megabytes, measured on Linux with Python 3.11.
-DOWNLOAD_MB, DISK_MB = 310, 1000
+DOWNLOAD_MB, DISK_MB = 310, 1080
 _OLDEST = (3, 11)
 
 
@@ -59,7 +60,8 @@ def network(settings: Any = None) -> dict[str, str]:
     scheme = "socks5h" if kind.startswith("Socks5") else "http"
     user = str(settings.value("proxy/proxyUser", "") or "")
     password = str(settings.value("proxy/proxyPassword", "") or "")
-    login = f"{user}:{password}@" if user else ""
+    # Letters such as @ and : would end the name or password where they stand.
+    login = f"{quote(user, safe='')}:{quote(password, safe='')}@" if user else ""
     address = f"{scheme}://{login}{host}:{port}" if port else f"{scheme}://{login}{host}"
     return {"HTTP_PROXY": address, "HTTPS_PROXY": address}
 

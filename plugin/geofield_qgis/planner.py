@@ -39,6 +39,7 @@ class Planner(QObject):
     """
 
     finished = pyqtSignal(str)
+    engine_missing = pyqtSignal(str)
 
     def __init__(self, iface: Any) -> None:
         super().__init__(iface.mainWindow())
@@ -103,11 +104,19 @@ class Planner(QObject):
         if picture is None:
             self._say(tr("There is no picture here: add a raster layer of the place first."))
             return
+        self._imagery, self._environment = sources.imagery(picture)
+        if self._environment:
+            self._say(
+                tr(
+                    "Whether the terms of {0} allow this is for you to say: use Plan a field in "
+                    "the toolbox, or a picture of your own."
+                ).format(picture.name())
+            )
+            return
         try:
-            self._imagery, self._environment = sources.imagery(picture)
             engine.require_engine()
         except engine.EngineError as error:
-            self._say(str(error))
+            self.engine_missing.emit(str(error))
             return
         if self._target is None:
             self._target = _folder() / time.strftime("field_%Y%m%d_%H%M%S.gpkg")
@@ -121,7 +130,8 @@ class Planner(QObject):
         for name, points in self._ground.items():
             for point in points:
                 lonlat = self._lonlat(point)
-                words += [f"--{name}-lonlat", f"{lonlat.x():.9f},{lonlat.y():.9f}"]
+                option = description.settings()[f"field.{name}"]["option"]
+                words += [option, f"{lonlat.x():.9f},{lonlat.y():.9f}"]
         words += ["-o", str(self._target), "--overwrite", "--fresh", "--json"]
         self._run("field", ["field", self._imagery, *words])
 

@@ -6,6 +6,7 @@ from typing import Any, Callable
 
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtGui import QIcon
+from qgis.PyQt.QtWidgets import QPushButton
 
 from .algorithm import ICONS
 from .compat import QAction
@@ -48,6 +49,7 @@ class Window:
         self.engine = self._action("", tr("Engine..."), self.show_engine)
         self.dialog: EngineDialog | None = None
         self.planner.finished.connect(self._planned)
+        self.planner.engine_missing.connect(self._offer_engine)
 
     def close(self) -> None:
         """Leave the window as it was before."""
@@ -81,6 +83,15 @@ class Window:
 
     def _take_tool(self) -> None:
         self.iface.mapCanvas().setMapTool(self.tool)
+
+    def _offer_engine(self, why: str) -> None:
+        """Say what is missing, with the way to it."""
+        messages = self.iface.messageBar()
+        item = messages.createMessage("geofield", why)
+        button = QPushButton(tr("Engine..."))
+        button.clicked.connect(lambda *_: (messages.popWidget(item), self.show_engine()))
+        item.layout().addWidget(button)
+        messages.pushWidget(item)
 
     def _planned(self, path: str) -> None:
         self.show_review(path)

@@ -231,6 +231,50 @@ def spoken(language):
     }
 
 
+def web_layers(addresses):
+    """How web layers are told to the command."""
+    from geofield_qgis import sources
+
+    made = []
+    for address in addresses:
+        layer = QgsRasterLayer(address, "web", "wms")
+        layer.setAttribution("© Survey")
+        made.append(sources.imagery(layer))
+    return made
+
+
+def install(requirements, wheels):
+    """The installer at work, with requirements of the test's own."""
+    from geofield_qgis import engine
+    from geofield_qgis import install as own
+
+    own.REQUIREMENTS = own.Path(requirements)
+    settings = QgsSettings()
+    for name, value in (
+        ("proxyEnabled", True), ("proxyHost", "proxy.farm"), ("proxyPort", "3128"),
+        ("proxyUser", "anna"), ("proxyPassword", "p@ss word"), ("proxyType", "HttpProxy"),
+    ):  # fmt: skip
+        settings.setValue(f"proxy/{name}", value)
+    told = {"network": own.network(settings), "consent": own.consent_text()}
+    settings.setValue("proxy/proxyEnabled", False)
+    for wheel in wheels:
+        installer, ends = own.Installer(wheel), []
+        installer.failed.connect(ends.append)
+        installer.done.connect(lambda ends=ends: ends.append("done"))
+        installer.start()
+        while not ends:
+            QgsApplication.processEvents()
+            time.sleep(0.02)
+        told.setdefault("ends", []).append(ends[0])
+        told.setdefault("there", []).append(engine.command_in(engine.own_environment()).is_file())
+        told.setdefault("folders", []).append(
+            sorted(each.name for each in engine.own_environment().parent.iterdir())
+        )
+    found = engine.find_engine()
+    own.remove()
+    return {**told, "found": found}
+
+
 def setting(name, value):
     QgsSettings().setValue(name, value)
     return value
@@ -246,6 +290,8 @@ ACTIONS = {
     "model": model,
     "loaded": loaded,
     "setting": setting,
+    "web_layers": web_layers,
+    "install": install,
     "spoken": spoken,
     "several": several,
 }

@@ -76,10 +76,15 @@ def qgis(qgis_environment):
 def geofield():
     """Run the command itself, to compare with."""
 
-    def call(*words, cwd=ROOT):
+    def call(*words, variables=None):
         command = Path(sys.executable).with_name("geofield")
         return subprocess.run(
-            [command, *map(str, words)], cwd=cwd, check=True, capture_output=True, text=True
+            [command, *map(str, words)],
+            cwd=ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, **(variables or {})},
         )
 
     return call

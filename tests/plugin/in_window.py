@@ -196,7 +196,21 @@ def work():
     canvas.setExtent(QgsRectangle(extent))
     screenshot("saved")
 
+    # The dialogues, for a person to look at.
+    import processing
+
+    tool = processing.createAlgorithmDialog("geofield:plan", {"IMAGERY": picture})
+    tool.resize(900, 700)
+    tool.show()
+    QTest.qWait(500)
+    tool.grab().save(str(FOLDER / "tool.png"))
+    tool.close()
+    ours.show_engine()
+    QTest.qWait(300)
+    ours.dialog.grab().save(str(FOLDER / "engine.png"))
+
     # Reloaded and unloaded, it leaves nothing.
+    awake = dock.live._process.processId()
     reloadPlugin("geofield_qgis")
     QTest.qWait(300)
     from qgis.PyQt.QtWidgets import QDockWidget, QToolBar
@@ -207,6 +221,7 @@ def work():
     ANSWER["after_reload"] = [len(names(QDockWidget)), len(names(QToolBar))]
     plugins["geofield_qgis"].unload()
     QTest.qWait(300)
+    ANSWER["engine_left"] = Path(f"/proc/{awake}").exists()
     ANSWER["after_unload"] = [len(names(QDockWidget)), len(names(QToolBar))]
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import subprocess
+import time
+import zipfile
 from pathlib import Path
 
 import pytest
-from plugin_place import POINT, SAMPLE
+from plugin_place import CLIENT, POINT, PYTHON, SAMPLE
 
 HEAD = "#!/bin/sh\nif [ \"$1\" = --version ]; then echo 'geofield, version {version}'; exit 0; fi\n"
 
@@ -94,3 +99,110 @@ def test_nothing_of_qgis_reaches_the_engine(qgis, tmp_path):
     names = {line.partition("=")[0] for line in (tmp_path / "environment").read_text().splitlines()}
     assert not {"GDAL_DATA", "PROJ_LIB", "LD_LIBRARY_PATH", "PYTHONHOME", "PYTHONPATH"} & names
     assert "MINE" in names
+
+
+def test_web_layers_are_told_by_address_and_terms(qgis, geofield, tmp_path):
+    xyz, wms = qgis(
+        "web_layers",
+        addresses=[
+            "type=xyz&url=https://tiles.example.org/%7Bz%7D/%7Bx%7D/%7By%7D.png&zmax=19&zmin=3",
+            "contextualWMSLegend=0&crs=EPSG:3857&dpiMode=7&format=image/png&layers=ortho&styles=&"
+            "url=https://wms.example.org/service?map%3D1",
+        ],
+    )
+    told = []
+    for name, variables in (xyz, wms):
+        settings = json.loads(variables["GEOFIELD_FETCH__SOURCES"])[name]
+        assert settings["attribution"] == "© Survey"
+        told.append(settings)
+        # The command takes it as it is, and does not hold that deriving is allowed.
+        listed = json.loads(geofield("sources", "--json", variables=variables).stdout)
+        row = next(each for each in listed if each["name"] == name)
+        assert row["may_derive"] is False
+    assert told[0]["url"] == "https://tiles.example.org/{z}/{x}/{y}.png"
+    assert (told[0]["kind"], told[0]["min_zoom"], told[0]["max_zoom"]) == ("xyz", 3, 19)
+    assert (told[1]["kind"], told[1]["layer"]) == ("wms", "ortho")
+    assert told[1]["url"] == "https://wms.example.org/service?map=1"
+
+
+def test_the_plugin_itself_costs_little(planned, tmp_path):
+    """All that is not the command's own work: two starts of a process, forms, files."""
+    quick, _ = planned(engine(tmp_path / "quick", "exit 0"))
+    assert quick["wall_s"] < 4.0  # one on a machine that has nothing else to do
+
+
+def test_the_engine_ends_with_qgis(qgis_environment, tmp_path):
+    """QGIS is killed during a run: nobody else can stop the command any more."""
+    request = {"do": "run", "algorithm": "geofield:plan", "values": {
+        "IMAGERY": str(SAMPLE), "POINT": POINT, "OUTPUT": str(tmp_path / "out")}}  # fmt: skip
+    window = subprocess.Popen(
+        [PYTHON, str(CLIENT), json.dumps(request)],
+        env=qgis_environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        until(lambda: running(str(tmp_path)), 60)
+        time.sleep(2.0)
+    finally:
+        window.kill()
+        window.wait()
+    until(lambda: not running(str(tmp_path)), 20)
+    assert not any((tmp_path / "out").glob("*"))
+
+
+def test_the_engine_is_installed_by_its_hash(qgis, tmp_path):
+    """A tiny engine of the same name: only the file with the hash that is named comes in."""
+    wheel = tmp_path / "geofield-0.1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        meta = "geofield-0.1.0.dist-info"
+        archive.writestr("tiny_engine.py", "def main():\n    print('geofield, version 0.1.0')\n")
+        archive.writestr(
+            f"{meta}/entry_points.txt", "[console_scripts]\ngeofield = tiny_engine:main\n"
+        )
+        archive.writestr(
+            f"{meta}/METADATA", "Metadata-Version: 2.1\nName: geofield\nVersion: 0.1.0\n"
+        )
+        archive.writestr(
+            f"{meta}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        archive.writestr(f"{meta}/RECORD", "")
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    requirements = tmp_path / "requirements.txt"
+    requirements.write_text(f"--no-index\ngeofield==0.1.0 --hash=sha256:{digest}\n")
+    other = tmp_path / "other" / wheel.name
+    other.parent.mkdir()
+    other.write_bytes(wheel.read_bytes() + b" ")
+    answer = qgis(
+        "install", requirements=str(requirements), wheels=[str(other), str(wheel), str(other)]
+    )
+    refused, done, again = answer["ends"]
+    assert "HASH" in refused.upper()
+    assert done == "done"
+    # A failed update leaves the engine that was there before, and nothing else.
+    assert "HASH" in again.upper()
+    assert answer["there"] == [False, True, True]
+    assert answer["folders"] == [[], ["engine"], ["engine"]]
+    assert answer["found"].endswith("/geofield/engine/bin/geofield")
+    assert answer["network"]["HTTPS_PROXY"] == "http://anna:p%40ss%20word@proxy.farm:3128"
+    assert "1080 MB" in answer["consent"]
+
+
+def running(word):
+    """Commands that name this folder, QGIS itself left out."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            line = entry.read_bytes().decode("utf-8", "replace").split("\0")
+        except OSError:
+            continue
+        if any(each.startswith(word) for each in line):
+            found.append(line)
+    return found
+
+
+def until(true, seconds):
+    begun = time.monotonic()
+    while not true():
+        assert time.monotonic() - begun < seconds
+        time.sleep(0.1)

@@ -106,3 +106,4 @@ def test_a_whole_review_by_keys(seen):
 def test_nothing_is_left_after_unloading(seen):
     assert seen["after_reload"] == [1, 1]
     assert seen["after_unload"] == [0, 0]
+    assert not seen["engine_left"]

@@ -465,6 +465,11 @@
     </message>
     <message>
       <location filename="planner.py" />
+      <source>Whether the terms of {0} allow this is for you to say: use Plan a field in the toolbox, or a picture of your own.</source>
+      <translation>Ob die Bedingungen von {0} das erlauben, müssen Sie sagen: nehmen Sie Ein Feld planen in der Werkzeugkiste oder ein eigenes Bild.</translation>
+    </message>
+    <message>
+      <location filename="planner.py" />
       <source>{0} tracks, {1:.1f} km. Shift+click adds ground, Alt+click takes it away.</source>
       <translation>{0} Spuren, {1:.1f} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
     </message>
@@ -636,7 +641,7 @@
     <message>
       <location filename="description.json" />
       <source>Of the tracks: dominant (the way most of the border runs), longest_edge, hough, fewest, fewest_turns, or a heading in degrees clockwise from true north.</source>
-      <translation type="unfinished" />
+      <translation>Der Fahrspuren: dominant (wie der Rand meist verläuft), longest_edge, hough, fewest, fewest_turns oder ein Kurs in Grad von geografisch Nord im Uhrzeigersinn.</translation>
     </message>
     <message>
       <location filename="description.json" />
