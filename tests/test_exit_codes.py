@@ -99,7 +99,11 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "export": (
         ("export out/field.gpkg -f kml --out export",),
         ("export text.gpkg -f kml --out new", "export missing.gpkg -f kml --out new"),
-        ("export out/field.gpkg -f kml", "export out/field.gpkg -f shapefile --profile x --out n"),
+        (
+            "export out/field.gpkg -f gpgk --out n",
+            "export out/field.gpkg -f kml",
+            "export out/field.gpkg -f shapefile --profile x --out n",
+        ),
     ),
     "import": (
         ("import out/geojson/field.geojson -o import.gpkg",),

@@ -88,6 +88,12 @@ class FormatError(GeofieldError):
     """A product cannot be written, read or validated."""
 
 
+class UnknownFormatError(FormatError):
+    """A format was named that is not there: wrong usage, not work that failed."""
+
+    exit_code = 2
+
+
 class OutputExistsError(FormatError):
     """The product is there already and overwriting was not asked for."""
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from geofield.errors import FormatError
+from geofield.errors import FormatError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
 
@@ -25,7 +25,7 @@ def format_named(name: str) -> Format:
 
     Raises
     ------
-    FormatError
+    UnknownFormatError
         When there is none; says which name is nearest.
     """
     key = name.strip().lower()
@@ -36,7 +36,9 @@ def format_named(name: str) -> Format:
     names |= {f.title.lower(): f.name for f in FORMATS.values()}
     near = difflib.get_close_matches(key, list(names), n=1, cutoff=0.5)
     hint = f"Did you mean {names[near[0]]!r}? " if near else ""
-    raise FormatError(f"There is no format {name!r}.", hint=f"{hint}Formats: {', '.join(FORMATS)}.")
+    raise UnknownFormatError(
+        f"There is no format {name!r}.", hint=f"{hint}Formats: {', '.join(FORMATS)}."
+    )
 
 
 def detect(path: Path | str) -> Format:
