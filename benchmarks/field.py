@@ -291,8 +291,8 @@ def main() -> None:
         say(f"| **mean** | {means} |")
         say()
         say(
-            "The curves of `auto` were learned on these fields among others; `field_choice.md` "
-            f"has the figures of curves that never saw the site. Flagged: {flagged}."
+            "`auto` learned from some of these sites; `field_unseen.md` has figures of sites that "
+            f"it has not seen. Flagged: {flagged}."
         )
     say()
     for kind, fields in (("plain", simulated), ("crowded", crowded)):

@@ -18,7 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from geofield.errors import GeofieldError, GeofieldWarning
     from geofield.evaluation import evaluate
-    from geofield.field import extract_field
+    from geofield.field import extract_field, prepare_field
     from geofield.grid import Grid
     from geofield.imagery import read_scene, write_scene
     from geofield.model import Field, Scene, Tracks
@@ -45,6 +45,7 @@ _HOME = {
     "plan_field": "pipeline",
     "plan_route": "tracks",
     "plan_tracks": "tracks",
+    "prepare_field": "field",
     "read_plan": "plan",
     "read_scene": "imagery",
     "simulate_field": "simulate",
@@ -69,6 +70,7 @@ __all__ = [
     "plan_field",
     "plan_route",
     "plan_tracks",
+    "prepare_field",
     "read_plan",
     "read_scene",
     "simulate_field",

@@ -19,7 +19,8 @@ FIELD: Mapping[str, str] = MappingProxyType(
         "study": "geofield.study.threshold:segment",
     }
 )
-"""Each takes (scene, x_px, y_px) and returns a `Segmentation`; the study's also `regions`."""
+"""Each takes (scene, x_px, y_px) and returns a `Segmentation`; of auto also `include`, `exclude`
+and `search`, of the study also `regions`."""
 
 STUDY_STRATEGIES: Mapping[str, str] = MappingProxyType(
     dict.fromkeys(

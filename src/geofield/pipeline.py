@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FieldError, GeofieldError, TrackError
@@ -123,6 +124,7 @@ def run_field(
     regions: Sequence[int] = (),
     boundary: Field | None = None,
     window: Scene | None = None,
+    choose: int | None = None,
 ) -> Plan:
     """Stage 2: find the outline, unless a person drew it.
 
@@ -141,6 +143,8 @@ def run_field(
         The user's own outline; nothing is extracted then.
     window : Scene, optional
         The picture around the point, where it was read from the path already.
+    choose : int, optional
+        Take this one of the field's alternatives, by a person's word.
     """
     if isinstance(picture, Scene):
         scene = picture
@@ -149,12 +153,28 @@ def run_field(
     if previous is not None and not _holds(previous, lat=lat, lon=lon):
         _refuse_to_forget(previous, lat, lon)
         previous = None
-    if previous is not None and keeps_outline(previous) and boundary is None:
+    told = set() if previous is None else _points(previous.settings)
+    said = bool(_points(settings) - told)
+    settings = _with_points(settings, previous)
+    if previous is not None and boundary is None and choose and previous.field.alternatives:
+        field = previous.field.choose(choose)
+    elif (
+        previous is not None
+        and keeps_outline(previous)
+        and boundary is None
+        and not (previous.field.method == "chosen" and said)
+    ):
+        if said:
+            raise FieldError(
+                "The outline there was drawn by hand: it is kept, and no point changes it.",
+                hint="Move the outline itself, or --fresh to have it found again.",
+            )
         kept = "drawn" if previous.outline_edited else previous.field.method
         field = replace(previous.field, method=kept, quality=None)
     else:
         if boundary is None:
             field, scene = _find(picture, scene, lat, lon, settings, regions)
+            field = field.choose(choose) if choose else field
         else:
             field = boundary
             _refuse_elsewhere(boundary, scene)
@@ -198,7 +218,7 @@ def _find(
 
     options = settings.field.model_dump()
     if regions:
-        options["method"] = "study"
+        options |= {"method": "study", "include": (), "exclude": ()}
     if isinstance(picture, Scene) or regions or settings.imagery.size_m is None:
         # Numbers of regions, and a picture that is used as a whole, do not change.
         return extract_field(scene, lat=lat, lon=lon, regions=regions, **options), scene
@@ -209,10 +229,40 @@ def _find(
         wider = settings.imagery.model_copy(update={"size_m": size_m})
         return open_scene(picture, lat, lon, settings.model_copy(update={"imagery": wider}))
 
-    size_m = settings.imagery.size_m
+    size_m = max(settings.imagery.size_m, _reach_m(lat, lon, settings))
     return grow_field(
         read, lat=lat, lon=lon, size_m=size_m, largest_m=max(6400.0, size_m), **options
     )
+
+
+def _with_points(settings: Settings, previous: Plan | None) -> Settings:
+    """Settings with the points that an earlier plan of the field was told, too."""
+    if previous is None or previous.settings is None:
+        return settings
+    old, new = previous.settings.field, settings.field
+    # The last word on a place counts.
+    include = [one for one in old.include if one not in (*new.include, *new.exclude)]
+    exclude = [one for one in old.exclude if one not in (*new.include, *new.exclude)]
+    points = {"include": (*include, *new.include), "exclude": (*exclude, *new.exclude)}
+    return settings.model_copy(update={"field": new.model_copy(update=points)})
+
+
+def _points(settings: Settings | None) -> set[tuple[bool, tuple[float, float]]]:
+    """What was said of further places: whether each belongs, and where it is."""
+    if settings is None:
+        return set()
+    belong = {(True, place) for place in settings.field.include}
+    return belong | {(False, place) for place in settings.field.exclude}
+
+
+def _reach_m(lat: float, lon: float, settings: Settings) -> float:
+    """Side of the smallest window around a point that holds all further points, metres."""
+    ellipsoid = Geod(ellps="WGS84")
+    away_m = [
+        ellipsoid.line_length((lon, x), (lat, y))
+        for x, y in (*settings.field.include, *settings.field.exclude)
+    ]
+    return 2.1 * max(away_m, default=0.0)
 
 
 def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
@@ -299,7 +349,7 @@ def _refuse_too_wide(field: Field, spacing_m: float) -> None:
 
 def keeps_outline(previous: Plan) -> bool:
     """Whether an earlier plan's outline is a person's word."""
-    return previous.outline_edited or previous.field.method in ("drawn", "boundary")
+    return previous.outline_edited or previous.field.method in ("drawn", "boundary", "chosen")
 
 
 def _outline_changed(previous: Plan, field: Field) -> str:

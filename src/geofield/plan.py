@@ -18,7 +18,7 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence, quality_from_json
-from geofield.model.field import Field
+from geofield.model.field import Alternative, Field
 from geofield.model.frame import along_frame, outside_in_words
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
@@ -117,6 +117,8 @@ class Plan:
     def _tables(self) -> dict[str, gpd.GeoDataFrame]:
         """All tables but the field's own."""
         tables = {} if self.obstacles is None else {schema.OBSTACLES.name: self.obstacles}
+        if self.field.alternatives:
+            tables[schema.ALTERNATIVES.name] = self._alternatives_table()
         return tables if self.tracks is None else tables | self.tracks.tables()
 
     def _provenance(self) -> Provenance:
@@ -302,6 +304,19 @@ class Plan:
 
         return PlanPage(document(self.to_dataset(), self.scene), height_px)
 
+    def _alternatives_table(self) -> gpd.GeoDataFrame:
+        polygons = [one.polygon for one in self.field.alternatives]
+        return schema.table(
+            schema.ALTERNATIVES,
+            {
+                "alternative_no": list(range(1, len(polygons) + 1)),
+                "area_ha": [one.area / 10_000.0 for one in polygons],
+                "certainty": [one.certainty for one in self.field.alternatives],
+            },
+            polygons,
+            self.field.crs,
+        )
+
     def _field_table(self) -> gpd.GeoDataFrame:
         from geofield.tracks.direction import find_baseline
 
@@ -375,7 +390,17 @@ def _field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[
             for name in schema.own_columns(schema.FIELD, rows)
             if rows[name].notna().iloc[0]
         ),
+        alternatives=_alternatives(dataset.tables.get(schema.ALTERNATIVES.name)),
     )
+
+
+def _alternatives(rows: gpd.GeoDataFrame | None) -> tuple[Alternative, ...]:
+    """The alternatives that were written, by number."""
+    if rows is None or not len(rows):
+        return ()
+    rows = rows.sort_values("alternative_no")
+    pairs = zip(rows.geometry, rows["certainty"], strict=True)
+    return tuple(Alternative(_single_polygon(shape), float(sure)) for shape, sure in pairs)
 
 
 def _single_polygon(geometry: shapely.Geometry) -> shapely.Polygon:

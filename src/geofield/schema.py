@@ -74,6 +74,8 @@ class Layer:
     columns : tuple of Column
     optional : bool
         Written only when the plan has it.
+    working : bool
+        For a person to decide by: only in the plan's own GeoPackage and its QGIS project.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Layer:
     key: tuple[str, ...]
     columns: tuple[Column, ...]
     optional: bool = False
+    working: bool = False
 
     @property
     def column_names(self) -> list[str]:
@@ -131,6 +134,21 @@ FIELD = Layer(
         Column("certainty", "float", "Certainty", "certainty", "1"),
         Column("doubts", "str", "Doubts", "doubts"),
     ),
+)
+
+ALTERNATIVES = Layer(
+    "alternatives",
+    "Polygon",
+    "Alternatives",
+    "The most likely different outlines; number 1 is the one that was taken.",
+    ("alternative_no",),
+    (
+        Column("alternative_no", "int", "Alternative", "altern_no"),
+        Column("area_ha", "float", "Area", "area_ha", "har"),
+        Column("certainty", "float", "Certainty", "certainty", "1"),
+    ),
+    optional=True,
+    working=True,
 )
 
 OBSTACLES = Layer(
@@ -292,6 +310,7 @@ LAYERS: tuple[Layer, ...] = (
     HEADLAND_TRACKS,
     ROUTE,
     TURNS,
+    ALTERNATIVES,
 )
 
 

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     PositiveFloat,
@@ -71,6 +72,22 @@ def _direction(value: str) -> str:
     if not math.isfinite(heading):
         raise ValueError("input should be a finite heading")
     return value
+
+
+def _lonlat(value: Any) -> Any:
+    """Longitude and latitude of a text ``LON,LAT``; what is a pair already stays."""
+    if isinstance(value, str):
+        value = value.split(",")
+    if len(value) != 2:
+        raise ValueError("write a position as LON,LAT, for instance 33.531142,35.075373")
+    lon, lat = (float(part) for part in value)
+    if not (abs(lon) <= 180 and abs(lat) <= 90):
+        raise ValueError(f"{lon:g},{lat:g} is no longitude and latitude")
+    return lon, lat
+
+
+LonLat = Annotated[tuple[float, float], BeforeValidator(_lonlat)]
+"""Longitude and latitude, degrees."""
 
 
 class Section(BaseModel):
@@ -170,6 +187,16 @@ class FieldSettings(Section):
     )
     smooth: Literal["none", "diffusion"] = Field(
         "none", description="Smoothing of the picture first; diffusion is anisotropic."
+    )
+    include: tuple[LonLat, ...] = Field(
+        (),
+        description="Further ground that belongs to the field, LON,LAT; repeat for several.",
+        json_schema_extra={"option": "--include-lonlat"},
+    )
+    exclude: tuple[LonLat, ...] = Field(
+        (),
+        description="Ground that does not belong to the field, LON,LAT; repeat for several.",
+        json_schema_extra={"option": "--exclude-lonlat"},
     )
 
 

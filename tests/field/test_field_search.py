@@ -1,25 +1,21 @@
 """The steps of the default method, each alone: clearing, redrawing, measuring, aligning."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import shapely
 from shapely import Polygon, box
 
-from geofield.errors import FieldError
-from geofield.field import choice, scoring
-from geofield.field.auto import footing
-from geofield.field.border import FIGURES
 from geofield.field.border import measure as measure_inside
 from geofield.field.clearing import clear
 from geofield.field.hierarchy import merge
 from geofield.field.morphology import filled, inner, plump
+from geofield.field.ranking import expected_overlaps
 from geofield.field.refine import aligned
-from geofield.field.regions import partition, regions
+from geofield.field.regions import partition
+from geofield.field.regions import regions as regions_around
+from geofield.field.search import open_ground
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
-from geofield.field.table import read_table
 
 
 def overlap(a, b):
@@ -33,6 +29,12 @@ def picture(shape=(160, 160), seed=0):
 
 def measure(surface, outline):
     return measure_inside(surface, outline, surface.members(ring(outline)))
+
+
+def regions(parted, seed, include=(), exclude=()):
+    """With a network that knows nothing."""
+    likely = np.full(parted.tree.leaf_count, 0.2)
+    return regions_around(parted, likely, (seed, *include), exclude)
 
 
 def disc(shape, x, y, radius):
@@ -76,18 +78,40 @@ def test_a_region_that_only_grew_a_tendril_comes_once():
     found = regions(partition(stack), (60.5, 60.5))
     assert any(abs(one.mask.sum() - 6400) < 300 for one in found)
     assert len(found) > 1
-    for one, following in pairwise(found):
-        assert not np.array_equal(one.mask, following.mask)
+    masks = {one.mask.tobytes() for one in found}
+    assert len(masks) == len(found)
 
 
-def test_a_nook_beyond_a_neck_does_not_stand_for_what_lies_behind_it():
-    stack = picture() + 30
-    for rows, columns in ((30, 60), (20, 40)), ((52, 56), (20, 150)), ((52, 150), (60, 150)):
-        stack[:, slice(*rows), slice(*columns)] -= 30
-    found = regions(partition(stack), (30.5, 40.5))
-    assert len(found) > 1
-    for one, following in pairwise(found):
-        assert following.mask.sum() > 1.1 * one.mask.sum()
+def test_points_take_parts_away_and_add_them():
+    stack = picture((240, 240))
+    stack[0, 40:120, 40:120] += 12
+    stack[0, 40:120, 120:200] += 9
+    stack[0, 130:200, 40:200] += 22
+    parted = partition(stack)
+    left, right, below = (80.5, 80.5), (160.5, 80.5), (120.5, 165.5)
+    for include, exclude in (((), (right,)), ((right,), (below,)), ((below,), (right,))):
+        found = regions(parted, left, include, exclude)
+        obeying = [
+            one
+            for one in found
+            if all(one.mask[int(y), int(x)] for x, y in (left, *include))
+            and not any(one.mask[int(y), int(x)] for x, y in exclude)
+        ]
+        assert obeying, (include, exclude)
+    both = np.zeros((240, 240), bool)
+    both[40:120, 40:200] = True
+    found = regions(parted, left, (right,), (below,))
+    assert max((one.mask & both).sum() / (one.mask | both).sum() for one in found) > 0.95
+
+
+def test_what_the_network_takes_for_the_field_is_a_region():
+    stack = picture()
+    parted = partition(stack)
+    wanted = np.zeros((160, 160), np.float32)
+    wanted[30:110, 20:90] = 0.9
+    found = regions_around(parted, parted.mean(wanted), ((50.5, 60.5),), ())
+    shares = [(one.mask & (wanted > 0)).sum() / (one.mask | (wanted > 0)).sum() for one in found]
+    assert max(shares) > 0.9
 
 
 def test_a_road_does_not_give_way():
@@ -117,11 +141,11 @@ def test_a_point_on_a_crown_at_the_border_stands_on_the_crowns_own_ground():
     crown = disc((160, 160), 75, 60, 5)
     stack[1, crown & (np.indices((160, 160))[1] < 80)] -= 15
     parted = partition(stack)
-    x, y = footing(parted, np.zeros((160, 160), bool), (78.5, 60.5))
+    x, y = open_ground(parted, np.zeros((160, 160), bool), (78.5, 60.5))
     assert x < 80
     assert np.hypot(x - 75, y - 60) > 4.5
-    open_ground = (20.5, 60.5)
-    assert footing(parted, np.zeros((160, 160), bool), open_ground) == open_ground
+    free = (20.5, 60.5)
+    assert open_ground(parted, np.zeros((160, 160), bool), free) == free
 
 
 @pytest.mark.parametrize(
@@ -154,8 +178,6 @@ def test_figures_tell_a_border_from_none():
     )
     assert on is not None
     assert off is not None
-    assert len(on) == len(FIGURES) == len(set(FIGURES))
-    on, off = (dict(zip(FIGURES, one, strict=True)) for one in (on, off))
     assert on["strength_10"] > np.log(5) > off["strength_50"] + 1
     assert on["share_faint"] == 0
     assert off["share_faint"] > 0.9
@@ -196,27 +218,15 @@ def test_a_side_beside_the_frame_is_the_frame():
 def test_the_choice_prefers_what_others_agree_with():
     small, large = box(0, 0, 100, 100), box(0, 0, 100, 104)
     lone = box(0, 0, 30, 30)
-    best, expected = choice.choose([lone, small, large], np.array([0.1, 0.0, -0.2]))
-    assert best == 1
-    assert 0.5 < expected < 0.9
-    best, expected = choice.choose([lone, small, large], np.array([0.1, 0.0, -0.2]), boldness=50)
-    assert best == 0, "scores taken far beyond their word"
-    assert expected > 0.95
-
-
-def test_the_learned_table_is_of_these_figures_and_says_what_it_doubts():
-    curves = scoring.learned()
-    assert curves.slope.shape == (3, len(scoring.NAMES))
-    usual = curves.usual
-    sure, fair, doubtful = (curves.certainty(expected, usual) for expected in (0.99, 0.7, 0.3))
-    assert sure > fair > doubtful
-    rival, crooked = usual.copy(), usual.copy()
-    rival[scoring.NAMES.index("inside_95_above_border")] += 1.0  # e times as strong
-    crooked[scoring.NAMES.index("long_sides_share")] = 0.6
-    assert curves.certainty(0.7, rival) < fair
-    assert curves.certainty(0.7, crooked) < fair
-    with pytest.raises(FieldError, match=r"outline\.json is of another version"):
-        read_table("outline", "figures", scoring.NAMES[1:])
+    scores = np.array([0.1, 0.0, -0.2])
+    belief, expected, overlap = expected_overlaps([lone, small, large], scores)
+    assert belief.sum() == pytest.approx(1)
+    assert int(np.argmax(expected)) == 1
+    assert 0.5 < expected[1] < 0.9
+    assert overlap[1, 2] == pytest.approx(100 / 104, abs=0.02)
+    _, expected, _ = expected_overlaps([lone, small, large], 50 * scores)
+    assert int(np.argmax(expected)) == 0, "scores taken far beyond their word"
+    assert expected[0] > 0.95
 
 
 def test_only_what_touches_no_border_is_a_hole():

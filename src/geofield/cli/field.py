@@ -23,6 +23,9 @@ Examples (on the project's own sample):
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --list
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
       --region 2 --region 3 -o field.gpkg
+  geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
+      --include-lonlat 33.5305,35.0753 --exclude-lonlat 33.5325,35.0738 \\
+      --alternatives -o field.gpkg --overwrite
 """
 )
 @click.argument("imagery", type=click.Path(path_type=str))
@@ -53,6 +56,16 @@ Examples (on the project's own sample):
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the study's pictures: grey, binary, numbered regions, reconstruction.",
 )
+@click.option(
+    "--alternatives",
+    is_flag=True,
+    help="Show the most likely different outlines; the file's layer alternatives has them.",
+)
+@click.option(
+    "--choose",
+    type=click.IntRange(1, 3),
+    help="Take this outline of the alternatives: your word, kept on every later run.",
+)
 @boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @settings_option
@@ -69,6 +82,8 @@ def field(
     list_regions: bool,
     regions: tuple[int, ...],
     pictures: Path | None,
+    alternatives: bool,
+    choose: int | None,
     boundary: Path | None,
     boundary_layer: str | None,
     boundary_name: str | None,
@@ -88,8 +103,10 @@ def field(
     from geofield.cli.imagery_tools import as_picture
     from geofield.pipeline import open_scene
 
-    if boundary is not None and (regions or list_regions):
-        raise click.UsageError("--boundary takes a parcel as it is: leave --list and --region out.")
+    if boundary is not None and (regions or list_regions or choose):
+        raise click.UsageError(
+            "--boundary takes a parcel as it is: leave --list, --region and --choose out."
+        )
     if not list_regions and output is None:
         raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
     with (
@@ -109,6 +126,8 @@ def field(
                 overwrite=overwrite,
                 fresh=fresh,
                 regions=regions,
+                choose=choose,
+                tell=alternatives,
                 parcel=None
                 if boundary is None
                 else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
@@ -126,6 +145,8 @@ def _extract(
     overwrite: bool,
     fresh: bool,
     regions: tuple[int, ...],
+    choose: int | None,
+    tell: bool,
     parcel: Field | None,
     as_json: bool,
 ) -> None:
@@ -149,6 +170,7 @@ def _extract(
         previous=previous,
         regions=regions,
         boundary=parcel,
+        choose=choose,
     )
     save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
     found = plan.field
@@ -164,6 +186,10 @@ def _extract(
                 "vertices": len(found.polygon.exterior.coords) - 1,
                 "holes": len(found.polygon.interiors),
                 "crs": found.crs.to_string(),
+                "alternatives": [
+                    {"area_ha": one.polygon.area / 1e4, "certainty": one.certainty}
+                    for one in found.alternatives
+                ],
                 "evidence": plan.to_dataset().provenance.evidence.get("field", {}),
             }
         )
@@ -176,6 +202,10 @@ def _extract(
         say(f"Trust      {found.quality.score:.0%}")
         for reason in found.quality.reasons:
             say(f"           {reason}")
+    if tell and not found.alternatives:
+        say("Others     none: only method auto offers alternatives")
+    for number, one in enumerate(found.alternatives if tell else (), 1):
+        say(f"Outline {number}  {one.polygon.area / 1e4:.2f} ha, certainty {one.certainty:.0%}")
     say(f"File       {output}")
 
 

@@ -51,7 +51,7 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
         "metric CRS": f"{authority_name(dataset.crs)} ({dataset.crs.name})",
         "rows": {
             layer.name: len(dataset.table(layer.name))
-            for layer in dataset.layers()
+            for layer in dataset.layers(working=True)
             if dataset.has(layer.name)
         },
     }

@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeVar
 import click
 from pydantic.fields import FieldInfo
 
-from geofield.settings import Settings, Stage
+from geofield.settings import LonLat, Settings, Stage
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -130,6 +130,8 @@ def _help(field: FieldInfo) -> str:
 
 def _click_type(annotation: Any) -> dict[str, Any]:
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation == LonLat:
+        return {"type": str, "metavar": "LON,LAT"}
     if origin is typing.Annotated:
         return _click_type(arguments[0])
     if origin in (types.UnionType, typing.Union):

@@ -39,66 +39,9 @@ _SHORT_PX = 12.0
 #: A border below this strength is none that an eye would see.
 _FAINT = 2.0
 
-FIGURES = (
-    "strength_mean",
-    "strength_10",
-    "strength_25",
-    "strength_50",
-    "strength_mean_above_inside",
-    "strength_10_above_inside",
-    "strength_25_above_inside",
-    "strength_50_above_inside",
-    "inside_strength",
-    "share_like_inside",
-    "share_faint",
-    "share_stronger_inside",
-    "share_stronger_outside",
-    "inside_80_above_border",
-    "inside_95_above_border",
-    "outside_above_border",
-    "longest_faint_share",
-    "longest_faint_px",
-    "strips_10",
-    "strips_25",
-    "strips_50",
-    "strips_whole",
-    "rim_strange_50",
-    "rim_strange_80",
-    "rim_strange_95",
-    "around_strange_10",
-    "around_strange_25",
-    "around_strange_50",
-    "share_around_like_rim",
-    "texture_step_25",
-    "texture_step_50",
-    "texture_step_whole",
-    "compactness",
-    "area_share",
-    "frame_share",
-    "vertices",
-    "convexity",
-    "long_sides_share",
-    "short_sides_share",
-    "area_px",
-    "right_angles",
-    "interior_50",
-    "interior_80",
-    "interior_95",
-    "interior_99",
-    "strength_50_above_interior",
-    "strength_25_above_interior",
-    "uneven_50",
-    "uneven_80",
-    "uneven_95",
-    "strange_share",
-    "rough_inside",
-    "rough_outside_above_inside",
-)
-"""Names of the figures of `measure`, in their order."""
 
-
-def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> FloatArray | None:
-    """The figures of an outline, in the order of `FIGURES`; None for a mere scrap.
+def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> dict[str, float] | None:
+    """The figures of an outline by name; None for a mere scrap.
 
     Parameters
     ----------
@@ -114,11 +57,13 @@ def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> FloatArray
         return None
     means = surface.means[:, inside]
     usual = np.array([_median(one) for one in means])
-    along, outside_rough = _along(surface, places, outward, usual)
-    interior = _interior(surface, inside, means, usual, outside_rough)
-    above = [along[at] - interior[1] for at in (3, 2)]
-    shape = _shape(outline, vertices, frame, surface.shape)
-    return np.array([*along, *shape, *interior[:4], *above, *interior[4:]])
+    along = _along(surface, places, outward, usual)
+    interior = _interior(surface, inside, means, usual)
+    interior["rough_outside_above_inside"] = along.pop("rough_outside") - interior["rough_inside"]
+    for share in (50, 25):
+        above = along[f"strength_{share}"] - interior["interior_80"]
+        interior[f"strength_{share}_above_interior"] = above
+    return along | _shape(outline, vertices, frame, surface.shape) | interior
 
 
 def _places(vertices: FloatArray, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray, float]:
@@ -154,11 +99,8 @@ def _look(
 
 def _along(
     surface: Surface, places: FloatArray, outward: FloatArray, usual_inside: FloatArray
-) -> tuple[list[float], float]:
-    """Strength at the outline, inside and outside it; strips beside it against the interior.
-
-    Also how rough the ground outside is.
-    """
+) -> dict[str, float]:
+    """Strength at the outline, inside and outside it; strips beside it against the interior."""
     offsets = [*_AT_PX, *_INSIDE_PX, *_OUTSIDE_PX]
     away = [offset + across for across in (-_ACROSS_PX, 0.0, _ACROSS_PX) for offset in offsets]
     strips = [*(-one for one in _STRIP_PX), *_STRIP_PX]
@@ -185,49 +127,50 @@ def _along(
     beside = np.log(_ranked(_norm(step_beside[:, :-1]), [0.1, 0.25, 0.5]) + 0.3)
     texture = np.log(_ranked(np.abs(step_beside[:, -1]), [0.25, 0.5]) + 0.1)
     rim_strange, strange = (_norm(part[:, :-1] - usual_inside) for part in (rim, around))
-    return [
-        mean,
-        *quantiles,
-        mean - base,
-        *(quantiles - base),
-        base,
-        float(np.mean(own < 1.5 * noise)),
-        float(np.mean(own < _FAINT)),
-        float(np.mean(within > own)),
-        float(np.mean(outside > own)),
-        *inner,
-        float(np.log(outside + 0.3).mean()) - mean,
-        longest / len(places),
-        math.log1p(longest),
-        *beside,
-        math.log(float(np.linalg.norm(step_beside[:, :-1].mean(axis=0))) + 0.3),
-        *np.log(_ranked(rim_strange, [0.5, 0.8, 0.95]) + 0.3),
-        *np.log(_ranked(strange, [0.1, 0.25, 0.5]) + 0.3),
-        float(np.mean(strange < rim_strange + 0.5)),
-        *texture,
-        float(step_beside[:, -1].mean()),
-    ], _median(beyond)
+    return {
+        "strength_mean": mean,
+        **_named("strength", (10, 25, 50), quantiles),
+        "strength_mean_above_inside": mean - base,
+        **_named("strength", (10, 25, 50), quantiles - base, "_above_inside"),
+        "inside_strength": base,
+        "share_like_inside": float(np.mean(own < 1.5 * noise)),
+        "share_faint": float(np.mean(own < _FAINT)),
+        "share_stronger_inside": float(np.mean(within > own)),
+        "share_stronger_outside": float(np.mean(outside > own)),
+        **_named("inside", (80, 95), inner, "_above_border"),
+        "outside_above_border": float(np.log(outside + 0.3).mean()) - mean,
+        "longest_faint_share": longest / len(places),
+        "longest_faint_px": math.log1p(longest),
+        **_named("strips", (10, 25, 50), beside),
+        "strips_whole": math.log(float(np.linalg.norm(step_beside[:, :-1].mean(axis=0))) + 0.3),
+        **_named("rim_strange", (50, 80, 95), np.log(_ranked(rim_strange, [0.5, 0.8, 0.95]) + 0.3)),
+        **_named("around_strange", (10, 25, 50), np.log(_ranked(strange, [0.1, 0.25, 0.5]) + 0.3)),
+        "share_around_like_rim": float(np.mean(strange < rim_strange + 0.5)),
+        **_named("texture_step", (25, 50), texture),
+        "texture_step_whole": float(step_beside[:, -1].mean()),
+        "rough_outside": math.log(_median(beyond) + 0.3),
+    }
 
 
 def _shape(
     outline: Polygon, vertices: FloatArray, frame: float, shape: tuple[int, int]
-) -> list[float]:
+) -> dict[str, float]:
     """How plain the outline is."""
     side = np.roll(vertices, -1, axis=0) - vertices
     length = np.hypot(*side.T)
     around, area = float(length.sum()), outline.area
     turn = np.exp(4j * np.arctan2(side[:, 1], side[:, 0]))
-    return [
-        math.log(4 * math.pi * area / around**2),
-        math.log(area / (shape[0] * shape[1])),
-        frame,
-        math.log(len(vertices)),
-        area / shapely.convex_hull(outline).area,
-        float(length[length >= 0.15 * math.sqrt(area)].sum()) / around,
-        float(np.mean(length < _SHORT_PX)),
-        math.log(area),
-        float(abs(length @ turn)) / around,
-    ]
+    return {
+        "compactness": math.log(4 * math.pi * area / around**2),
+        "area_share": math.log(area / (shape[0] * shape[1])),
+        "frame_share": frame,
+        "vertices": math.log(len(vertices)),
+        "convexity": area / shapely.convex_hull(outline).area,
+        "long_sides_share": float(length[length >= 0.15 * math.sqrt(area)].sum()) / around,
+        "short_sides_share": float(np.mean(length < _SHORT_PX)),
+        "area_px": math.log(area),
+        "right_angles": float(abs(length @ turn)) / around,
+    }
 
 
 def _interior(
@@ -235,8 +178,7 @@ def _interior(
     inside: BoolArray,
     means: FloatArray,
     usual: FloatArray,
-    outside_rough: float,
-) -> list[float]:
+) -> dict[str, float]:
     """Borders within the outline, how uneven and how rough the ground is."""
     first, second, strength = surface.neighbours
     within = strength[inside[first] & inside[second]]
@@ -246,13 +188,21 @@ def _interior(
     uneven = np.log(_ranked(distance, [0.5, 0.8, 0.95]) + 0.3)
     rows, columns = surface.centres
     rough = _median(surface.layers[rows[inside], columns[inside], -1])
-    return [
-        *inner,
-        *uneven,
-        float(np.mean(distance > 6.0)),
-        math.log(rough + 0.3),
-        math.log(outside_rough + 0.3) - math.log(rough + 0.3),
-    ]
+    return {
+        **_named("interior", (50, 80, 95, 99), inner),
+        **_named("uneven", (50, 80, 95), uneven),
+        "strange_share": float(np.mean(distance > 6.0)),
+        "rough_inside": math.log(rough + 0.3),
+    }
+
+
+def _named(
+    name: str, shares: tuple[int, ...], values: NDArray[np.floating], more: str = ""
+) -> dict[str, float]:
+    """Quantiles by name and share in per cent."""
+    return {
+        f"{name}_{share}{more}": float(value) for share, value in zip(shares, values, strict=True)
+    }
 
 
 def _smoothed(values: NDArray[np.float32], width: int) -> NDArray[np.float32]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import shapely
 from shapely import Polygon
@@ -12,15 +12,19 @@ from shapely import Polygon
 from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
+from geofield.field.points import obeying
 from geofield.field.quality import judge
+from geofield.field.search import FieldSearch, search_field
 from geofield.field.segmentation import fill_holes, part_at
 from geofield.methods import FIELD
 from geofield.methods import method as method_of
-from geofield.model import Field, Scene
+from geofield.model import Alternative, Field, FieldQuality, Scene
 from geofield.model.segmentation import Segmentation
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
+#: Longitude and latitude, degrees.
+Places = Sequence[tuple[float, float]]
 
 
 def extract_field(
@@ -28,6 +32,8 @@ def extract_field(
     *,
     lat: float,
     lon: float,
+    include: Places = (),
+    exclude: Places = (),
     method: str = "auto",
     regions: Sequence[int] = (),
     holes: Holes | None = None,
@@ -35,6 +41,7 @@ def extract_field(
     tolerance_px: float = 3.0,
     smooth: Smoothing = "none",
     name: str = "",
+    search: FieldSearch | None = None,
 ) -> Field:
     """Find the outline of the field around a point.
 
@@ -43,6 +50,9 @@ def extract_field(
     scene : Scene
     lat, lon : float
         A point in the field, degrees, WGS 84.
+    include, exclude : sequence of (lon, lat)
+        Further points, degrees: ground that belongs to the field, ground that does not. What
+        they say is obeyed.
     method : str
         ``auto`` uses colour, near infrared, texture and edges; ``study`` is the study's
         threshold (METHOD.md, section 2).
@@ -59,18 +69,21 @@ def extract_field(
         Smoothing of the picture first: anisotropic diffusion keeps borders and evens
         surfaces.
     name : str
+    search : FieldSearch, optional
+        What `prepare_field` made of the same scene and point: further points then cost only
+        what they change.
 
     Returns
     -------
     Field
-        In the grid's metric CRS, with its `quality`.
+        In the grid's metric CRS, with its `quality` and, of ``auto``, its `alternatives`.
 
     Raises
     ------
     PointOutsideError
-        When the point is outside the picture or on no data.
+        When a point is outside the picture or on no data.
     FieldError
-        When there is no field to take.
+        When there is no field to take, or points contradict each other.
 
     Warns
     -----
@@ -85,34 +98,50 @@ def extract_field(
         raise SettingsError(
             f"Numbered regions belong to method study, not {method}.", hint="Use method study."
         )
+    if (include or exclude) and method != "auto":
+        raise SettingsError(
+            f"Further points belong to method auto, not {method}.", hint="Use method auto."
+        )
     if holes not in (None, "fill", "keep"):
         raise SettingsError(f"Unknown choice {holes!r} for holes.", hint="Use fill or keep.")
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
     if smooth not in ("none", "diffusion"):
         raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
-    x_px, y_px = scene.pixel_of(lat=lat, lon=lon)
+    seed = scene.pixel_of(lat=lat, lon=lon)
+    belong, apart = (
+        tuple(scene.pixel_of(lat=y, lon=x) for x, y in places) for places in (include, exclude)
+    )
     if scene.is_blank:
         raise FieldError(
             "The picture is empty: all its pixels have the same value.",
             hint="Check the source, the band and the scaling, for instance with QGIS.",
         )
     picture = diffused(scene) if smooth == "diffusion" else scene
-    chosen = {"regions": tuple(regions)} if regions else {}
-    found: Segmentation = method_of(FIELD, method)(picture, x_px, y_px, **chosen)
+    chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
+    if method == "auto":
+        chosen = {"include": belong, "exclude": apart, "search": search}
+    found: Segmentation = method_of(FIELD, method)(picture, *seed, **chosen)
     keep = holes == "keep" or (holes is None and method == "study")
-    resolution = scene.grid.ground_resolution_m
-    smallest = min_hole_m2 / resolution**2 if keep else None
-    filled = fill_holes(found.mask, smallest_kept_px=smallest)
-    if not regions:
-        filled = part_at(filled, x_px, y_px)
-    if not filled.any():
-        raise FieldError(
-            f"No field was found at lat {lat}, lon {lon}.",
-            hint="Choose a point in the open field, or give its outline with --boundary.",
-        )
-    outline_px = straight_outline(filled, tolerance_px=tolerance_px)
-    quality = judge(scene, filled, outline_px, found, (x_px, y_px))
+    smallest = min_hole_m2 / scene.grid.ground_resolution_m**2 if keep else None
+
+    def outlined(one: Segmentation) -> tuple[Polygon, FieldQuality]:
+        """Outline, pixel coordinates, and its quality."""
+        filled = fill_holes(one.mask, smallest_kept_px=smallest)
+        if not regions:
+            filled = part_at(filled, *seed)
+        if not filled.any():
+            raise FieldError(
+                f"No field was found at lat {lat}, lon {lon}.",
+                hint="Choose a point in the open field, or give its outline with --boundary.",
+            )
+        outline_px = straight_outline(filled, tolerance_px=tolerance_px)
+        if belong or apart:
+            outline_px = obeying(outline_px, (seed, *belong), apart)
+        return outline_px, judge(scene, filled, outline_px, one, seed)
+
+    outline_px, quality = outlined(found)
+    others = [outlined(one) for one in found.alternatives]
     field = Field(
         _to_metric(outline_px, scene),
         scene.grid.metric_crs,
@@ -122,6 +151,12 @@ def extract_field(
         imagery=scene.source.name,
         imagery_date=scene.source.date,
         licence=scene.source.licence,
+        alternatives=tuple(
+            Alternative(_to_metric(polygon, scene), dict(judged.figures)["certainty"])
+            for polygon, judged in ((outline_px, quality), *others)
+        )
+        if method == "auto"
+        else (),
     )
     if not quality.trusted:
         warnings.warn(
@@ -131,6 +166,18 @@ def extract_field(
             stacklevel=2,
         )
     return field
+
+
+def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
+    """What `extract_field` can keep between points; it can be pickled.
+
+    Parameters
+    ----------
+    scene : Scene
+    lat, lon : float
+        The point in the field, degrees, WGS 84.
+    """
+    return search_field(scene, *scene.pixel_of(lat=lat, lon=lon))
 
 
 def _to_metric(outline_px: Polygon, scene: Scene) -> Polygon:

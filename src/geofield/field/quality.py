@@ -18,7 +18,7 @@ BoolArray = NDArray[np.bool_]
 _SMALL_M2 = 400.0
 #: From this score on an outline is used without a warning. The score is the probability of a
 #: good outline, lowered for what that probability knows nothing of.
-_TRUSTED = 0.5
+_TRUSTED = 0.45
 
 
 def judge(
@@ -48,11 +48,10 @@ def judge(
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
-    score = measured.get("certainty", 1.0) - 0.55 * len(strange)
-    reasons.extend(strange)
+    score = measured.get("certainty", 1.0) - sum(costs for _, costs in strange)
+    reasons.extend(words for words, _ in strange)
     if touching > 0.0:
         reasons.append(outside_in_words(touching))
-        score -= min(0.1, touching) if touching > 0.02 else 0.0
     if covered > 0.95:
         reasons.append("it fills the whole picture")
         score -= 0.6

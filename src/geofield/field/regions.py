@@ -1,14 +1,14 @@
-"""Regions: the nested regions around the seed that may be the field.
+"""Regions: sets of superpixels around the points that may be the field.
 
-Each merge along the chain asks: did this cross a field's border? What a region has merged
-so far, its toll, speaks for or against it.
+Superpixels merge across their weakest borders first; the pieces around the seed make a chain
+from a patch of ground to the whole picture. Further points take parts of that tree away or add
+them. What the network takes for the field makes a few regions more.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from geofield.field.evidence import gradient
 from geofield.field.hierarchy import MergeTree, merge
 from geofield.field.morphology import filled, tidy
-from geofield.field.superpixels import BorderLine, Borders, borders, superpixels
+from geofield.field.superpixels import Borders, borders, superpixels
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
+Points = tuple[tuple[float, float], ...]
 
 #: Side of a superpixel's cell, pixels.
 STEP_PX = 5
@@ -27,33 +28,17 @@ STEP_PX = 5
 SMALLEST_SHARE = 0.006
 #: The same in pixels.
 SMALLEST_PX = 200.0
-#: A part below this share of the region joins it without being asked.
-_TRIFLE_SHARE = 0.03
 #: A region of which a smaller share hangs together with the seed is none around the seed.
 _OWN_SHARE = 0.2
-
-TOLLS = (
-    "merges",
-    "seam",
-    "merge_height",
-    "straight_seam",
-    "seam_straightness",
-    "inside_50",
-    "inside_80",
-    "seam_above_1",
-    "merge_height_above_inside",
-    "straight_seam_above_half",
-    "share",
-    "highest_above_inside",
-    "seam_above_inside",
-    "inside_95",
-)
-"""What each merge adds to the toll; strengths as logarithms, weighted by how much joined."""
+#: So many regions of a chain are looked at, those that agree best with the network.
+_MOST = 14
+#: Superpixels from these probabilities on make regions of the network's own.
+_LIKELY = (0.3, 0.5, 0.7)
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """One region of the chain.
+    """What may be the field.
 
     Attributes
     ----------
@@ -61,13 +46,10 @@ class Region:
         Holes filled, tendrils cut, notches closed.
     holes : bool array
         What was filled.
-    toll : float array (tolls,)
-        Of the merges that made it, see `TOLLS`.
     """
 
     mask: BoolArray
     holes: BoolArray
-    toll: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +70,20 @@ class Partition:
     pairs: tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray]
     tree: MergeTree
 
+    @property
+    def size_px(self) -> FloatArray:
+        """Pixels in each superpixel."""
+        return self.tree.size_px[: self.tree.leaf_count]
+
+    def at(self, points: Points) -> list[int]:
+        """The superpixels at points, pixel coordinates."""
+        return [int(self.labels[int(y), int(x)]) for x, y in points]
+
+    def mean(self, layer: NDArray[np.floating]) -> FloatArray:
+        """Mean of a layer (rows, columns) in each superpixel."""
+        total = np.bincount(self.labels.ravel(), layer.ravel(), self.tree.leaf_count)
+        return np.asarray(total / self.size_px)
+
 
 def partition(stack: NDArray[np.float32]) -> Partition:
     """Superpixels of whitened channels, merged across their weakest borders first."""
@@ -99,68 +95,71 @@ def partition(stack: NDArray[np.float32]) -> Partition:
     return Partition(labels, lines, pairs, merge(sizes, *pairs))
 
 
-def regions(parted: Partition, seed_px: tuple[float, float]) -> list[Region]:
-    """The regions around the seed that may be the field, from small to large, no shape twice."""
-    labels, tree = parted.labels, parted.tree
-    first, second, _, strength = parted.pairs
+def regions(
+    parted: Partition, likely: FloatArray, include: Points, exclude: Points
+) -> list[Region]:
+    """The regions around the points that may be the field.
+
+    Parameters
+    ----------
+    parted : Partition
+    likely : float array (superpixels,)
+        How likely each belongs to the field.
+    include, exclude : tuple of (float, float)
+        Points that belong and that do not, pixel coordinates; the first one is the seed.
+    """
+    size = parted.size_px
+    wanted, unwanted = parted.at(include), set(parted.at(exclude))
+    unwanted -= set(wanted)
+    smallest = max(SMALLEST_PX, SMALLEST_SHARE * parted.labels.size)
+    everywhere = float(size @ likely)
+    sets: dict[bytes, tuple[float, BoolArray]] = {}
+    for members in _chain(parted.tree, wanted, unwanted):
+        area = float(size @ members)
+        if area >= smallest:
+            common = float(size @ (likely * members))
+            sets[members.tobytes()] = common / (area + everywhere - common), members
+    ranked = sorted(sets.values(), key=lambda one: -one[0])[:_MOST]
+    chosen = [members for _, members in ranked]
+    for least in _LIKELY:
+        members = likely > least
+        members[wanted] = True
+        members[list(unwanted)] = False
+        chosen.append(members)
     found: list[Region] = []
-    toll = np.zeros(len(TOLLS))
-    highest = 0.0
-    for region, following in pairwise(tree.chain(int(labels[int(seed_px[1]), int(seed_px[0])]))):
-        other = tree.beside(region)
-        size, joins = float(tree.size_px[region]), float(tree.size_px[other])
-        share = size / labels.size
-        trifle = joins < _TRIFLE_SHARE * size and share < 0.9
-        if size < SMALLEST_PX or share < SMALLEST_SHARE or trifle:
-            continue
-        member = np.zeros(tree.leaf_count, bool)
-        member[tree.leaves(region)] = True
-        raw = member[labels]
+    for members in chosen:
+        raw = members[parted.labels]
         whole = filled(raw)
-        part = tidy(whole, seed_px)
+        part = tidy(whole, include[0])
         own = part.sum() >= _OWN_SHARE * whole.sum()
-        if own and not (found and np.array_equal(part, found[-1].mask)):
-            found.append(Region(part, whole & ~raw, toll))
-        side = member.astype(np.int8)
-        side[tree.leaves(other)] = -1
-        seam = parted.lines.along(side)
-        height = float(tree.height[following])
-        within = strength[member[first] & member[second]]
-        inside = np.quantile(within, [0.5, 0.8, 0.95]) if len(within) else np.ones(3)
-        toll = toll + _toll(seam, height, highest, joins / size, float(whole.mean()), inside)
-        highest = max(highest, height)
+        if own and not any(np.array_equal(part, one.mask) for one in found):
+            found.append(Region(part, whole & ~raw))
     return found
 
 
-def _toll(
-    seam: BorderLine | None,
-    height: float,
-    highest: float,
-    joins: float,
-    share: float,
-    inside: FloatArray,
-) -> FloatArray:
-    """What one merge shows, weighted by how much joins."""
-    i50, i80, i95 = np.log(np.maximum(inside, 0.5))
-    mean, straight, both = 0.0, 0.0, 0.0
-    if seam is not None:
-        mean, straight = float(seam.strength.mean()), float(seam.straight.mean())
-        both = float((seam.strength * seam.straight).mean())
-    strength, merged, along = (math.log(value + 0.3) for value in (mean, height, both))
-    values = [
-        1.0,
-        strength,
-        merged,
-        along,
-        straight,
-        i50,
-        i80,
-        max(strength - 1.0, 0.0),
-        max(merged - i80 - 0.6, 0.0),
-        max(along - 0.5, 0.0),
-        math.log(share + 0.003),
-        max(math.log(highest + 0.3) - i80 - 0.6, 0.0),
-        max(strength - i50 - 0.7, 0.0),
-        i95,
-    ]
-    return math.sqrt(min(1.0, joins / 0.15)) * np.array(values)
+def _chain(tree: MergeTree, wanted: list[int], unwanted: set[int]) -> Iterator[BoolArray]:
+    """The regions from the first superpixel on up, as sets of superpixels that obey the points."""
+    apart = [(leaf, _largest(tree, leaf, set(wanted))) for leaf in unwanted]
+    along = [(leaf, _largest(tree, leaf, unwanted | {wanted[0]})) for leaf in wanted[1:]]
+    members = np.zeros(tree.leaf_count, bool)
+    for region in tree.chain(wanted[0]):
+        members[tree.leaves(region)] = True
+        one = members.copy()
+        for leaf, part in apart:
+            if members[leaf]:
+                one[part] = False
+        for leaf, part in along:
+            if not one[leaf]:
+                one[part] = True
+        yield one
+
+
+def _largest(tree: MergeTree, leaf: int, without: set[int]) -> NDArray[np.int64]:
+    """The largest region around a superpixel that holds none of some others."""
+    best = np.array([leaf])
+    for region in tree.chain(leaf):
+        leaves = tree.leaves(region)
+        if not without.isdisjoint(leaves.tolist()):
+            break
+        best = leaves
+    return best

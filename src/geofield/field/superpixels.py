@@ -6,20 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 #: Pixels on either side of a border that are compared across it.
 _DEPTH_PX = 2
-#: Neighbourhood in which a border's contrast is averaged and its straightness seen, pixels.
-_ALONG_PX = 15.0
-#: Scatter of a border about its own line that still counts as straight, pixels.
-_STRAIGHT_PX = 1.5
-#: Long borders are measured at this many places.
-_MOST_PLACES = 1200
 
 
 def superpixels(gradient: NDArray[np.float32], step_px: int) -> NDArray[np.int32]:
@@ -57,15 +49,12 @@ class Borders:
         Second minus first, a few pixels away from the side.
     ridge : float array (channels, n)
         The side itself minus the mean of both: a fence, a track, a ditch.
-    xy : float array (n, 2)
-        Pixel coordinates of its middle.
     """
 
     first: IntArray
     second: IntArray
     step: NDArray[np.float32]
     ridge: NDArray[np.float32]
-    xy: FloatArray
 
     def pairs(self, count: int) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         """Neighbours among `count` superpixels: first, second, length px, strength.
@@ -85,51 +74,6 @@ class Borders:
             ridge += np.square(np.bincount(index, other) / length)
         return keys // count, keys % count, length, np.sqrt(np.maximum(step, ridge))
 
-    def along(self, side: NDArray[np.int8]) -> BorderLine | None:
-        """What the border between two sets of superpixels shows along its way.
-
-        Parameters
-        ----------
-        side : int8 array
-            Per superpixel +1 (one set), -1 (the other) or 0 (neither).
-        """
-        one, other = side[self.first], side[self.second]
-        at = np.flatnonzero(one * other < 0)
-        if len(at) < 8:
-            return None
-        length_px = len(at)
-        if length_px > _MOST_PLACES:
-            at = at[np.linspace(0, length_px - 1, _MOST_PLACES).astype(int)]
-        xy = self.xy[at]
-        close = cKDTree(xy).query_pairs(_ALONG_PX, output_type="ndarray")
-        own = np.arange(len(at))
-        rows = np.concatenate([close[:, 0], close[:, 1], own])
-        columns = np.concatenate([close[:, 1], close[:, 0], own])
-        shape = (len(at), len(at))
-        near = coo_array((np.ones(len(rows), np.float32), (rows, columns)), shape).tocsr()
-        x, y = (xy - xy.mean(axis=0)).T
-        step = self.step[:, at] * np.where(one[at] > 0, 1, -1)
-        columns_of = [*step, *self.ridge[:, at], x, y, x * x, y * y, x * y]
-        mean = (near @ np.stack(columns_of, axis=1)) / near.sum(axis=1)[:, None]
-        half = len(step)
-        strength = np.maximum(
-            np.linalg.norm(mean[:, :half], axis=1), np.linalg.norm(mean[:, half : 2 * half], axis=1)
-        )
-        mx, my, mxx, myy, mxy = mean[:, 2 * half :].T
-        sxx, syy, sxy = mxx - mx * mx, myy - my * my, mxy - mx * my
-        thickness = (sxx + syy) / 2 - np.hypot((sxx - syy) / 2, sxy)
-        straight = np.exp(-np.maximum(thickness, 0) / _STRAIGHT_PX**2)
-        return BorderLine(strength, straight, length_px)
-
-
-@dataclass(frozen=True, eq=False)
-class BorderLine:
-    """A border's strength and straightness (0..1) at places along it; its length, px."""
-
-    strength: FloatArray
-    straight: FloatArray
-    length_px: int
-
 
 def borders(labels: NDArray[np.int32], stack: NDArray[np.float32]) -> Borders:
     """The borders between superpixels, measured in whitened channels."""
@@ -144,16 +88,12 @@ def borders(labels: NDArray[np.int32], stack: NDArray[np.float32]) -> Borders:
         low = padded[:, yp - _DEPTH_PX * down, xp - _DEPTH_PX * right]
         high = padded[:, yp + reach * down, xp + reach * right]
         middle = 0.5 * (padded[:, yp, xp] + padded[:, yp + down, xp + right])
-        xy = np.column_stack([x + 0.5 + 0.5 * right, y + 0.5 + 0.5 * down])
         ridge = middle - 0.5 * (low + high)
-        parts.append(
-            (here[y, x].astype(np.int64), there[y, x].astype(np.int64), high - low, ridge, xy)
-        )
+        parts.append((here[y, x].astype(np.int64), there[y, x].astype(np.int64), high - low, ridge))
     a, b = parts
     return Borders(
         np.concatenate([a[0], b[0]]),
         np.concatenate([a[1], b[1]]),
         np.concatenate([a[2], b[2]], axis=1),
         np.concatenate([a[3], b[3]], axis=1),
-        np.concatenate([a[4], b[4]]),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from geofield import schema
 from geofield.formats.format import Drop, Format
 
-_ALL = tuple(layer.name for layer in schema.LAYERS)
+_ALL = tuple(layer.name for layer in schema.LAYERS if not layer.working)
 _RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name", "points")
 
 _TERMINAL_DROPS = (

@@ -81,7 +81,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     # The file comes into place when it is whole: waiting for the disk after every layer and
     # statement would take most of the time. It is waited for once, at the end.
     with gdal_config(OGR_CURRENT_DATE=stamp, OGR_SQLITE_SYNCHRONOUS="OFF"):
-        for layer in dataset.layers():
+        for layer in dataset.layers(working=True):
             if layer.name == schema.TRACK_POINTS.name:
                 chunks = dataset.point_chunks() if with_points else iter(())
                 table = batches(layer, chunks)
@@ -105,7 +105,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         connection.execute("PRAGMA synchronous = OFF")
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
-        add_styles(connection, dataset.layers(), stamp, frame_strip(dataset))
+        add_styles(connection, dataset.layers(working=True), stamp, frame_strip(dataset))
         project = qgz_bytes(project_xml(dataset, path.name), stem, stamp)
         add_project(connection, stem, project, stamp)
     with path.open("rb") as file:
@@ -140,7 +140,7 @@ def _add_columns(connection: sqlite3.Connection, dataset: Dataset) -> None:
     """Titles, units and value lists of the columns (the Schema extension)."""
     connection.executescript(_DATA_COLUMNS)
     lists: dict[str, tuple[str, ...]] = {}
-    for layer in dataset.layers():
+    for layer in dataset.layers(working=True):
         for column in layer.columns:
             unit = f"Unit (UCUM): {column.unit}" if column.unit else None
             constraint = f"{layer.name}_{column.name}" if column.values else None

@@ -100,9 +100,19 @@ class Dataset:
             return len(self.table(schema.SEGMENTS.name)) > 0
         return name in self.tables and len(self.tables[name]) > 0
 
-    def layers(self) -> list[schema.Layer]:
-        """The layers to write, in the schema's order: all that are not optional, and these."""
-        return [each for each in schema.LAYERS if not each.optional or self.has(each.name)]
+    def layers(self, *, working: bool = False) -> list[schema.Layer]:
+        """The layers to write, in the schema's order: all that are not optional, and these.
+
+        Parameters
+        ----------
+        working : bool
+            With those that only the plan's own file has.
+        """
+        return [
+            each
+            for each in schema.LAYERS
+            if (not each.optional or self.has(each.name)) and (working or not each.working)
+        ]
 
     def point_chunks(self) -> Iterator[gpd.GeoDataFrame]:
         """The track points, a table at a time."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,22 @@ class FieldQuality:
     trusted: bool = True
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Alternative:
+    """An outline that may be meant.
+
+    Attributes
+    ----------
+    polygon : shapely.Polygon
+        In the field's CRS.
+    certainty : float
+        Probability that it is right.
+    """
+
+    polygon: Polygon
+    certainty: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Field:
     """A field.
@@ -69,6 +85,9 @@ class Field:
         ISO 8601.
     own : tuple of (str, value)
         The columns that the user added to the layer `field`.
+    alternatives : tuple of Alternative
+        The most likely different outlines, the one that was taken first; empty where nobody
+        searched.
     """
 
     polygon: Polygon
@@ -81,6 +100,7 @@ class Field:
     imagery_date: str | None = None
     licence: str = ""
     own: tuple[tuple[str, Any], ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
 
     def __post_init__(self) -> None:
         crs = parse_crs(self.crs)
@@ -130,6 +150,28 @@ class Field:
             facts["certainty"] = f"{self.quality.score:.2f}"
             facts["doubts"] = str(len(self.quality.reasons))
         return facts
+
+    def choose(self, number: int) -> Field:
+        """The field with one of its alternatives as outline, by a person's word.
+
+        Parameters
+        ----------
+        number : int
+            1 is the outline that was taken.
+
+        Raises
+        ------
+        FieldError
+            When there is no such alternative.
+        """
+        if not 1 <= number <= len(self.alternatives):
+            raise FieldError(
+                f"There is no outline {number} to choose: this field has "
+                f"{len(self.alternatives)} alternatives.",
+                hint="Show them with `geofield field --alternatives`.",
+            )
+        polygon = self.alternatives[number - 1].polygon
+        return replace(self, polygon=polygon, method="chosen", quality=None)
 
     @property
     def area_ha(self) -> float:

@@ -20,8 +20,11 @@ class Segmentation:
         What the method had to tell.
     figures : tuple of (str, float)
         Evidence that the method measured itself.
+    alternatives : tuple of Segmentation
+        Other fields that may be meant, the likeliest first.
     """
 
     mask: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
     figures: tuple[tuple[str, float], ...] = ()
+    alternatives: tuple[Segmentation, ...] = ()

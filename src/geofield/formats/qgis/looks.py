@@ -238,6 +238,27 @@ LOOKS: dict[str, Look] = {
         max_scale=500,
         tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
     ),
+    "alternatives": Look(
+        (
+            Rule(
+                "Outline that may be meant",
+                "fill",
+                (fill("0,0,0,0", "255,60,220,255", 0.5, line="dash"),),
+            ),
+        ),
+        (
+            Label(
+                "to_string(\"alternative_no\") || ': ' || "
+                "to_string(round(100 * \"certainty\")) || ' %'",
+                8,
+                "255,60,220,255",
+                "255,255,255,230",
+            ),
+        ),
+        visible=False,
+        tip='<b>Outline [% "alternative_no" %]</b>: [% round(100 * "certainty") %] % certain, '
+        '[% round("area_ha", 2) %] ha; taken with geofield field --choose',
+    ),
     "headland": Look(
         (Rule("Headland", "fill", (fill(_rgba(theme.HEADLAND, 40), _HEADLAND, 0.25),)),),
         max_scale=REGION_SCALE,
@@ -282,5 +303,6 @@ ORDER = (
     "headland_tracks",
     "segments",
     "headland",
+    "alternatives",
     "field",
 )

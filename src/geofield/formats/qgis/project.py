@@ -42,7 +42,7 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
     gpkg_name : str
         File name of the GeoPackage.
     """
-    layers = sorted(dataset.layers(), key=lambda each: _place(each.name))
+    layers = sorted(dataset.layers(working=True), key=lambda each: _place(each.name))
     root = ET.Element("qgis", projectname=dataset.name, version=QGIS_VERSION)
     ET.SubElement(root, "homePath", path="")
     ET.SubElement(root, "title").text = dataset.name

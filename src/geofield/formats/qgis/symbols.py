@@ -56,7 +56,9 @@ def line(colour: str, width_mm: float, *, dash: str = "") -> SymbolLayer:
     return SymbolLayer("SimpleLine", values)
 
 
-def fill(colour: str, outline: str, width_mm: float, *, style: str = "solid") -> SymbolLayer:
+def fill(
+    colour: str, outline: str, width_mm: float, *, style: str = "solid", line: str = "solid"
+) -> SymbolLayer:
     """A filled polygon with an outline."""
     return SymbolLayer(
         "SimpleFill",
@@ -66,7 +68,7 @@ def fill(colour: str, outline: str, width_mm: float, *, style: str = "solid") ->
             "outline_color": outline,
             "outline_width": f"{width_mm:g}",
             "outline_width_unit": "MM",
-            "outline_style": "solid",
+            "outline_style": line,
             "joinstyle": "round",
         },
     )

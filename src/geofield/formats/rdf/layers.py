@@ -149,7 +149,7 @@ def layer_map(name: str) -> LayerMap:
 
 def layer_maps() -> list[LayerMap]:
     """All layers, in the schema's order."""
-    return [layer_map(layer.name) for layer in schema.LAYERS]
+    return [layer_map(layer.name) for layer in schema.LAYERS if not layer.working]
 
 
 def column_term(column: schema.Column) -> str:

@@ -1,0 +1,275 @@
+"""Outlines on sites that nothing was learned from: the choice, points, certainty, other pictures.
+
+    python benchmarks/field_unseen.py [--fields N] [--clicks N] [--others N] [--processes 1]
+
+Fields drawn by eye on sites that the network was not trained on (`learned/outline.json` names
+those), each judged by the part of the ranking that was learned without its site. Further points
+are put in the middle of the largest wrong piece. N limits how many fields each part looks at.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import Pool
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from common import machine, overlap, write_page
+from geofield.errors import GeofieldError
+from geofield.field import extract_field
+from geofield.field.search import search_field
+from geofield.learned.network import network
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
+from outline_cases import Case, labelled, middle_of_error, other
+from outline_pictures import fold_of
+from train_ranking import FOLDS
+
+#: Overlaps that count: a good outline, one that clicks aim at, one to be warned of.
+GOOD, AIM, BAD = 0.88, 0.93, 0.8
+MOST_CLICKS = 10
+Point = tuple[float, float]
+Way = Callable[[Case, list[Point], list[Point]], shapely.Polygon]
+
+
+@dataclass
+class Result:
+    """Of one outline: overlap, whether it was warned of, its certainty, processor seconds."""
+
+    name: str
+    site: str
+    overlap: float
+    warned: bool
+    certainty: float
+    seconds: float
+
+
+def found(case: Case) -> Result:
+    """The outline of a case."""
+    start = time.process_time()
+    try:
+        search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
+        lon, lat = case.scene.grid.to_lonlat(case.x_px, case.y_px)
+        field = extract_field(case.scene, lat=lat, lon=lon, search=search)
+    except GeofieldError:
+        return Result(case.name, case.site, 0.0, True, 0.0, time.process_time() - start)
+    seconds = time.process_time() - start
+    figures = dict(field.quality.figures)
+    shared = overlap(field.polygon_px(case.scene.grid), case.truth)
+    certain = figures.get("certainty", 0.0)
+    return Result(case.name, case.site, shared, not field.quality.trusted, certain, seconds)
+
+
+def of_kind(case: Case, kind: str) -> Result:
+    """The outline of a case as another picture."""
+    return found(another(case, kind))
+
+
+def another(case: Case, kind: str) -> Case:
+    if kind == "4 bands":
+        return case
+    if kind == "16 bit":
+        # Read through the percentile stretch that 16 bits get: levels shift and clip.
+        bands = case.scene.bands.astype(float)
+        low, high = np.quantile(bands, [0.01, 0.99])
+        spread = np.clip((bands - low) / (high - low) * 255, 0, 255)
+        return replace(case, scene=replace(case.scene, bands=np.rint(spread).astype(np.uint8)))
+    if kind == "moved 10 m":
+        step = 10.0 / case.scene.grid.ground_resolution_m
+        ways = [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)]
+        inner = case.truth.buffer(-2)
+        for dx, dy in ways:
+            if shapely.contains_xy(inner, case.x_px + dx, case.y_px + dy):
+                return replace(case, x_px=case.x_px + dx, y_px=case.y_px + dy)
+        return case
+    return other(case, kind)
+
+
+def clicked(case: Case, way: str, most: int = MOST_CLICKS) -> list[float]:
+    """Overlaps after the first point, the second, ... until the aim is reached."""
+    include, exclude = [(case.x_px, case.y_px)], []
+    run = WAYS[way](case)
+    overlaps: list[float] = []
+    for _ in range(most):
+        outline = run(include, exclude)
+        overlaps.append(overlap(outline, case.truth) if outline.area else 0.0)
+        wrong = middle_of_error(outline, case.truth, case.scene.grid.shape)
+        if wrong is None or (overlaps[-1] >= AIM and len(overlaps) > 2):
+            break
+        (include if wrong[0] else exclude).append(wrong[1])
+    return overlaps
+
+
+def ours(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
+    grid = case.scene.grid
+    search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
+    lon, lat = grid.to_lonlat(case.x_px, case.y_px)
+
+    def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
+        places = ([grid.to_lonlat(*one) for one in points] for points in (include[1:], exclude))
+        belong, apart = places
+        field = extract_field(
+            case.scene, lat=lat, lon=lon, include=belong, exclude=apart, search=search
+        )
+        return field.polygon_px(grid)
+
+    return run
+
+
+def random_walker(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
+    """Discs at the points, the picture's frame as what does not belong."""
+    from skimage.segmentation import random_walker as walk
+
+    picture = case.scene.rgb.astype(float)
+
+    def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
+        markers = np.zeros(picture.shape[:2], int)
+        if not exclude:
+            markers[[0, -1], :] = markers[:, [0, -1]] = 2
+        row, column = np.indices(markers.shape)
+        for number, points in ((2, exclude), (1, include)):
+            for x, y in points:
+                markers[np.hypot(row + 0.5 - y, column + 0.5 - x) < 6] = number
+        labels = walk(picture, markers, beta=800, mode="cg_j", tol=1e-3, channel_axis=-1)
+        return polygon_of(labels == 1)
+
+    return run
+
+
+def felzenszwalb(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
+    """The pieces at the points that belong, without those at the others."""
+    from skimage.segmentation import felzenszwalb as segment
+
+    labels = segment(case.scene.rgb, scale=600, sigma=1.0, min_size=400)
+
+    def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
+        wanted = {labels[int(y), int(x)] for x, y in include}
+        wanted -= {labels[int(y), int(x)] for x, y in exclude}
+        return polygon_of(np.isin(labels, list(wanted)))
+
+    return run
+
+
+WAYS = {"geofield": ours, "random walker": random_walker, "felzenszwalb": felzenszwalb}
+
+
+def polygon_of(mask: np.ndarray) -> shapely.Geometry:
+    from rasterio.features import shapes
+
+    parts = [shapely.geometry.shape(one) for one, _ in shapes(mask.astype(np.uint8), mask=mask)]
+    return shapely.union_all([shapely.make_valid(one) for one in parts])
+
+
+def row(name: str, results: Sequence[Result]) -> str:
+    values = np.array([one.overlap for one in results])
+    worst = np.sort(values)[: max(1, round(len(values) / 10))].mean()
+    seconds = np.median([one.seconds for one in results])
+    return (
+        f"| {name} | {len(values)} | {values.mean():.3f} | {np.median(values):.3f} | "
+        f"{np.mean(values >= GOOD):.0%} | {worst:.2f} | {seconds:.2f} |"
+    )
+
+
+def certainty(results: Sequence[Result]) -> list[str]:
+    """How far certainty is to be trusted."""
+    right = np.array([one.overlap >= 0.85 for one in results])
+    told = np.array([one.certainty for one in results])
+    bins = np.clip((told * 5).astype(int), 0, 4)
+    lines = ["| certainty | outlines | told | right (.85) |", "|---|---|---|---|"]
+    error = 0.0
+    for number in range(5):
+        at = bins == number
+        if at.any():
+            error += at.mean() * abs(told[at].mean() - right[at].mean())
+            lines.append(
+                f"| {number / 5:.1f} to {number / 5 + 0.2:.1f} | {at.sum()} | "
+                f"{told[at].mean():.2f} | {right[at].mean():.2f} |"
+            )
+    bad = [one for one in results if one.overlap < BAD]
+    good = [one for one in results if one.overlap >= GOOD]
+    caught, false = (sum(one.warned for one in some) for some in (bad, good))
+    return [
+        *lines,
+        "",
+        f"Expected calibration error {error:.3f}. Warned of: {caught} of {len(bad)} outlines below "
+        f"{BAD}, {false} of {len(good)} from {GOOD} on.",
+        "",
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fields", type=int, default=10_000)
+    parser.add_argument("--clicks", type=int, default=10_000)
+    parser.add_argument("--others", type=int, default=10_000)
+    parser.add_argument("--processes", type=int, default=1)
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    seen = set(network("outline").facts["sites"])
+    every = [case for case in labelled() if case.site not in seen]
+    # Spread over the tables, whatever the number.
+    order = np.random.default_rng(0).permutation(len(every))
+    every = [every[at] for at in order]
+    some = every[: options.fields]
+    lines = [
+        f"{len({one.site for one in some})} sites that neither network nor ranking was learned "
+        "from; fields drawn by eye. Overlap is intersection over union; seconds are processor "
+        "seconds.",
+        "",
+        "| pictures | fields | mean | median | from .88 on | worst tenth | seconds |",
+        "|---" * 7 + "|",
+    ]
+    with Pool(options.processes) as pool:
+        results: dict[str, list[Result]] = {}
+        for kind in ("4 bands", "colour", "grey"):
+            results[kind] = pool.map(partial(of_kind, kind=kind), some, chunksize=2)
+            lines.append(row(kind, results[kind]))
+            print(lines[-1], flush=True)
+        for mark in dict.fromkeys(one.mark for one in some):
+            part = [one for one in results["4 bands"] if one.name.startswith(mark)]
+            lines.append(row(f"of these, table `{mark}`", part))
+        lines += ["", "## Certainty", "", *certainty(results["4 bands"])]
+        lines += ["## Further points", "", "| way | fields | first | second | third | until .93 |"]
+        lines.append("|---" * 6 + "|")
+        for way in WAYS:
+            overlaps = pool.map(partial(clicked, way=way), every[: options.clicks], chunksize=1)
+            at = [np.mean([one[min(k, len(one) - 1)] for one in overlaps]) for k in range(3)]
+            clicks = [
+                next((n for n, value in enumerate(one, 1) if value >= AIM), MOST_CLICKS)
+                for one in overlaps
+            ]
+            lines.append(
+                f"| {way} | {len(overlaps)} | {at[0]:.3f} | {at[1]:.3f} | {at[2]:.3f} | "
+                f"{np.mean(clicks):.1f} |"
+            )
+            print(lines[-1], flush=True)
+        lines += ["", "## Other pictures of the same fields", ""]
+        lines += [
+            "| picture | mean | mean change | worse by .1 |",
+            "|---|---|---|---|",
+        ]
+        few = every[: options.others]
+        plain = np.array([one.overlap for one in pool.map(found, few, chunksize=2)])
+        for kind in ("JPEG 30", "JPEG 60", "JPEG 85", "haze", "contrast", "16 bit", "moved 10 m"):
+            other_results = pool.map(partial(of_kind, kind=kind), few, chunksize=2)
+            got = np.array([one.overlap for one in other_results])
+            lines.append(
+                f"| {kind} | {got.mean():.3f} | {got.mean() - plain.mean():+.3f} | "
+                f"{np.sum(got < plain - 0.1)} of {len(got)} |"
+            )
+            print(lines[-1], flush=True)
+    write_page(
+        "field_unseen", "Outlines on unseen sites", [*machine("opencv-python-headless"), "", *lines]
+    )
+
+
+if __name__ == "__main__":
+    main()

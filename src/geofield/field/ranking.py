@@ -1,0 +1,176 @@
+"""Ranking: how much the figures of an outline speak for it, and how far to trust the sum.
+
+An outline's score is a sum of curves, one for each figure that is measured on it: bent twice,
+so that a figure can count more on one side of what is usual than on the other. Scores become
+beliefs (their exponentials, to add up to one), and the outline taken is the one with the largest
+expected overlap with the others under these beliefs. `tools/train_ranking.py` learned the curves
+on sites that the network, whose answer is among the figures, had not seen.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.special import expit, logit
+from shapely import Polygon
+
+from geofield.errors import FieldError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Figures = Mapping[str, float]
+
+#: Where a curve bends, and where it ends, in units of the figure's spread.
+BEND, END = 0.5, 4.0
+#: Side of the picture in which outlines are compared, pixels.
+_SMALL_PX = 96
+#: So many of the best are weighed against each other.
+WEIGHED = 200
+
+
+def agreement(likely: FloatArray, size_px: FloatArray, inside: BoolArray) -> dict[str, float]:
+    """How well an outline agrees with what the network takes for the field, by name.
+
+    Parameters
+    ----------
+    likely, size_px : float array (superpixels,)
+        How likely each belongs to the field; its pixels.
+    inside : bool array (superpixels,)
+        Which the outline holds; at least one.
+    """
+    area, everywhere = float(size_px[inside].sum()), float(size_px @ likely)
+    common = float(size_px[inside] @ likely[inside])
+    field = size_px * (likely > 0.5)
+    both, either = float(field[inside].sum()), area + float(field[~inside].sum())
+    sure = np.clip(likely, 0.005, 0.995)
+    fit = size_px[inside] @ np.log(sure[inside]) + size_px[~inside] @ np.log1p(-sure[~inside])
+    return {
+        "network_overlap": float(log_odds(common / (area + everywhere - common))),
+        "network_field_overlap": float(log_odds(both / either)),
+        "network_inside": common / area,
+        "network_missed": 1.0 - common / max(everywhere, 1e-9),
+        "network_unlikely_share": float(size_px[inside] @ (likely[inside] < 0.3)) / area,
+        "network_fit": float(np.log(0.02 - fit / size_px.sum())),
+        "network_fit_of_area": float(np.log(0.02 - fit / area)),
+    }
+
+
+def log_odds(share: FloatArray | float) -> FloatArray:
+    """Logarithm of the odds of a share, within bounds."""
+    return np.asarray(logit(np.clip(share, 0.01, 0.995)))
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """The learned sum of curves, and what its doubt is worth.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the figures that count.
+    mean, spread : float array (names,)
+        Over the outlines learned from.
+    slope : float array (3, names)
+        Everywhere; above the upper bend; below the lower one.
+    calibration : mapping
+        By what is asked (see `certainty`): weights of named evidence.
+    """
+
+    names: tuple[str, ...]
+    mean: FloatArray
+    spread: FloatArray
+    slope: FloatArray
+    calibration: Mapping[str, Mapping[str, float]]
+
+    def scores(self, outlines: Sequence[Figures]) -> FloatArray:
+        """Scores of outlines; only differences mean something."""
+        values = np.array([[one[name] for name in self.names] for one in outlines])
+        bent = bends((values - self.mean) / self.spread)
+        return np.asarray(np.einsum("bon,bn->o", bent, self.slope))
+
+    def certainty(self, what: str, evidence: Figures) -> float:
+        """Probability that an outline is right, from a logistic regression on left-out sites.
+
+        Parameters
+        ----------
+        what : str
+            ``field`` (overlap with the truth of 85 % or more), ``ground`` (70 %: the right
+            piece of ground) or ``border`` (93 %: its border, too).
+        evidence : mapping
+        """
+        weights = self.calibration[what]
+        total = weights["constant"]
+        for name, weight in weights.items():
+            if name != "constant":
+                total += weight * evidence[name]
+        return float(expit(total))
+
+
+def bends(standard: FloatArray) -> FloatArray:
+    """Standardised figures as the three parts of a curve, (3, ...)."""
+    standard = np.clip(standard, -END, END)
+    return np.stack([standard, np.maximum(standard - BEND, 0), np.maximum(-standard - BEND, 0)])
+
+
+@cache
+def trained(part: int | None = None) -> Ranking:
+    """The ranking of this package; of a fold, the part that has seen none of its sites.
+
+    Raises
+    ------
+    FieldError
+        When its table cannot be read.
+    """
+    text = (files("geofield.learned") / "outline_ranking.json").read_text("utf-8")
+    table: dict[str, Any] = json.loads(text)
+    try:
+        rows = table["figures"]
+        mean, spread = (np.array([row[key] for row in rows]) for key in ("mean", "spread"))
+        # Of each figure, the slopes of all parts: (parts, 3, names).
+        slopes = np.moveaxis(np.array([row["slopes"] for row in rows]), 0, -1)
+        names = tuple(row["name"] for row in rows)
+        slope = slopes.mean(axis=0) if part is None else slopes[part]
+        calibration = table["calibration"]["all" if part is None else str(part)]
+        return Ranking(names, mean, spread, slope, calibration)
+    except (KeyError, IndexError) as error:
+        raise FieldError("The table outline_ranking.json cannot be read.") from error
+
+
+def expected_overlaps(
+    polygons: Sequence[Polygon], scores: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Beliefs, expected overlap of each outline with the truth, overlaps of each with each.
+
+    Parameters
+    ----------
+    polygons : sequence of Polygon
+    scores : float array
+    """
+    belief = np.exp(scores - scores.max())
+    belief /= belief.sum()
+    masks = _small_masks(polygons)
+    common = masks @ masks.T
+    area = np.diag(common)
+    overlap = common / np.maximum(area[:, None] + area - common, 1.0)
+    return belief, np.asarray(overlap @ belief), overlap
+
+
+def _small_masks(polygons: Sequence[Polygon]) -> NDArray[np.float32]:
+    """Polygons as rows of pixels of a small picture, to compare them all with all."""
+    import cv2
+
+    left, top, right, bottom = shapely.total_bounds(np.array(polygons))
+    scale = (_SMALL_PX - 1) / max(right - left, bottom - top)
+    masks = np.zeros((len(polygons), _SMALL_PX, _SMALL_PX), np.uint8)
+    for mask, polygon in zip(masks, polygons, strict=True):
+        points = (shapely.get_coordinates(polygon.exterior) - (left, top)) * scale
+        cv2.fillPoly(mask, [np.rint(points * 16).astype(np.int32)], 1, shift=4)
+    return masks.reshape(len(polygons), -1).astype(np.float32)

@@ -1,0 +1,271 @@
+"""Search: possible outlines around the points, each with its score; kept for further points.
+
+The regions around the points become straight outlines, the best of them redrawn along their own
+straight sides. What the points say is obeyed by every outline. What was measured is kept, so
+that a further point costs the network's answer to it and a few new outlines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from geofield.errors import FieldError
+from geofield.field.border import measure
+from geofield.field.clearing import clear
+from geofield.field.evidence import channels, whiten
+from geofield.field.network import Seen, seen
+from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.points import obeys
+from geofield.field.ranking import Figures, agreement, trained
+from geofield.field.regions import (
+    SMALLEST_PX,
+    SMALLEST_SHARE,
+    Partition,
+    Points,
+    partition,
+    regions,
+)
+from geofield.field.straight import redrawn, ring
+from geofield.field.surface import Surface
+from geofield.model import Scene
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: The search works on a picture reduced to at most this many pixels a side.
+COARSE_PX = 400
+#: How far from the seed open ground is looked for, pixels.
+_STRAY_PX = 20
+#: How far the first outlines may leave their regions' borders, pixels.
+_TOLERANCE_PX = 3.0
+#: So many of the regions' outlines get well fitted sides; so many are redrawn, so many times.
+_FITTED, _BREADTH, _ROUNDS = 5, 4, 2
+#: Of what an outline suggests, so many that agree best with the network are measured.
+_SUGGESTED = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A possible outline of the field.
+
+    Attributes
+    ----------
+    polygon : Polygon
+        Pixel coordinates of the searched picture; no holes.
+    holes : bool array
+        What was filled in the region that it began as.
+    figures : mapping
+        What was measured on it, by name.
+    score : float
+        Only differences mean something.
+    """
+
+    polygon: Polygon
+    holes: BoolArray
+    figures: Figures
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What is known of an outline without the points; figures are None for a scrap."""
+
+    polygon: Polygon
+    holes: BoolArray
+    inside: BoolArray
+    figures: Figures | None
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSearch:
+    """A scene made ready for outlines around a seed, and what was measured so far.
+
+    It can be pickled, and asked again with further points.
+
+    Attributes
+    ----------
+    factor : int
+        Pixels of the scene along one of the searched picture.
+    surface : Surface
+    second : Partition
+        Of another look at the same picture.
+    seen : Seen
+    seed_px : (float, float)
+        Open ground at the seed or beside it, pixel coordinates of the searched picture.
+    moved : bool
+        Whether the seed itself lies on something small: a crown, a hut.
+    part : int or None
+        The only part of the ranking to ask: the one learned without the sites of this fold.
+    """
+
+    factor: int
+    surface: Surface
+    second: Partition
+    seen: Seen
+    seed_px: tuple[float, float]
+    moved: bool
+    part: int | None = None
+    known: dict[bytes, Held] = field(default_factory=dict)
+
+    def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
+        """How likely each pixel of the searched picture belongs to the field."""
+        include = (self.seed_px, *include)
+        return self.seen.probability(include, exclude, self.surface.shape, self.factor)
+
+    def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
+        """Outlines that obey the points, the best first; none where nothing stands out.
+
+        Parameters
+        ----------
+        include, exclude : tuple of (float, float)
+            Further points that belong and that do not, pixel coordinates of the searched
+            picture.
+        """
+        likely = self.likely(include, exclude)
+        points = (self.seed_px, *include), exclude
+        ground = self.surface.parted.mean(likely)
+        found: dict[bytes, Candidate] = {}
+
+        def add(outlines: Iterable[tuple[Polygon, BoolArray]]) -> None:
+            """Those that obey the points, with their scores."""
+            new = {}
+            for polygon, holes in outlines:
+                key = polygon.wkb
+                if key not in found and obeys(polygon, *points):
+                    held = self._held(key, polygon, holes)
+                    if held.figures is not None:
+                        agrees = agreement(ground, self.surface.size_px, held.inside)
+                        new[key] = held, {**held.figures, **agrees}
+            if new:
+                scores = trained(self.part).scores([figures for _, figures in new.values()])
+                for (key, (held, figures)), score in zip(new.items(), scores.tolist(), strict=True):
+                    found[key] = Candidate(held.polygon, held.holes, figures, score)
+
+        add((one.polygon, one.holes) for one in list(self.known.values()))
+        second = self.second.mean(likely)
+        around = [
+            *regions(self.surface.parted, ground, *points),
+            *regions(self.second, second, *points),
+        ]
+        rough = {rough_outline(one.mask): one for one in around}
+        add((polygon, one.holes) for polygon, one in rough.items())
+        ranked = sorted(
+            (polygon for polygon in rough if polygon.wkb in found),
+            key=lambda polygon: -found[polygon.wkb].score,
+        )
+        for polygon in ranked[:_FITTED]:
+            with suppress(FieldError):
+                fitted = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
+                add([(Polygon(fitted.exterior), rough[polygon].holes)])
+        tried: set[bytes] = set()
+        for _ in range(_ROUNDS):
+            for key in [one for one in best_first(found)[:_BREADTH] if one not in tried]:
+                tried.add(key)
+                one = found[key]
+                others = redrawn(one.polygon, self.seed_px, self.surface.shape)
+                add((other, one.holes) for other in self._agreeing(others, ground))
+        return [found[key] for key in best_first(found)]
+
+    def _agreeing(self, polygons: Sequence[Polygon], ground: FloatArray) -> list[Polygon]:
+        """Of many outlines those that agree best with the network: measuring takes longer."""
+        if len(polygons) <= _SUGGESTED:
+            return list(polygons)
+        size = self.surface.size_px
+        inside = np.array([self.surface.members(ring(one)) for one in polygons])
+        common, area = inside @ (size * ground), inside @ size
+        overlap = common / (area + float(size @ ground) - common)
+        return [polygons[at] for at in np.argsort(-overlap, kind="stable")[:_SUGGESTED]]
+
+    def _held(self, key: bytes, polygon: Polygon, holes: BoolArray) -> Held:
+        """What is known of an outline; it is measured once."""
+        if key not in self.known:
+            inside = self.surface.members(ring(polygon))
+            figures = measure(self.surface, polygon, inside)
+            self.known[key] = Held(polygon, holes, inside, figures)
+        return self.known[key]
+
+
+def best_first(found: dict[bytes, Candidate]) -> list[bytes]:
+    """The keys of candidates by score."""
+    return sorted(found, key=lambda key: -found[key].score)
+
+
+def search_field(
+    scene: Scene,
+    x_px: float,
+    y_px: float,
+    *,
+    part: int | None = None,
+) -> FieldSearch:
+    """Make a scene ready.
+
+    Parameters
+    ----------
+    scene : Scene
+    x_px, y_px : float
+        The seed, pixel coordinates.
+    part : int, optional
+        See `FieldSearch`.
+
+    Raises
+    ------
+    FieldError
+        When the picture is too small.
+    """
+    factor = max(1, math.ceil(max(scene.grid.shape) / COARSE_PX))
+    seed = (x_px / factor, y_px / factor)
+    raw = channels(scene, factor)
+    whitened = whiten(raw, seed)
+    stack, things = clear(whitened, scene.grid.ground_resolution_m * factor)
+    surface = Surface(stack, partition(stack), things)
+    if not len(surface.parted.lines.first):
+        raise FieldError("The picture is too small to find a field in.")
+    footing = open_ground(surface.parted, things, seed)
+    # Another look: nothing painted over, and colour alone where there is near infrared.
+    second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed))
+    return FieldSearch(
+        factor,
+        surface,
+        second,
+        seen(scene),
+        footing,
+        footing != seed,
+        part,
+    )
+
+
+def open_ground(
+    parted: Partition, things: BoolArray, seed_px: tuple[float, float]
+) -> tuple[float, float]:
+    """The seed, or the nearest place on open ground where it is on a crown or the like.
+
+    That is ground of the surface which the crown stands in, where it is known: beyond a border
+    nearby there is other ground.
+    """
+    labels, tree = parted.labels, parted.tree
+    x, y = int(seed_px[0]), int(seed_px[1])
+    smallest = max(SMALLEST_PX, SMALLEST_SHARE * labels.size)
+    around = tree.surface_around(int(labels[y, x]), smallest)
+    if around is None and not things[y, x]:
+        return seed_px
+    top, left = max(y - _STRAY_PX, 0), max(x - _STRAY_PX, 0)
+    near = (slice(top, y + _STRAY_PX + 1), slice(left, x + _STRAY_PX + 1))
+    leaves = np.unique(labels[near])
+    specks = [leaf for leaf in leaves if tree.surface_around(int(leaf), smallest) is not None]
+    free = ~np.isin(labels[near], specks) & ~things[near]
+    row, column = np.indices(free.shape)
+    distance = np.hypot(row + top - y, column + left - x)
+    if around is not None:
+        own = free & np.isin(labels[near], tree.leaves(around))
+        free = own if own.any() else free
+    if not free.any():
+        return seed_px
+    down, right = np.unravel_index(np.argmin(np.where(free, distance, np.inf)), free.shape)
+    return (float(left + right) + 0.5, float(top + down) + 0.5)

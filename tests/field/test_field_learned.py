@@ -1,0 +1,144 @@
+"""What was learned is read by name: no two figures or channels can be swapped unnoticed."""
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.errors import FieldError
+from geofield.field import ranking
+from geofield.field.border import measure
+from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
+from geofield.field.ranking import agreement, trained
+from geofield.field.regions import partition
+from geofield.field.straight import ring
+from geofield.field.surface import Surface
+from geofield.learned.network import network
+
+OUTLINES = (
+    [(38, 42), (110, 36), (160, 50), (160, 118), (90, 126), (42, 119)],
+    [(40, 40), (160, 40), (160, 120), (40, 120)],
+    [(20, 30), (100, 20), (104, 26), (140, 90), (90, 94), (96, 140), (30, 120)],
+)
+
+
+@pytest.fixture(scope="module")
+def several():
+    """The figures of outlines that fit one border or another, or none."""
+    rng = np.random.default_rng(4)
+    stack = rng.normal(0, 0.5, (3, 160, 160)).astype(np.float32)
+    stack[0, 40:120, 40:] += 9
+    stack[1, 70:100, 60:110] += 3
+    stack[2, 120:] += 5 * rng.random((40, 160), np.float32)
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    likely = np.clip(surface.parted.mean(stack[0]) / 9 + 0.1, 0.02, 0.97)
+    found = []
+    for corners in OUTLINES:
+        outline = shapely.Polygon(corners)
+        inside = surface.members(ring(outline))
+        agrees = agreement(likely, surface.size_px, inside)
+        found.append({**measure(surface, outline, inside), **agrees})
+    return found
+
+
+@pytest.fixture
+def figures(several):
+    return several[0]
+
+
+def table(monkeypatch, tmp_path, change):
+    """The ranking of a table that was changed."""
+    folder = ranking.files("geofield.learned")
+    known = json.loads((folder / "outline_ranking.json").read_text("utf-8"))
+    change(known)
+    (tmp_path / "outline_ranking.json").write_text(json.dumps(known), "utf-8")
+    monkeypatch.setattr(ranking, "files", lambda package: tmp_path)
+    trained.cache_clear()
+    try:
+        return trained()
+    finally:
+        monkeypatch.undo()
+        trained.cache_clear()
+
+
+def test_no_two_figures_can_be_taken_for_each_other(several):
+    for one, other in itertools.combinations(several[0], 2):
+        apart = max(abs(figures[one] - figures[other]) for figures in several)
+        assert apart > 1e-6, (one, other)
+
+
+def test_every_figure_of_the_ranking_is_measured_and_counts(figures):
+    known = trained()
+    assert set(known.names) <= set(figures)
+    score = known.scores([figures])[0]
+    for name in known.names:
+        at = known.names.index(name)
+        moved = {**figures, name: float(known.mean[at] + 2.5 * known.spread[at])}
+        again = {**figures, name: float(known.mean[at] - 2.5 * known.spread[at])}
+        assert len({float(known.scores([one])[0]) for one in (moved, again)} | {score}) >= 2, name
+
+
+def test_two_names_swapped_in_the_table_are_noticed(several, monkeypatch, tmp_path):
+    names = trained().names
+    scores = trained().scores(several)
+    for one, other in zip(names, names[1:] + names[:1], strict=True):
+
+        def swap(known, one=one, other=other):
+            for row in known["figures"]:
+                row["name"] = {one: other, other: one}.get(row["name"], row["name"])
+
+        again = table(monkeypatch, tmp_path, swap).scores(several)
+        assert not np.array_equal(again, scores), (one, other)
+
+
+def test_a_table_of_another_version_is_refused(monkeypatch, tmp_path):
+    with pytest.raises(FieldError, match=r"outline_ranking\.json"):
+        table(monkeypatch, tmp_path, lambda known: known.pop("calibration"))
+
+
+def test_certainty_falls_with_what_is_expected(figures):
+    for what in ("field", "ground", "border"):
+        sure, fair, doubtful = (
+            trained().certainty(
+                what,
+                {
+                    **figures,
+                    "expected_overlap": odds,
+                    "belief_alike": share,
+                    "belief_same": share,
+                },
+            )
+            for odds, share in ((4.0, 0.95), (1.0, 0.6), (-1.0, 0.2))
+        )
+        assert sure > fair > doubtful
+
+
+def test_the_network_takes_its_channels_in_their_order():
+    assert network("outline").inputs == (*BANDS, *POINTS)
+    rng = np.random.default_rng(0)
+    rgb = rng.uniform(60, 160, (3, SIDE_PX, SIDE_PX)).astype(np.float32)
+    rgb += np.array([0, 20, 40], np.float32)[:, None, None]
+    nir = rgb[0] * 1.5 + 10
+    valid = np.ones((SIDE_PX, SIDE_PX), bool)
+    valid[:, -20:] = False
+    named = dict(zip(BANDS, normalised(rgb, nir, valid), strict=True))
+    inside = (slice(None), slice(0, -20))
+    red, green, blue = (float(named[name][inside].mean()) for name in ("red", "green", "blue"))
+    assert red < green < blue
+    assert abs(float(named["nir"][inside].mean())) < 0.01
+    assert named["vegetation"][inside].min() > 0
+    assert np.array_equal(named["valid"] > 0, valid)
+    assert not any(named[name][~valid].any() for name in BANDS)
+    without = dict(zip(BANDS, normalised(rgb, None, valid), strict=True))
+    assert not without["nir"].any()
+    assert not without["vegetation"].any()
+    maps = dict(zip(POINTS, points_maps([(40.0, 80.0)], [(200.0, 20.0)]), strict=True))
+    places = {
+        name: np.unravel_index(int(np.argmax(maps[name])), maps[name].shape) for name in POINTS
+    }
+    assert max(abs(a - b) for a, b in zip(places["belongs_at"], (20, 10), strict=True)) <= 1
+    assert max(abs(a - b) for a, b in zip(places["apart_at"], (5, 50), strict=True)) <= 1
+    assert maps["belongs_around"].mean() > maps["belongs_at"].mean()
+    assert maps["apart_around"].mean() > maps["apart_at"].mean()

@@ -1,0 +1,152 @@
+"""Pictures, points and true outlines that outlines are judged by, each also as other pictures.
+
+Disturbed pictures are what users bring: colour or grey only, JPEG, haze, little contrast, a
+point elsewhere in the field.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import shapely
+from outline_pictures import DATA, TABLES, site_of
+from rasterio.features import rasterize
+
+from geofield.imagery import read_scene
+from geofield.learned.network import network
+from geofield.model import Scene
+from geofield.simulate import SimulationSettings, simulate_field
+
+SIMULATION_SEED, SIMULATED = 61_000, 40
+
+
+@dataclass
+class Case:
+    """A picture, a seed and the truth, pixel coordinates."""
+
+    name: str
+    mark: str
+    site: str
+    scene: Scene
+    x_px: float
+    y_px: float
+    truth: shapely.Polygon
+    certainty: str = ""
+
+
+def labelled() -> Iterator[Case]:
+    """The fields drawn by eye."""
+    for mark, table, folder in TABLES:
+        if not table.is_file():
+            continue
+        with table.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            scene = read_scene(DATA / (folder or row["folder"]) / f"{row['image']}.tif")
+            x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
+            truth = shapely.make_valid(shapely.Polygon(json.loads(row["polygon_px"])))
+            name = f"{mark} {row['image']} ({x:.0f}, {y:.0f})"
+            sure = row.get("certainty") or ""
+            yield Case(name, mark, site_of(row["image"]), scene, x, y, truth, sure)
+
+
+def simulated(count: int = SIMULATED) -> Iterator[Case]:
+    """Simulated fields, plain and crowded by turns."""
+    rng = np.random.default_rng(SIMULATION_SEED)
+    for index in range(count):
+        side = 640 if index % 2 else 480
+        crowns = int(rng.integers(3, 26)) if index % 2 else int(rng.integers(10, 61))
+        settings = SimulationSettings(
+            width_px=side, height_px=side, obstacles=crowns, equal_brightness=index % 3 == 0
+        )
+        one = simulate_field(SIMULATION_SEED + index, settings)
+        x, y = one.scene.grid.from_lonlat(one.lon, one.lat)
+        truth = one.field.polygon_px(one.scene.grid)
+        site = f"simulated {index}"
+        yield Case(site, "simulated", site, one.scene, float(x), float(y), truth)
+
+
+def cases() -> Iterator[Case]:
+    """What the ranking is learned from: each field as it is, and as two other pictures."""
+    for case in labelled():
+        yield case
+        moved = reseeded(case)
+        pick = zlib.crc32(case.name.encode())
+        yield other(moved, ("colour", "grey")[pick % 2])
+        yield other(moved if pick % 4 < 2 else case, ("JPEG 40", "haze", "contrast")[pick % 3])
+    yield from simulated()
+
+
+def unseen() -> Iterator[Case]:
+    """The cases of sites that the network was not trained on."""
+    seen = set(network("outline").facts["sites"])
+    yield from (case for case in cases() if case.site not in seen)
+
+
+def reseeded(case: Case, number: int = 0) -> Case:
+    """The case with another point in its field."""
+    rng = np.random.default_rng([zlib.crc32(case.name.encode()), number])
+    inner = case.truth.buffer(-5)
+    area = inner if not inner.is_empty else case.truth
+    row, column = np.nonzero(rasterize([(area, 1)], case.scene.grid.shape))
+    at = int(rng.integers(len(row)))
+    return replace(
+        case, name=f"{case.name} moved {number}", x_px=column[at] + 0.5, y_px=row[at] + 0.5
+    )
+
+
+def other(case: Case, kind: str) -> Case:
+    """The case as another picture."""
+    scene = case.scene
+    bands = scene.bands.astype(np.float32)
+    if kind == "colour":
+        scene = replace(scene, bands=scene.bands[:3], roles=scene.roles[:3])
+    elif kind == "grey":
+        grey = np.clip(np.rint(scene.grey), 0, 255).astype(np.uint8)
+        scene = replace(scene, bands=grey[None], roles=("grey",))
+    elif kind.startswith("JPEG"):
+        scene = replace(scene, bands=jpeg(scene.bands, int(kind.split()[1])))
+    elif kind == "haze":
+        scene = replace(scene, bands=np.rint(0.65 * bands + 0.35 * 205).astype(np.uint8))
+    elif kind == "contrast":
+        scene = replace(scene, bands=np.clip(np.rint(0.7 * bands + 20), 0, 255).astype(np.uint8))
+    else:
+        raise ValueError(kind)
+    return replace(case, name=f"{case.name} {kind}", mark=f"{case.mark} {kind}", scene=scene)
+
+
+def jpeg(bands: np.ndarray, quality: int) -> np.ndarray:
+    """Bands through JPEG, as tiles are: colours together, near infrared by itself."""
+    settings = [cv2.IMWRITE_JPEG_QUALITY, quality]
+    colour = np.ascontiguousarray(np.moveaxis(bands[:3], 0, -1)[..., ::-1])
+    back = cv2.imdecode(cv2.imencode(".jpg", colour, settings)[1], cv2.IMREAD_COLOR)
+    layers = [np.moveaxis(back[..., ::-1], -1, 0)]
+    for band in bands[3:]:
+        grey = cv2.imencode(".jpg", np.ascontiguousarray(band), settings)[1]
+        layers.append(cv2.imdecode(grey, cv2.IMREAD_GRAYSCALE)[None])
+    return np.concatenate(layers)
+
+
+def middle_of_error(
+    found: shapely.Polygon, truth: shapely.Polygon, shape: tuple[int, int]
+) -> tuple[bool, tuple[float, float]] | None:
+    """Whether it belongs, and the middle of the largest wrong piece; None where there is none."""
+    drawn, true = (
+        np.zeros(shape, np.uint8) if one.is_empty else rasterize([(one, 1)], shape, dtype=np.uint8)
+        for one in (found, truth)
+    )
+    wrong = (drawn != true).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(wrong, connectivity=4)
+    if count == 1:
+        return None
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    own = np.pad(labels == largest, 1).astype(np.uint8)
+    depth = cv2.distanceTransform(own, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    y, x = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    return bool(true[y, x]), (float(x) + 0.5, float(y) + 0.5)

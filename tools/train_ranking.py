@@ -1,0 +1,275 @@
+"""Learn which of the outlines of a search is taken, and what that certainty is worth.
+
+    python tools/train_ranking.py CACHE [--write] [--processes 1]
+
+Learned from fields drawn by eye on sites that the network has not seen, and from simulated ones:
+the curves over the figures of the outlines make beliefs as likely as their overlaps with the
+truth say. Part K of the table is learned without the sites of fold K, and what certainty is worth
+from outlines taken by such parts. CACHE keeps the searches.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import pickle
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing import Pool
+from pathlib import Path
+
+import numpy as np
+import shapely
+from outline_cases import Case, middle_of_error, unseen
+from outline_pictures import fold_of
+from scipy.optimize import minimize
+
+from geofield.field.auto import evidence_of
+from geofield.field.ranking import BEND, END, WEIGHED, Ranking, bends, expected_overlaps
+from geofield.field.search import Candidate, search_field
+
+TABLE = Path(__file__).resolve().parent.parent / "src/geofield/learned/outline_ranking.json"
+FOLDS = 4
+#: Pull towards zero, of curves and of what certainty is worth.
+RIDGE, CALM = 1e-2, 1.0
+#: How much likelier an outline is believed to be for its overlap; less than half is nothing.
+SHARPNESS, WORST = 20.0, 0.5
+#: What a simulated picture counts against a real one.
+SIMULATED = 0.4
+#: Overlap from which an outline is right, by what is asked.
+RIGHT = {"field": 0.85, "ground": 0.70, "border": 0.93}
+#: What certainty is told from.
+EVIDENCE = (
+    "expected_overlap",
+    "belief_alike",
+    "network_overlap",
+    "network_fit_of_area",
+    "strength_25_above_inside",
+    "inside_95_above_border",
+    "frame_share",
+    "long_sides_share",
+)
+
+
+@dataclass
+class Searched:
+    """The outlines of one search, with their overlaps with the truth."""
+
+    name: str
+    mark: str
+    site: str
+    names: tuple[str, ...]
+    figures: np.ndarray
+    polygons: list[shapely.Polygon]
+    overlap: np.ndarray
+
+    @property
+    def fold(self) -> int:
+        return fold_of(self.site, FOLDS)
+
+
+def searched(case: Case) -> list[Searched]:
+    """The search of a case, and once more with a point where its best outline errs."""
+    search = search_field(case.scene, case.x_px, case.y_px)
+    truth = shapely.transform(case.truth, lambda c: c / search.factor)
+    found = []
+    include: tuple[tuple[float, float], ...] = ()
+    exclude: tuple[tuple[float, float], ...] = ()
+    for turn in range(2):
+        candidates = search.candidates(include, exclude)
+        if not candidates:
+            break
+        polygons = [one.polygon for one in candidates]
+        common = shapely.area(shapely.intersection(polygons, truth))
+        either = shapely.area(polygons) + truth.area - common
+        names = tuple(candidates[0].figures)
+        values = np.array([[one.figures[name] for name in names] for one in candidates])
+        name = f"{case.name} {turn}"
+        mark = case.mark if turn == 0 else f"{case.mark} clicked"
+        found.append(Searched(name, mark, case.site, names, values, polygons, common / either))
+        wrong = middle_of_error(polygons[0], truth, search.surface.shape)
+        if wrong is None or turn or zlib.crc32(case.name.encode()) % 2:
+            break
+        if wrong[0]:
+            include = (wrong[1],)
+        else:
+            exclude = (wrong[1],)
+    return found
+
+
+def weights(known: Sequence[Searched]) -> np.ndarray:
+    """What each counts: a site by the root of its pictures, as its years are much alike."""
+    often = Counter(one.site for one in known)
+    share = np.array(
+        [
+            (SIMULATED if one.mark.startswith("simulated") else 1.0) / often[one.site] ** 0.5
+            for one in known
+        ]
+    )
+    return share / share.sum()
+
+
+def learn(known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Slopes (3, names) under which beliefs follow overlaps (cross entropy, ridge; convex)."""
+    bent, wanted = [], []
+    for one in known:
+        bent.append(np.concatenate(list(bends((one.figures - mean) / spread)), axis=1))
+        regret = np.minimum(one.overlap.max() - one.overlap, WORST)
+        belief = np.exp(-SHARPNESS * regret)
+        wanted.append(belief / belief.sum())
+    share = weights(known)
+
+    def loss(slope: np.ndarray) -> tuple[float, np.ndarray]:
+        total, gradient = RIDGE * float(slope @ slope), 2 * RIDGE * slope
+        for weight, part, target in zip(share, bent, wanted, strict=True):
+            score = part @ slope
+            score -= score.max()
+            belief = np.exp(score)
+            mass = belief.sum()
+            total += weight * (math.log(mass) - float(target @ score))
+            gradient = gradient + weight * (part.T @ (belief / mass - target))
+        return total, gradient
+
+    size = bent[0].shape[1]
+    found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": 150})
+    return found.x.reshape(3, -1)
+
+
+@dataclass
+class Chosen:
+    """The outline that a ranking takes, its overlap and what speaks for it."""
+
+    of: Searched
+    overlap: float
+    evidence: dict[str, float]
+
+
+def chosen(one: Searched, ranking: Ranking) -> Chosen:
+    """What a ranking takes of a search."""
+    at = [one.names.index(name) for name in ranking.names]
+    bent = bends((one.figures[:, at] - ranking.mean) / ranking.spread)
+    score = np.einsum("bon,bn->o", bent, ranking.slope)
+    order = np.argsort(-score, kind="stable")[:WEIGHED]
+    belief, expected, overlap = expected_overlaps([one.polygons[k] for k in order], score[order])
+    best = int(np.argmax(expected))
+    figures = dict(zip(one.names, one.figures[order[best]].tolist(), strict=True))
+    candidate = Candidate(one.polygons[order[best]], None, figures, 0.0)  # type: ignore[arg-type]
+    evidence = evidence_of(candidate, float(expected[best]), belief, overlap[best])
+    return Chosen(one, float(one.overlap[order[best]]), dict(evidence))
+
+
+def calibrated(some: Sequence[Chosen]) -> dict[str, dict[str, float]]:
+    """Weights of the evidence for an outline being right (logistic regression, ridge)."""
+    x = np.array([[*(one.evidence[name] for name in EVIDENCE), 1.0] for one in some])
+    share = weights([one.of for one in some]) * len(some)
+    mean, spread = x[:, :-1].mean(axis=0), x[:, :-1].std(axis=0) + 1e-9
+    z = np.column_stack([(x[:, :-1] - mean) / spread, np.ones(len(x))])
+    found = {}
+    for what, least in RIGHT.items():
+        right = np.array([one.overlap >= least for one in some], float)
+
+        def loss(w: np.ndarray, right: np.ndarray = right) -> tuple[float, np.ndarray]:
+            t = z @ w
+            p = 1 / (1 + np.exp(-t))
+            total = share @ (np.logaddexp(0, t) - right * t) + CALM * float(w[:-1] @ w[:-1])
+            return total, z.T @ (share * (p - right)) + 2 * CALM * np.append(w[:-1], 0.0)
+
+        w = minimize(loss, np.zeros(z.shape[1]), jac=True, method="L-BFGS-B").x
+        slope = w[:-1] / spread
+        table = dict(zip(EVIDENCE, slope.round(5).tolist(), strict=True))
+        found[what] = {**table, "constant": round(float(w[-1] - slope @ mean), 5)}
+    return found
+
+
+def rounded(slopes: np.ndarray) -> np.ndarray:
+    return slopes.round(4)
+
+
+def table_of(known: Sequence[Searched], names: Sequence[str]) -> tuple[dict, list[Chosen]]:
+    """The table, and what its parts take on the sites that they have not seen."""
+    at = [known[0].names.index(name) for name in names]
+    for one in known:
+        one.figures = one.figures[:, at]
+        one.names = tuple(names)
+    every = np.concatenate([one.figures for one in known])
+    mean, spread = every.mean(axis=0).round(4), (every.std(axis=0) + 1e-3).round(4)
+    slopes = [
+        rounded(learn([one for one in known if one.fold != k], mean, spread)) for k in range(FOLDS)
+    ]
+    taken = [
+        chosen(one, Ranking(tuple(names), mean, spread, slopes[one.fold], {})) for one in known
+    ]
+    real = [one for one in taken if not one.of.mark.startswith("simulated")]
+    calibration = {"all": calibrated(real)}
+    for k in range(FOLDS):
+        calibration[str(k)] = calibrated([one for one in real if one.of.fold != k])
+    rows = [
+        {
+            "name": name,
+            "mean": float(mean[n]),
+            "spread": float(spread[n]),
+            "slopes": [part[:, n].tolist() for part in slopes],
+        }
+        for n, name in enumerate(names)
+    ]
+    table = {
+        "learned_by": "tools/train_ranking.py",
+        "bend_end": [BEND, END],
+        "calibration": calibration,
+        "figures": rows,
+    }
+    return table, taken
+
+
+def report(taken: Sequence[Chosen]) -> None:
+    """Print mean overlaps by kind of case, of the best outline, of the one taken."""
+    marks = [one.of.mark for one in taken]
+    for mark in dict.fromkeys(marks):
+        some = [one for one in taken if one.of.mark == mark]
+        got = np.array([one.overlap for one in some])
+        best = np.array([one.of.overlap.max() for one in some])
+        print(
+            f"{mark:24s} {len(some):4d} best {best.mean():.3f} taken {got.mean():.3f} "
+            f">=.88 {np.mean(got >= 0.88):.2f} tenth {np.quantile(got, 0.1):.2f}"
+        )
+
+
+def write(table: dict) -> None:
+    """Write the table, one figure per line."""
+    text = json.dumps(table).replace('{"name"', '\n{"name"')
+    TABLE.write_text(text + "\n", encoding="utf-8")
+
+
+def all_searched(processes: int, only: int | None) -> Iterator[Searched]:
+    """The searches of every case."""
+    some = [one for one in unseen() if only is None or fold_of(one.site, FOLDS) == only]
+    with Pool(processes) as pool:
+        for number, found in enumerate(pool.imap(searched, some, chunksize=4), 1):
+            yield from found
+            if number % 50 == 0:
+                print(f"{number} of {len(some)}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cache", type=Path)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--only", type=int, help="search the cases of this fold only")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    if not options.cache.is_file():
+        found = list(all_searched(options.processes, options.only))
+        options.cache.write_bytes(pickle.dumps(found))
+    if options.only is None:
+        known = pickle.loads(options.cache.read_bytes())
+        table, taken = table_of(known, known[0].names)
+        report(taken)
+        if options.write:
+            write(table)
+
+
+if __name__ == "__main__":
+    main()
