@@ -12,6 +12,9 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 PLUGIN = Path(__file__).parent / "geofield_qgis"
+# The module alone: the package needs QGIS.
+sys.path.insert(0, str(PLUGIN))
+import description  # noqa: E402
 
 
 def texts() -> dict[str, str]:
@@ -26,6 +29,8 @@ def texts() -> dict[str, str]:
     for command in described["commands"].values():
         rows += [row for row in command["parameters"] if "name" in row]
     for row in rows:
+        # Labels are read in the window, as the texts of the code are.
+        found.setdefault(description.label_of(row), "description.py")
         if row["description"]:
             found.setdefault(row["description"], "description.json")
     return found

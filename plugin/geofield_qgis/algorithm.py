@@ -76,7 +76,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     def shortHelpString(self) -> str:  # noqa: D102
         lines = [description.command_help(self.command)]
         lines += [
-            f"<b>{each.name()}</b>: {each.help()}"
+            f"<b>{each.description()}</b>: {each.help()}"
             for each in self.parameterDefinitions()
             if each.help()
         ]

@@ -11,6 +11,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+#: Units at the end of a name, and how a person writes them.
+_UNITS = {"_m2": "m²", "_m": "m", "_px": "px", "_mb": "MB", "_days": "days", "_lonlat": ""}
+_WRITTEN = {"ab": "A-B line", "crs": "CRS", "stem": "file name", "further": "further options"}
 FILE = Path(__file__).with_name("description.json")
 
 
@@ -39,6 +42,18 @@ def parameters(command: str) -> list[dict[str, Any]]:
         else:
             rows.append(row)
     return rows
+
+
+def label_of(row: dict[str, Any]) -> str:
+    """A short label of a parameter, with its unit; what it means is its description."""
+    name, unit = str(row["name"]), ""
+    for end, written in _UNITS.items():
+        if name.endswith(end):
+            name, unit = name[: -len(end)], written
+            break
+    label = _WRITTEN.get(name, name.replace("_", " "))
+    label = label[0].upper() + label[1:]
+    return f"{label} ({unit})" if unit else label
 
 
 def formats() -> list[str]:

@@ -165,7 +165,7 @@ def _kind(row: dict[str, Any]) -> str:
 
 def _asked(row: dict[str, Any]) -> list[tuple[str, str]]:
     """Names and labels of the parameters of one value."""
-    label = tr(row["description"]).rstrip(".")
+    label = tr(description.label_of(row))
     if _kind(row) == "points" and row["count"] == 4:
         return [(f"{name_of(row)}_{end}", f"{label} ({end})") for end in "AB"]
     return [(name_of(row), label)]

@@ -116,5 +116,5 @@ def test_german_is_spoken(qgis):
     assert answer == {
         "plan": "Ein Feld planen",
         "group": "Schritt für Schritt",
-        "label": "Abstand der Fahrspuren, Meter",
+        "label": "Spurabstand (m)",
     }

@@ -524,9 +524,19 @@
       <translation>Rechenprogramm...</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Size (m)</source>
+      <translation>Fenstergröße (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Side of the window read around the point, metres; all of a small picture.</source>
       <translation>Seite des Ausschnitts um den Punkt, Meter; kleine Bilder ganz.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Bands</source>
+      <translation>Kanäle</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -534,9 +544,19 @@
       <translation>Was die Kanäle des Bildes zeigen, der Reihe nach: red, green, blue, nir, grey, other.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>CRS</source>
+      <translation>KBS</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>CRS of a picture that does not say its own, e.g. EPSG:32633.</source>
       <translation>KBS eines Bildes, das seines nicht nennt, z. B. EPSG:32633.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Method</source>
+      <translation>Verfahren</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -544,9 +564,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Holes</source>
+      <translation>Löcher</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>What becomes of crowns, huts and ponds inside: fill (the way of auto) or keep as holes (the way of study).</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Min hole (m²)</source>
+      <translation>Kleinstes Loch (m²)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -554,9 +584,19 @@
       <translation>Löcher unter dieser Größe werden gefüllt, Quadratmeter.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Tolerance (px)</source>
+      <translation>Abweichung (px)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>How far the straightened outline may leave the pixels; 0 keeps them all.</source>
       <translation>Wie weit der begradigte Umriss von den Pixeln abweichen darf; 0 behält alle.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Smooth</source>
+      <translation>Glätten</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -564,9 +604,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Strategy</source>
+      <translation>Verfahren der Suche</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>How obstacles are found: auto, or a way of the study.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Radius (m)</source>
+      <translation>Radius (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -574,9 +624,19 @@
       <translation>Kleinster und größter Kronenradius, Meter; sonst 1 bis 15 mit auto, 2 bis 9 mit den Verfahren der Studie.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Buffer (m)</source>
+      <translation>Sicherheitsabstand (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Safety margin around each obstacle, metres.</source>
       <translation>Sicherheitsabstand um jedes Hindernis, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Cost missed</source>
+      <translation>Gewicht von Übersehenem</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -584,9 +644,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Careful</source>
+      <translation>Vorsichtig</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>auto: drive around what is only possible, too.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Min confidence</source>
+      <translation>Mindestsicherheit</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -594,9 +664,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Polarity</source>
+      <translation>Dunkel oder hell</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>auto: crowns darker or brighter than what is around them.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Others</source>
+      <translation>Auch anderes</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -604,9 +684,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Edge method</source>
+      <translation>Kantenverfahren</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>The study's strategies: edge method.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Threshold</source>
+      <translation>Schwelle</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -614,9 +704,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Circle method</source>
+      <translation>Kreisverfahren</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>The study's strategies: circle transform.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Sensitivity</source>
+      <translation>Empfindlichkeit</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -624,9 +724,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Grey check</source>
+      <translation>Grauprüfung</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Drop discs brighter than 127.37 (absolute) or than the field (relative).</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Spacing (m)</source>
+      <translation>Spurabstand (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -634,9 +744,19 @@
       <translation>Abstand der Fahrspuren, Meter.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Step (m)</source>
+      <translation>Punktabstand (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Distance between track points, metres.</source>
       <translation>Abstand der Spurpunkte, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Direction</source>
+      <translation>Richtung</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -644,9 +764,19 @@
       <translation>Der Fahrspuren: dominant (wie der Rand meist verläuft), longest_edge, hough, fewest, fewest_turns oder ein Kurs in Grad von geografisch Nord im Uhrzeigersinn.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>A-B line</source>
+      <translation>A-B-Linie</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>A-B line to follow: longitude and latitude of A, then of B.</source>
       <translation>A-B-Linie: Länge und Breite von A, dann von B.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Through</source>
+      <translation>Durch diesen Ort</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -654,9 +784,19 @@
       <translation>Ein Ort, durch den eine Spur geht.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Offset (m)</source>
+      <translation>Versatz (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Of the first track from its edge, metres; half the spacing by default.</source>
       <translation>Abstand der ersten Spur vom Rand, Meter; sonst der halbe Spurabstand.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Last strip</source>
+      <translation>Letzter Streifen</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -664,9 +804,19 @@
       <translation>Der Rest am anderen Rand: überfahren, lassen, letzte Spur zurücksetzen oder alle gleich verteilen.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Headland (m)</source>
+      <translation>Vorgewende (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Width of the headland along the border, metres.</source>
       <translation>Breite des Vorgewendes, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Headland holes</source>
+      <translation>Vorgewende um Löcher</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -674,9 +824,19 @@
       <translation>Vorgewende auch um Löcher im Feld.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Min segment (m)</source>
+      <translation>Kürzester Abschnitt (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Shorter segments are not driven, metres.</source>
       <translation>Kürzere Abschnitte werden nicht gefahren, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Clearance (m)</source>
+      <translation>Zusätzlicher Abstand (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -684,9 +844,19 @@
       <translation>Abstand zu Hindernissen über deren Rand hinaus, Meter.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Straight tolerance (m)</source>
+      <translation>Geradheit (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>How far the vertices of a straight edge may stray, metres.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Route</source>
+      <translation>Fahrweg</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -694,9 +864,19 @@
       <translation>Reihenfolge der Arbeit mit den Wegen dazwischen.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Skip</source>
+      <translation>Ausgelassene Spuren</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Tracks left out at each turn of the route skip.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Turning radius (m)</source>
+      <translation>Wenderadius (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -704,9 +884,19 @@
       <translation>Wenderadius der Maschine, Meter.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Curve</source>
+      <translation>Kurve</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Turns forwards only, or with reversing.</source>
       <translation>Wenden nur vorwärts oder mit Zurücksetzen.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Margin (m)</source>
+      <translation>Rand für Wenden (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -714,9 +904,19 @@
       <translation>Wie weit Wenden über den Rand reichen dürfen, Meter.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Start</source>
+      <translation>Beginn</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Longitude and latitude of the place where the route begins.</source>
       <translation>Ort, an dem der Fahrweg beginnt.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Formats</source>
+      <translation>Formate</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -724,9 +924,19 @@
       <translation>Formate der Ergebnisse.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Points</source>
+      <translation>Spurpunkte</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Track points in linked data, too: most of its bytes.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Threads</source>
+      <translation>Gleichzeitige Abrufe</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -734,9 +944,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Cache dir</source>
+      <translation>Ordner des Speichers</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Folder of the tile caches; the user's cache folder by default.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Cache max (MB)</source>
+      <translation>Größter Speicher (MB)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -744,9 +964,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Cache max (days)</source>
+      <translation>Ältester Speicher (Tage)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Tiles are fetched anew after, days.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Allow</source>
+      <translation>Erlaubt</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -754,9 +984,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Keys</source>
+      <translation>Schlüssel</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Keys by source name; GEOFIELD_KEY_NAME in the environment wins.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Sources</source>
+      <translation>Quellen</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -764,9 +1004,24 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Imagery</source>
+      <translation>Bild</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Lat</source>
+      <translation>Breite</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Latitude of a point in the field.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Lon</source>
+      <translation>Länge</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -774,9 +1029,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Out</source>
+      <translation>Ziel</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Folder for the products; made when it does not exist.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Overwrite</source>
+      <translation>Überschreiben</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -784,9 +1049,19 @@
       <translation>Frühere Ergebnisse dort ersetzen; Durchgesehenes und ein verschobener Umriss bleiben.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Fresh</source>
+      <translation>Von vorn</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>With --overwrite: forget what a person edited there.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Acknowledge terms</source>
+      <translation>Bedingungen anerkannt</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -794,9 +1069,19 @@
       <translation>Sie haben die Erlaubnis, Geodaten abzuleiten, obwohl die Bedingungen der Quelle es verbieten.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>As json</source>
+      <translation>Als JSON</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Print the report as JSON on stdout.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Boundary</source>
+      <translation>Grenze</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -804,9 +1089,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Boundary layer</source>
+      <translation>Layer der Grenze</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Layer of --boundary, where it has several.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Boundary name</source>
+      <translation>Name des Schlags</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -814,9 +1109,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Settings file</source>
+      <translation>Einstellungsdatei</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>TOML file with a table per stage; geofield.toml here is read by itself.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Output</source>
+      <translation>Ziel</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -829,14 +1134,29 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>List regions</source>
+      <translation>Regionen zeigen</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Show the study's numbered regions instead of extracting; draws them with --pictures.</source>
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Regions</source>
+      <translation>Regionen</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Take this numbered region of the study's method; repeat to join several.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Pictures</source>
+      <translation>Bilder</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -849,6 +1169,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Plan file</source>
+      <translation>Plan</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>GeoPackage to write; may be the one that was read.</source>
       <translation type="unfinished" />
@@ -859,9 +1184,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>File</source>
+      <translation>Datei</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>GeoPackage to write, may be FILE; for several fields a folder, one file each.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Obstacle file</source>
+      <translation>Hindernisse</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -884,6 +1219,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Source</source>
+      <translation>Quelle</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Latitude of the centre.</source>
       <translation type="unfinished" />
@@ -894,9 +1234,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Area</source>
+      <translation>Gebiet</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Vector file whose extent is fetched, instead of a square around a point.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Zoom</source>
+      <translation>Zoom</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -904,9 +1254,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Resolution (m)</source>
+      <translation>Auflösung (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Wanted metres per pixel on the ground, when no zoom is given.</source>
       <translation>Gewünschte Meter je Pixel am Boden, wenn kein Zoom angegeben ist.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Size (px)</source>
+      <translation>Größe (px)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -919,9 +1279,19 @@
       <translation>Seite des Quadrats, Meter am Boden.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Whole tiles</source>
+      <translation>Ganze Kacheln</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Keep the touched tiles whole.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Layer</source>
+      <translation>Layer</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -929,14 +1299,29 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Missing</source>
+      <translation>Fehlende Kacheln</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>What to do about tiles that cannot be had: stop, or leave no-data.</source>
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Offline</source>
+      <translation>Ohne Netz</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Work from the tile cache alone.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>No cache</source>
+      <translation>Ohne Speicher</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -969,9 +1354,19 @@
       <translation>Formate.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Folder</source>
+      <translation>Ordner</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Folder for the products.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>File name</source>
+      <translation>Dateiname</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -984,9 +1379,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Customer</source>
+      <translation>Kunde</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Customer's name, for terminals.</source>
       <translation>Name des Kunden, für Terminals.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Farm</source>
+      <translation>Betrieb</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -994,9 +1399,19 @@
       <translation>Name des Betriebs, für Terminals.</translation>
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Profile</source>
+      <translation>Profil</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Names and columns of Shapefiles.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Zipped</source>
+      <translation>Als Archiv</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1007,6 +1422,11 @@
       <location filename="description.json" />
       <source>Track points: by default in the GeoPackage and the study's files, not in other RDF.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Further options</source>
+      <translation>Weitere Angaben</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1029,6 +1449,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Name</source>
+      <translation>Name</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>The field's name.</source>
       <translation>Name des Feldes.</translation>
@@ -1044,6 +1469,16 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Detected</source>
+      <translation>Gefunden</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Distance (m)</source>
+      <translation>Abstand (m)</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Distance between centres within which a detection is a hit, metres.</source>
       <translation>Abstand der Mitten, bis zu dem ein Fund ein Treffer ist, Meter.</translation>
@@ -1054,14 +1489,29 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Truth layer</source>
+      <translation>Layer der Wahrheit</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Layer of TRUTH; its first one when not given.</source>
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Driving</source>
+      <translation>Fahrweise</translation>
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Also what a driver loses: DETECTED is a plan with its field and tracks.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Seed</source>
+      <translation>Startzahl</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1072,6 +1522,11 @@
       <location filename="description.json" />
       <source>PNG to write: hits, misses and false detections.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Scene file</source>
+      <translation>Bild</translation>
     </message>
     <message>
       <location filename="description.json" />
