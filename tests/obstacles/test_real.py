@@ -34,7 +34,7 @@ def detections(shared, bands):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.77, 0.70), (3, 0.70, 0.62)])
+@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.77, 0.73), (3, 0.75, 0.72)])
 def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
     hits = {6: 0, 10: 0}
     found = labelled = 0
@@ -49,4 +49,8 @@ def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
         good.append(np.isin(np.arange(len(xy)), match.detected_index))
     assert 2 * hits[10] / (found + labelled) > least_10
     assert 2 * hits[6] / (found + labelled) > least_6
-    assert reliability(np.concatenate(confidences), np.concatenate(good))[3] < 0.15
+    # The curve was fitted on open land in cities: in fields it errs on the safe side, by less
+    # than a fifth.
+    p, hit = np.concatenate(confidences), np.concatenate(good)
+    assert reliability(p, hit)[3] < 0.2
+    assert p.mean() < hit.mean()
