@@ -83,7 +83,7 @@ def curve(answer: np.ndarray, hit: np.ndarray, bin_hits: int = BIN_HITS) -> dict
     order = np.argsort(answer)
     number = np.cumsum(hit[order]) // bin_hits
     parts = [order[number == k] for k in range(int(number[-1]) + 1)]
-    parts = [part for part in parts if len(part) > 10]
+    parts = [part for part in parts if len(part) >= bin_hits]
     mean = np.array([answer[part].mean() for part in parts])
     # One hit and one miss more: no bin is sure of anything.
     share = np.array([(hit[part].sum() + 0.5) / (len(part) + 1) for part in parts])
