@@ -71,6 +71,13 @@ class Planner(QObject):
             self._here, self._target = point, None
             self._ground = {"include": [], "exclude": []}
             self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
+        if self._target is not None:
+            try:
+                for layer in plan_files.layers_of(str(self._target)).values():
+                    sources.refuse_unsaved(layer)
+            except engine.EngineError as error:
+                self._say(str(error))
+                return
         self._points.addPoint(point)
         self.stop()
         self._begin()
@@ -132,7 +139,7 @@ class Planner(QObject):
                 lonlat = self._lonlat(point)
                 option = description.settings()[f"field.{name}"]["option"]
                 words += [option, f"{lonlat.x():.9f},{lonlat.y():.9f}"]
-        words += ["-o", str(self._target), "--overwrite", "--fresh", "--json"]
+        words += ["-o", str(self._target), "--overwrite", "--json"]
         self._run("field", ["field", self._imagery, *words])
 
     def _run(self, stage: str, words: list[str]) -> None:

@@ -196,6 +196,23 @@ def work():
     canvas.setExtent(QgsRectangle(extent))
     screenshot("saved")
 
+    # More ground with Shift: the same plan anew, with what was said of its obstacles.
+    finished.clear()
+    ours.plan.trigger()
+    QTest.mouseClick(
+        canvas.viewport(),
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.ShiftModifier,
+        pixel_of(ASKED["lon"] + 0.0003, ASKED["lat"] + 0.0003),
+    )
+    until(lambda: finished, 200, "planned with more ground")
+    ANSWER["again"] = finished[0]
+    until(lambda: not dock.live.busy, 60, "figures again")
+    ANSWER["count_again"] = dock.count.text()
+    ANSWER["layers_again"] = len(
+        [each for each in project.mapLayers().values() if each.name() == "Obstacles"]
+    )
+
     # The dialogues, for a person to look at.
     import processing
 

@@ -12,6 +12,7 @@ import pytest
 from plugin_place import CLIENT, SAMPLE
 
 from geofield.formats import read_dataset
+from geofield.plan import read_plan
 
 SCRIPT = CLIENT.with_name("in_window.py")
 INI = """[PythonPlugins]
@@ -101,6 +102,16 @@ def test_a_whole_review_by_keys(seen):
     assert wall_s / presses < 2.0  # thirty in a minute
     statuses = read_dataset(Path(seen["plan"])).table("obstacles")["status"]
     assert not statuses.isin(["detected", "possible"]).any()
+
+
+def test_shift_adds_ground_and_keeps_what_was_said(seen):
+    assert seen["again"] == seen["plan"]
+    assert seen["layers_again"] == 1
+    plan = read_plan(Path(seen["again"]))
+    (place,) = plan.settings.field.include
+    assert place == pytest.approx((33.531442, 35.075673), abs=1e-5)
+    # What stands where a person saw it stays; the outline may have brought others in.
+    assert set(plan.obstacles["status"]) >= {"confirmed", "rejected", "added"}
 
 
 def test_nothing_is_left_after_unloading(seen):

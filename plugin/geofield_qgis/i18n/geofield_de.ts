@@ -605,6 +605,26 @@
     </message>
     <message>
       <location filename="description.py" />
+      <source>Include</source>
+      <translation>Gehört dazu</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Further ground that belongs to the field, LON,LAT; repeat for several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Exclude</source>
+      <translation>Gehört nicht dazu</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Ground that does not belong to the field, LON,LAT; repeat for several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
       <source>Strategy</source>
       <translation>Verfahren der Suche</translation>
     </message>
@@ -1161,6 +1181,26 @@
     <message>
       <location filename="description.json" />
       <source>Folder for the study's pictures: grey, binary, numbered regions, reconstruction.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Alternatives</source>
+      <translation>Alternativen</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Show the most likely different outlines; the file's layer alternatives has them.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Choose</source>
+      <translation>Auswahl</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Take this outline of the alternatives: your word, kept on every later run.</source>
       <translation type="unfinished" />
     </message>
     <message>
