@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield import __version__, schema
-from geofield.crs import ground_scale_of
+from geofield.crs import ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
@@ -310,7 +310,7 @@ class Plan:
             schema.ALTERNATIVES,
             {
                 "alternative_no": list(range(1, len(polygons) + 1)),
-                "area_ha": [one.area / 10_000.0 for one in polygons],
+                "area_ha": ground_areas_m2(polygons, self.field.crs) / 10_000.0,
                 "certainty": [one.certainty for one in self.field.alternatives],
             },
             polygons,

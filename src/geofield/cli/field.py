@@ -187,8 +187,8 @@ def _extract(
                 "holes": len(found.polygon.interiors),
                 "crs": found.crs.to_string(),
                 "alternatives": [
-                    {"area_ha": one.polygon.area / 1e4, "certainty": one.certainty}
-                    for one in found.alternatives
+                    {"area_ha": area_ha, "certainty": certain}
+                    for area_ha, certain in _alternatives(found)
                 ],
                 "evidence": plan.to_dataset().provenance.evidence.get("field", {}),
             }
@@ -204,9 +204,18 @@ def _extract(
             say(f"           {reason}")
     if tell and not found.alternatives:
         say("Others     none: only method auto offers alternatives")
-    for number, one in enumerate(found.alternatives if tell else (), 1):
-        say(f"Outline {number}  {one.polygon.area / 1e4:.2f} ha, certainty {one.certainty:.0%}")
+    for number, (area_ha, certain) in enumerate(_alternatives(found) if tell else (), 1):
+        say(f"Outline {number}  {area_ha:.2f} ha, certainty {certain:.0%}")
     say(f"File       {output}")
+
+
+def _alternatives(field: Field) -> list[tuple[float, float]]:
+    """Area on the ground, hectares, and certainty of each outline that may be meant."""
+    from geofield.crs import ground_areas_m2
+
+    areas_m2 = ground_areas_m2([one.polygon for one in field.alternatives], field.crs)
+    sure = [one.certainty for one in field.alternatives]
+    return [(float(area) / 1e4, each) for area, each in zip(areas_m2, sure, strict=True)]
 
 
 def _study(
