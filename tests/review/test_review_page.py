@@ -349,3 +349,25 @@ def test_a_folder_of_plans_is_reviewed_in_one_session(
     assert first is not None
     assert (first["status"] == "rejected").sum() == 0
     assert plan_path.with_name("field.gpkg.review.jsonl").exists()
+
+
+def test_ground_is_clicked_and_another_outline_chosen(page: Page) -> None:
+    before = page.state()
+    ring = before["field"]["rings"][0]
+    middle = sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)
+    high = max(place[1] for place in ring)
+    page.press("g")
+    page.click(middle[0] + 60, high + 3)
+    page.wait(lambda: page.state()["can_undo"])
+    wider = page.state()
+    assert wider["figures"]["area_ha"] > before["figures"]["area_ha"] + 0.05
+    page.chord(Keys.CONTROL, "z")
+    page.wait(lambda: page.state()["field"]["rings"] == before["field"]["rings"])
+    page.press(Keys.ESCAPE)
+    others = page.driver.find_elements(By.CSS_SELECTOR, "#alternatives button")
+    assert len(others) == len(before["field"]["alternatives"]) >= 2
+    others[-1].click()
+    page.wait(lambda: page.state()["can_undo"])
+    chosen = page.state()["field"]
+    assert chosen["rings"] == before["field"]["alternatives"][-1]["rings"]
+    assert "Drawn by a person" in page.text("certainty")

@@ -177,3 +177,38 @@ def test_a_file_that_another_program_changed_is_not_overwritten(plan_path: Path)
             desk.save(name)
     with pytest.raises(GeofieldError, match="there already"):
         desk.save("mine")
+
+
+def test_ground_that_was_clicked_is_obeyed_undone_and_remembered(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    before = desk.session.plan
+    # Ground beyond the northern border, by the road.
+    left, _, right, top = before.field.polygon.bounds
+    place = [(left + right) / 2 + 60, top + 3]
+    assert not before.field.polygon.covers(shapely.Point(place))
+    desk.edit({"do": "ground", "place": place, "belongs": True})
+    wider = desk.session.plan
+    assert wider.field.polygon.covers(shapely.Point(place))
+    assert wider.settings is not None
+    assert len(wider.settings.field.include) == 1
+    desk.edit({"do": "ground", "place": place, "belongs": False})
+    assert not desk.session.plan.field.polygon.covers(shapely.Point(place))
+    desk.edit({"do": "undo"})
+    assert desk.session.plan.field.polygon.equals(wider.field.polygon)
+    desk.save()
+    saved = read_plan(plan_path)
+    assert saved.field.polygon.covers(shapely.Point(place))
+    # Nobody drew it: a later run searches again, with the same points.
+    assert not saved.outline_edited
+    assert saved.settings is not None
+    assert saved.settings.field.include == wider.settings.field.include
+
+
+def test_another_outline_is_chosen(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    outlines = desk.session.plan.field.alternatives
+    assert outlines
+    desk.edit({"do": "choose", "no": len(outlines)})
+    assert desk.session.plan.field.polygon.equals(outlines[-1].polygon)
+    with pytest.raises(GeofieldError, match="no outline 9"):
+        desk.edit({"do": "choose", "no": 9})

@@ -77,7 +77,7 @@ def add_circle(plan: Plan, command: Command) -> Plan:
 
 
 def add_polygon(plan: Plan, command: Command) -> Plan:
-    """An obstacle of any shape: ``ring``, a list of x, y."""
+    """An obstacle of any shape, avoided as drawn: ``ring``, a list of x, y."""
     shape = _polygon([command["ring"]], "obstacle")
     centre = shape.centroid
     return _added(plan, shape, centre.x, centre.y, radius_m=None)
@@ -136,6 +136,14 @@ def set_outline(plan: Plan, command: Command) -> Plan:
     return replace(plan, field=replace(plan.field, polygon=_polygon(command["rings"], "outline")))
 
 
+def choose(plan: Plan, command: Command) -> Plan:
+    """One of the outlines that the search found: ``no``, 1 is the most likely."""
+    number = command["no"]
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise EditError(f"no is not a whole number: {number!r}.")
+    return replace(plan, field=plan.field.choose(number))
+
+
 def set_tracks(plan: Plan, command: Command) -> Plan:
     """Settings of the tracks by their names: ``settings``."""
     given = dict(command["settings"])
@@ -175,6 +183,7 @@ COMMANDS: dict[str, Callable[[Plan, Command], Plan]] = {
     "reshape": reshape,
     "delete": delete,
     "outline": set_outline,
+    "choose": choose,
     "tracks": set_tracks,
     "direction": set_direction,
 }
@@ -211,8 +220,9 @@ def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: floa
     import pandas as pd
 
     _on_the_picture(plan, footprint)
+    # A shape is avoided as it was drawn, in every program; a crown gets the usual margin.
     settings = plan.settings or Settings()
-    buffer_m = settings.obstacles.buffer_m
+    buffer_m = 0.0 if radius_m is None else settings.obstacles.buffer_m
     crs, before = plan.field.crs, plan.obstacles
     number = 1 if before is None else next_number(before)
     row = from_polygons(

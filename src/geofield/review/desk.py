@@ -14,11 +14,15 @@ from typing import Any
 from geofield.crs import ground_scale_of
 from geofield.errors import FormatError, GeofieldError
 from geofield.imagery.display import TiledPicture
+from geofield.model.scene import Scene
+from geofield.pipeline import scene_of_plan
 from geofield.plan import Plan, read_plan
 from geofield.review.commands import Command
+from geofield.review.ground import Ground
 from geofield.review.journal import Journal, fingerprint, play
 from geofield.review.session import Session
 from geofield.review.shown import state_of, tracks_of
+from geofield.settings import Settings
 from geofield.staging import refuse_locked
 from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
@@ -48,7 +52,8 @@ class Desk:
     def _read(self) -> None:
         self.seen = fingerprint(self.path)
         plan = read_plan(self.path)
-        self.session = Session(plan)
+        ground = None if self._picture_path is None else Ground(self._scene_of)
+        self.session = Session(plan, ground)
         self.journal = Journal(self.path)
         self.brought_back = self.journal.replay(self.session)
         self.picture = (
@@ -145,6 +150,10 @@ class Desk:
                 dataset, folder, [name], stem=self.path.stem, overwrite=True, inputs=[self.path]
             )
         return {"files": [str(path.relative_to(self.path.parent)) for path in written]}
+
+    def _scene_of(self, plan: Plan) -> Scene:
+        """The picture around the field, as the plan's own run read it."""
+        return scene_of_plan(str(self._picture_path), plan, plan.settings or Settings())
 
     # -- inner -------------------------------------------------------------------------------
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from geofield.errors import GeofieldWarning
 from geofield.pipeline import run_tracks
-from geofield.review.commands import Command, apply_command
+from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
+    from geofield.review.ground import Ground
 
 #: Steps that can be undone; a plan shares its unchanged tables with its neighbours.
 MOST_STEPS = 500
@@ -51,9 +52,12 @@ class Session:
     ----------
     plan : Plan
         Field and obstacles count as they are; tracks are planned where there are none.
+    ground : Ground, optional
+        Finds the outline again for the edit ``ground``.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, ground: Ground | None = None) -> None:
+        self._ground = ground
         self._steps = [Step(plan) if plan.tracks is not None else planned(plan, None)]
         self._at = 0
         self._saved = self._steps[0]
@@ -98,6 +102,10 @@ class Session:
 
     def preview(self, command: Command) -> Step:
         """What an edit would lead to, without making it."""
+        if command.get("do") == "ground":
+            if self._ground is None:
+                raise EditError("There is no picture beside this plan to find its outline on.")
+            return planned(self._ground.find(self.plan, command), command)
         return planned(apply_command(self.plan, command), command)
 
     def undo(self) -> Step:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geofield.settings import Settings
-from geofield.web.view import obstacles_view, outline_view, tracks_view
+from geofield.web.view import obstacles_view, outline_view, rings_of, tracks_view
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -37,9 +37,9 @@ def tracks_of(plan: Plan, notes: tuple[str, ...] = ()) -> dict[str, Any]:
 def field_of(plan: Plan) -> dict[str, Any]:
     """The outline; of what a person drew nothing is in doubt but where the picture ends."""
     field = plan.field
-    drawn = plan.outline_edited or field.method in ("drawn", "boundary")
+    drawn = plan.outline_edited or field.method in ("drawn", "boundary", "chosen")
     quality = None if drawn else field.quality
-    return outline_view(
+    shown = outline_view(
         field.polygon,
         field.crs,
         plan.grid,
@@ -47,3 +47,8 @@ def field_of(plan: Plan) -> dict[str, Any]:
         certainty=None if quality is None else quality.score,
         doubts=plan.doubts,
     )
+    others = [
+        {"rings": rings_of(one.polygon), "certainty": round(one.certainty, 3)}
+        for one in field.alternatives
+    ]
+    return {**shown, "alternatives": others}

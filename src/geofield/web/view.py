@@ -69,14 +69,18 @@ def outline_view(
     doubts: Sequence[str],
 ) -> dict[str, Any]:
     """The outline, its doubts in words, and where it runs along the picture's frame."""
-    rings = _lines([polygon.exterior, *polygon.interiors])
     return {
-        "rings": [ring[:-1] for ring in rings],
+        "rings": rings_of(polygon),
         "method": method,
         "certainty": _number(certainty),
         "doubts": list(doubts),
         "frame": _lines(along_frame(polygon, crs, grid)),
     }
+
+
+def rings_of(polygon: shapely.Polygon) -> list[list[list[float]]]:
+    """The rings of a polygon, the outer one first, without their last place, which is the first."""
+    return [ring[:-1] for ring in _lines([polygon.exterior, *polygon.interiors])]
 
 
 def obstacles_view(
@@ -102,9 +106,7 @@ def obstacles_view(
                 "buffer_m": _number(row.buffer_m),
                 "lost_m": _number(lost.get(int(row.obstacle_no))),
                 "centre": centre,
-                "rings": [
-                    ring[:-1] for part in parts for ring in _lines([part.exterior, *part.interiors])
-                ],
+                "rings": [ring for part in parts for ring in rings_of(part)],
             }
         )
     return rows

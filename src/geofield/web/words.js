@@ -26,7 +26,8 @@ const WORDS = {
     l_outline: "Outline", l_doubt: "Outline in doubt", l_frame: "Picture's frame: the field goes on",
     k_next: "Next obstacle, the most doubtful first", k_prev: "Previous obstacle", k_confirm: "Confirm", k_reject: "Reject",
     k_reset: "Take your word back", k_add: "Add a circle: press at its middle and drag", k_move: "Move by the arrow keys",
-    k_size: "Smaller, larger", k_outline: "Edit the outline's corners", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
+    k_size: "Smaller, larger", k_outline: "Edit the outline's corners", k_ground: "Click ground that belongs to the field", k_notground: "Click ground that does not",
+    outline_no: "Outline {n} · {p} %", alternatives: "Other outlines", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
     k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
   },
   de: {
@@ -54,7 +55,8 @@ const WORDS = {
     l_outline: "Umriss", l_doubt: "Zweifelhafter Umriss", l_frame: "Bildrand: das Feld geht weiter",
     k_next: "Nächstes Hindernis, das zweifelhafteste zuerst", k_prev: "Voriges Hindernis", k_confirm: "Bestätigen", k_reject: "Verwerfen",
     k_reset: "Ihr Wort zurücknehmen", k_add: "Kreis: in der Mitte drücken und ziehen", k_move: "Mit den Pfeiltasten verschieben",
-    k_size: "Kleiner, größer", k_outline: "Ecken des Umrisses ändern", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
+    k_size: "Kleiner, größer", k_outline: "Ecken des Umrisses ändern", k_ground: "Boden anklicken, der dazugehört", k_notground: "Boden anklicken, der nicht dazugehört",
+    outline_no: "Umriss {n} · {p} %", alternatives: "Andere Umrisse", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
     k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
   },
 };

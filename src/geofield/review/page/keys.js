@@ -6,7 +6,8 @@ const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
   ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")],
   ["m", "k_move", a => a.tool("select")], ["[", "k_size", a => a.smaller()], ["]", "k_size", a => a.larger()],
-  ["o", "k_outline", a => a.tool("outline")], ["Delete", "k_delete", a => a.remove()],
+  ["o", "k_outline", a => a.tool("outline")],
+  ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
   ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
 ];
 const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};

@@ -91,6 +91,17 @@ function showField() {
   const doubts = [...field.doubts];
   if (field.frame.length) doubts.push(t("frame"));
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
+  const shown = JSON.stringify(field.rings);
+  $("alternatives").replaceChildren(...field.alternatives.map((other, i) => {
+    const item = document.createElement("li");
+    const press = node("button", t("outline_no", {n: i + 1, p: number(100 * other.certainty)}));
+    press.setAttribute("aria-pressed", String(JSON.stringify(other.rings) === shown));
+    press.onclick = () => commit({do: "choose", no: i + 1});
+    press.onmouseenter = press.onfocus = () => maps.showOther(other.rings);
+    press.onmouseleave = press.onblur = () => maps.showOther(null);
+    item.append(press);
+    return item;
+  }));
 }
 
 // The most doubtful first; those with a person's word last.
@@ -142,8 +153,10 @@ function step(forth) {
 // -- doing -------------------------------------------------------------------------------
 
 async function commit(command) {
+  document.body.classList.toggle("busy", command.do === "ground");
   const before = new Set(state.obstacles.map(each => each.no));
   const done = await act(() => api.edit(command), show);
+  document.body.classList.remove("busy");
   if (!done) return show({});
   if ($("message").classList.contains("bad")) say("");
   const fresh = state.obstacles.find(each => !before.has(each.no));

@@ -84,6 +84,11 @@ export function showOutline(field) {
   fill("frame", field.frame.map(xy => symbols.line(xy)));
 }
 
+// Another outline that was found, while a person thinks about it.
+export function showOther(rings) {
+  fill("sketch", rings ? [new ol.Feature(symbols.closed(rings))] : []);
+}
+
 export function showObstacles(rows) {
   fill("obstacles", rows.map(symbols.obstacleFeature));
 }

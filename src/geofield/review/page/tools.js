@@ -3,7 +3,7 @@
 import * as maps from "./map.js";
 import {preview, endPreview} from "./api.js";
 
-export const TOOLS = ["select", "circle", "polygon", "outline", "anew", "direction", "measure"];
+export const TOOLS = ["select", "circle", "polygon", "ground", "notground", "outline", "anew", "direction", "measure"];
 let desk, active = "select", held = [];
 const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
 const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
@@ -13,6 +13,8 @@ export function begin(given) {
   desk = given;
   maps.map.on("singleclick", event => {
     if (active === "select") desk.choose(maps.obstacleAt(event.pixel), false);
+    else if (active === "ground" || active === "notground")
+      commit({do: "ground", place: at(event.coordinate), belongs: active === "ground"});
   });
   maps.map.on("pointermove", event => {
     if (event.dragging || active !== "select") return;
@@ -54,6 +56,8 @@ const MAKERS = {
     });
     return [draw];
   },
+  ground: () => [],
+  notground: () => [],
   polygon: () => [shape("Polygon", geometry => ({do: "polygon", ring: ring(geometry)}))],
   anew: () => [shape("Polygon", geometry => ({do: "outline", rings: [ring(geometry)]}), true)],
   outline() {

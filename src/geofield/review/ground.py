@@ -1,0 +1,106 @@
+"""The outline found again from what a person says of the ground: this belongs, that does not.
+
+What was searched once is kept, so that every further click costs only what it changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from pyproj import Geod
+
+from geofield.crs import LONLAT, transformer
+from geofield.field import extract_field, prepare_field
+from geofield.plan import outline_digest
+from geofield.review.commands import Command, EditError
+from geofield.settings import Settings
+
+if TYPE_CHECKING:
+    from geofield.model.scene import Scene
+    from geofield.plan import Plan
+
+
+#: Clicks nearer than this are on the same place, metres.
+_SAME_M = 2.0
+
+
+class Ground:
+    """The picture of a plan, searched for outlines.
+
+    Parameters
+    ----------
+    read : callable
+        Reads the picture of a plan; asked once, at the first click.
+    """
+
+    def __init__(self, read: Callable[[Plan], Scene]) -> None:
+        self._read = read
+        self._scene: Scene | None = None
+        self._search: Any = None
+
+    def find(self, plan: Plan, command: Command) -> Plan:
+        """The plan with the outline that follows from a further point.
+
+        Parameters
+        ----------
+        plan : Plan
+        command : mapping
+            ``place``, x and y in the plan's metric CRS, and ``belongs``, true or false.
+
+        Raises
+        ------
+        EditError
+            Without a place.
+        GeofieldError
+            When the place lies outside the picture or contradicts an earlier one.
+        """
+        try:
+            x, y = (float(value) for value in command["place"])
+        except (KeyError, TypeError, ValueError):
+            raise EditError("A place is two numbers, x and y.") from None
+        lon, lat = transformer(plan.field.crs, LONLAT).transform(x, y)
+        settings = plan.settings or Settings()
+        said = settings.field
+        sides = ("include", "exclude") if command.get("belongs") else ("exclude", "include")
+        place = (round(lon, 8), round(lat, 8))
+        # The last word on a place counts.
+        other = [one for one in getattr(said, sides[1]) if _metres_apart(one, place) > _SAME_M]
+        points = {sides[0]: (*getattr(said, sides[0]), place), sides[1]: tuple(other)}
+        said = said.model_copy(update={**points, "method": "auto"})
+        lat0, lon0 = self._point(plan)
+        if self._scene is None:
+            self._scene = self._read(plan)
+            self._search = prepare_field(self._scene, lat=lat0, lon=lon0)
+        found = extract_field(
+            self._scene, lat=lat0, lon=lon0, search=self._search, **said.model_dump()
+        )
+        old = plan.field
+        found = replace(
+            found,
+            name=old.name,
+            field_id=old.field_id,
+            own=old.own,
+            imagery=old.imagery,
+            imagery_date=old.imagery_date,
+            licence=old.licence,
+        )
+        return replace(
+            plan,
+            field=found,
+            settings=settings.model_copy(update={"field": said}),
+            evidence=replace(plan.evidence, outline=outline_digest(found), point=(lat0, lon0)),
+        )
+
+    def _point(self, plan: Plan) -> tuple[float, float]:
+        """Latitude and longitude that the field was looked for at."""
+        if plan.evidence.point is not None:
+            return plan.evidence.point
+        inside = plan.field.polygon_lonlat.representative_point()
+        return inside.y, inside.x
+
+
+def _metres_apart(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Between two places, longitude and latitude."""
+    return float(Geod(ellps="WGS84").line_length([one[0], other[0]], [one[1], other[1]]))
