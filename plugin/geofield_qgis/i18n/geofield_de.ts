@@ -630,16 +630,6 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Further ground that belongs to the field, LON,LAT; repeat for several.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>Ground that does not belong to the field, LON,LAT; repeat for several.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.json" />
       <source>How obstacles are found: auto, or a way of the study.</source>
       <translation type="unfinished" />
     </message>
@@ -1207,16 +1197,6 @@
       <location filename="description.py" />
       <source>Choose</source>
       <translation>Auswahl</translation>
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>Take this outline of the alternatives: your word, kept on every later run.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>Show the most likely different outlines; the file's layer alternatives has them.</source>
-      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
