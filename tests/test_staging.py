@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 import sqlite3
@@ -201,3 +202,20 @@ def test_a_geopackage_that_another_program_edits_is_left_alone(plan: Path) -> No
     assert done.returncode == 1
     assert "open in another program" in done.stderr
     assert plan.read_bytes() == before
+
+
+def test_a_folder_beside_that_vanishes_meanwhile_is_no_matter(tmp_path, monkeypatch):
+    gone = tmp_path / "of-another-program"
+    gone.mkdir()
+    for name in ("scandir", "listdir"):
+        real = getattr(os, name)
+
+        def vanished(path=".", real=real):
+            if str(path) == str(gone):
+                raise FileNotFoundError(path)
+            return real(path)
+
+        monkeypatch.setattr(os, name, vanished)
+    with staged_folder(tmp_path, overwrite=True) as staging:
+        (staging / "product.txt").write_text("whole", encoding="utf-8")
+    assert (tmp_path / "product.txt").read_text(encoding="utf-8") == "whole"

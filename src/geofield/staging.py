@@ -86,7 +86,8 @@ _Seen = dict[Path, tuple[int, int]]
 def _seen(target: Path) -> _Seen:
     """What lies in a folder and one below, as far as it could be a product."""
     found = {}
-    for place in (*target.glob("*"), *target.glob("*/*")):
+    upper = _listed(target)
+    for place in (*upper, *(inner for one in upper for inner in _listed(one))):
         try:
             facts = place.stat()
         except OSError:
@@ -94,6 +95,14 @@ def _seen(target: Path) -> _Seen:
         if not place.name.startswith(PREFIX) and stat.S_ISREG(facts.st_mode):
             found[place] = (facts.st_ino, facts.st_mtime_ns)
     return found
+
+
+def _listed(folder: Path) -> list[Path]:
+    """What is in a folder; nothing in what is none, or has gone meanwhile."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
 
 
 @contextmanager
