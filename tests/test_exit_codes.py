@@ -125,6 +125,12 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("info text.gpkg", "info text.tif", "info missing.tif"),
         ("info", "info out/field.gpkg --deep"),
     ),
+    # It serves until it is stopped: what it does then is tested in tests/review.
+    "review": (
+        (),
+        ("review text.gpkg --no-browser",),
+        ("review", "review out/field.gpkg --port x"),
+    ),
     "live": (("live",), (), ("live all",)),
     "settings": (("settings", "settings --json"), (), ("settings tracks",)),
     "formats": (("formats", "formats --json"), (), ("formats gpkg",)),

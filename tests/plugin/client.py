@@ -82,7 +82,7 @@ def given(values):
     return made
 
 
-def run(algorithm, values, stop_after_s=None, project_crs=None):
+def run(algorithm, values, stop_after_s=None, stop_at_percent=None, project_crs=None):
     """processing.run, timed; optionally stopped by a person after a while."""
     import processing
     from qgis.core import QgsCoordinateReferenceSystem
@@ -96,9 +96,12 @@ def run(algorithm, values, stop_after_s=None, project_crs=None):
         stopped.append(time.monotonic())
         feedback.cancel()
 
-    timer = threading.Timer(stop_after_s or 0, stop)
     if stop_after_s is not None:
-        timer.start()
+        threading.Timer(stop_after_s, stop).start()
+    if stop_at_percent is not None:
+        feedback.progressChanged.connect(
+            lambda value: stop() if value >= stop_at_percent and not stopped else None
+        )
     begun = time.monotonic()
     try:
         result = processing.run(algorithm, given(values), feedback=feedback)
