@@ -97,7 +97,10 @@ class Plan:
         return figures
 
     def __eq__(self, other: object) -> bool:
-        """Whether field, obstacles, tracks, settings, source, grid and evidence are the same."""
+        """Whether field, obstacles, tracks, settings, source, grid and evidence are the same.
+
+        Other outlines that were merely proposed do not count.
+        """
         if not isinstance(other, Plan):
             return NotImplemented
         mine, theirs = self._tables(), other._tables()
@@ -115,10 +118,8 @@ class Plan:
         return (one.crs, one.polygon, words, one.own, outline, self._provenance(), self.grid)
 
     def _tables(self) -> dict[str, gpd.GeoDataFrame]:
-        """All tables but the field's own."""
+        """All tables but the field's own and its alternatives, which are proposals."""
         tables = {} if self.obstacles is None else {schema.OBSTACLES.name: self.obstacles}
-        if self.field.alternatives:
-            tables[schema.ALTERNATIVES.name] = self._alternatives_table()
         return tables if self.tracks is None else tables | self.tracks.tables()
 
     def _provenance(self) -> Provenance:
@@ -146,8 +147,11 @@ class Plan:
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
+        tables = {schema.FIELD.name: self._field_table()} | self._tables()
+        if self.field.alternatives:
+            tables[schema.ALTERNATIVES.name] = self._alternatives_table()
         return Dataset(
-            tables={schema.FIELD.name: self._field_table()} | self._tables(),
+            tables=tables,
             crs=self.field.crs,
             name=self.field.name,
             provenance=self._provenance(),

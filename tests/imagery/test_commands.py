@@ -191,7 +191,7 @@ def test_sources_of_ones_own(
 
 def test_a_wrong_settings_file_does_not_show_its_keys(capsys: pytest.CaptureFixture[str]) -> None:
     Path("geofield.toml").write_text('[fetch.sources.county]\nkey = "s3cret"\nmax_zoom = 99\n')
-    assert run("sources") == 1
+    assert run("sources") == 2
     shown = capsys.readouterr().err
     assert "fetch.sources.county.url" in shown
     assert "s3cret" not in shown

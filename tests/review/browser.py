@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import subprocess
@@ -89,6 +90,11 @@ class Page:
     def obstacle(self, number: int) -> dict[str, Any]:
         """A row of the session."""
         return next(row for row in self.state()["obstacles"] if row["no"] == number)
+
+    def judged(self) -> int:
+        """How many obstacles have a person's word, as the page says it."""
+        waiting, total = re.findall(r"[0-9]+", self.text("left"))
+        return int(total) - int(waiting)
 
     def pixel(self, x: float, y: float) -> tuple[int, int]:
         """Where a place of the plan lies in the window."""
