@@ -284,7 +284,7 @@ CATALOGUE: tuple[Format, ...] = (
         "html",
         "Web page in one file",
         ("{stem}.html",),
-        ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns"),
+        ("field", "obstacles", "segments", "gaps", "headland_tracks", "route", "turns"),
         "geofield.web.html:write",
         drops=(Drop("settings and evidence", "provenance"),),
         crs="metric",

@@ -1,7 +1,7 @@
 // A plan on a page that is one file: picture, layers, what each thing is, legend.
 
 import {label, number, t} from "./words.js";
-import {cased, closed, frameStyle, gapFeatures, gapStyle, legend, line, lonlatOf, obstacleFeature, obstacleStyle,
+import {cased, closed, driveFeatures, driveStyle, frameStyle, gapFeatures, gapStyle, legend, line, lonlatOf, obstacleFeature, obstacleStyle,
   outlineColor, setTheme, trackFeatures, trackStyle, turnStyle} from "./js";
 
 const plan = JSON.parse(document.getElementById("plan").textContent);
@@ -25,6 +25,7 @@ const shown = {
   headland: add(plan.headland.map(xy => line(xy)), cased(plan.theme.headland, 1.6), "headland"),
   gaps: add(gapFeatures(plan.gaps), gapStyle(), "gap"),
   turns: add(plan.route.map(turn => line(turn.line, {fits: turn.fits})), turnStyle, "turn"),
+  drive: add(driveFeatures(plan.drive), driveStyle, "drive"),
   outline: add([new ol.Feature(closed(field.rings))], cased(outlineColor(field), 3), "outline"),
   frame: add(field.frame.map(xy => line(xy)), frameStyle(), "frame"),
   obstacles: add(plan.obstacles.map(obstacleFeature), obstacleStyle, "obstacle"),

@@ -35,6 +35,15 @@ export function trackStyle(feature, resolution) {
 export const turnStyle = feature =>
   cased(feature.get("fits") ? theme.turn : theme.unfit, feature.get("fits") ? 1.4 : 3);
 
+// Which way a segment is driven, and as which of all: an arrow at its middle.
+export function driveStyle(feature, resolution) {
+  if (resolution > 1.2) return [];
+  return [new ol.style.Style({image: new ol.style.RegularShape({points: 3, radius: 8, rotateWithView: true,
+      rotation: Math.PI / 2 - feature.get("turned"), scale: [0.7, 1.15],
+      fill: new ol.style.Fill({color: theme.turn}), stroke: stroke("#000", 1.2)})}),
+    ...(resolution < 0.35 ? [lettering(String(feature.get("order")), "11px system-ui, sans-serif", theme.turn)] : [])];
+}
+
 export function obstacleStyle(feature, resolution, chosen) {
   const status = feature.get("status"), look = theme.status[status];
   const faint = status === "rejected" || status === "possible";
@@ -54,6 +63,9 @@ export const closed = rings => new ol.geom.Polygon(rings.map(ring => [...ring, r
 
 export const trackFeatures = rows => rows.map(([no, x0, y0, x1, y1]) => line([[x0, y0], [x1, y1]], {no}));
 export const gapFeatures = rows => rows.map(([x0, y0, x1, y1, cause]) => line([[x0, y0], [x1, y1]], {cause}));
+
+export const driveFeatures = rows => rows.map(([x, y, turned], i) =>
+  new ol.Feature({geometry: new ol.geom.Point([x, y]), turned, order: i + 1}));
 
 export function obstacleFeature(row) {
   const feature = new ol.Feature({geometry: closed(row.rings), status: row.status, row});
@@ -75,7 +87,7 @@ function weights([a, b, c], x) {
 
 export function legend() {
   const rows = [["l_outline", theme.outline], ["l_doubt", theme.doubt], ["l_frame", "#000", true], ["l_track", theme.track],
-    ["l_gap", theme.gap, true], ["l_headland", theme.headland], ["l_turn", theme.turn], ["l_unfit", theme.unfit],
+    ["l_gap", theme.gap, true], ["l_headland", theme.headland], ["l_turn", theme.turn], ["l_unfit", theme.unfit], ["l_drive", theme.turn],
     ...Object.entries(theme.status).map(([status, look]) => [status, look.color, Boolean(look.dash)])];
   return rows.map(([name, color, dashed]) => {
     const item = document.createElement("li"), mark = document.createElementNS("http://www.w3.org/2000/svg", "svg");
@@ -85,6 +97,11 @@ export function legend() {
       const bar = document.createElementNS("http://www.w3.org/2000/svg", "line");
       set(bar, {x1: 1, x2: 33, y1: 6, y2: 6, stroke: paint, "stroke-width": width, "stroke-dasharray": dash});
       mark.append(bar);
+    }
+    if (name === "l_drive") {
+      const arrow = document.createElementNS("http://www.w3.org/2000/svg", "path");
+      set(arrow, {d: "M10 1l14 5-14 5z", fill: color, stroke: "#000"});
+      mark.replaceChildren(arrow);
     }
     item.append(mark, t(name));
     return item;

@@ -38,7 +38,8 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
         Told beside the tracks' own.
     """
     if tracks is None:
-        return {"tracks": [], "gaps": [], "headland": [], "route": [], "figures": {}, "notes": []}
+        names = ("tracks", "gaps", "headland", "route", "drive", "notes")
+        return {**{name: [] for name in names}, "figures": {}}
     numbers = tracks.segments["track_no"].to_numpy(dtype=np.int64).tolist()
     gaps, around, turns = tracks.gaps, tracks.headland_tracks, tracks.turns
     return {
@@ -54,6 +55,7 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
             {"line": line, "fits": fits != "no"}
             for line, fits in zip(_lines(turns.geometry.to_numpy()), turns["fits"], strict=True)
         ],
+        "drive": [] if tracks.route is None else _drive(tracks.route),
         "figures": _figures(tracks, area_ha),
         "notes": [*tracks.notes, *notes],
     }
@@ -129,6 +131,18 @@ def margin_bounds(polygon: shapely.Polygon) -> tuple[float, float, float, float]
     left, bottom, right, top = polygon.bounds
     margin = 0.1 * max(right - left, top - bottom)
     return left - margin, bottom - margin, right + margin, top + margin
+
+
+def _drive(route: gpd.GeoDataFrame) -> list[list[float]]:
+    """Where and which way segments are driven, in order: x, y and the turn from east, radians."""
+    work = route[route["kind"] == "work"].geometry.to_numpy()
+    ends = shapely.get_coordinates([shapely.get_point(work, 0), shapely.get_point(work, -1)])
+    start, end = ends.reshape(2, -1, 2)
+    ahead = end - start
+    middle = np.round((start + end) / 2, _DIGITS)
+    turned = np.round(np.arctan2(ahead[:, 1], ahead[:, 0]), 4)
+    arrows: list[list[float]] = np.column_stack([middle, turned]).tolist()
+    return arrows
 
 
 def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:

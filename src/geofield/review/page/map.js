@@ -6,7 +6,7 @@ import {number} from "./web/words.js";
 const source = () => new ol.source.Vector();
 export const sources = {
   outline: source(), frame: source(), tracks: source(), gaps: source(), headland: source(),
-  turns: source(), obstacles: source(), handle: source(), sketch: source(),
+  turns: source(), drive: source(), obstacles: source(), handle: source(), sketch: source(),
 };
 export let map, view;
 let picture, pictureFacts, places;
@@ -27,6 +27,7 @@ export function build(state, chosen) {
   add("headland", symbols.cased(state.theme.headland, 1.6));
   add("gaps", symbols.gapStyle());
   add("turns", symbols.turnStyle);
+  add("drive", symbols.driveStyle);
   add("outline", feature => symbols.cased(feature.get("color"), 3));
   add("frame", symbols.frameStyle());
   add("obstacles", (feature, resolution) => symbols.obstacleStyle(feature, resolution, feature.getId() === chosen()));
@@ -76,6 +77,7 @@ export function showTracks(answer) {
   fill("tracks", symbols.trackFeatures(answer.tracks));
   fill("gaps", symbols.gapFeatures(answer.gaps));
   fill("headland", answer.headland.map(xy => symbols.line(xy)));
+  fill("drive", symbols.driveFeatures(answer.drive));
   fill("turns", answer.route.map(({line: xy, fits}) => symbols.line(xy, {fits})));
 }
 
