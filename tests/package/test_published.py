@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -44,9 +45,11 @@ def test_the_wheel_does_the_main_job_outside_the_checkout(wheel: Path, tmp_path:
     # Its dependencies are those of this environment; its own files are the wheel's alone.
     (site / "dependencies.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
     python = home / "bin" / "python"
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     where = subprocess.run(
         [python, "-c", "import geofield; print(geofield.__file__)"],
         cwd=tmp_path,
+        env=clean,
         capture_output=True,
         text=True,
         check=True,
@@ -56,10 +59,12 @@ def test_the_wheel_does_the_main_job_outside_the_checkout(wheel: Path, tmp_path:
     formats = ["--format", "gpkg", "--format", "rdf", "--out", "out"]
     picture = ROOT / "sample_data" / "field_1.tif"
     run = [python, "-m", "geofield", "run", picture, *place, *formats]
-    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(run, cwd=tmp_path, env=clean, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     page = [python, "-m", "geofield", "export", "out/field.gpkg", "-f", "html", "--out", "page"]
-    done = subprocess.run(page, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        page, cwd=tmp_path, env=clean, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -11,6 +11,7 @@ import traceback
 from pathlib import Path
 
 from qgis.core import (
+    Qgis,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
     QgsPointXY,
@@ -182,7 +183,12 @@ def work():
         "statuses": statuses(layer),
         "renderer": type(layer.renderer()).__name__,
         "figures": dock.figures.text(),
-        "messages": [item.text() for item in iface.messageBar().items()],
+        # What went well may still stand there; what went wrong must not.
+        "messages": [
+            item.text()
+            for item in iface.messageBar().items()
+            if item.level() in (Qgis.MessageLevel.Warning, Qgis.MessageLevel.Critical)
+        ],
     }
     # All the rest by keys, timed.
     begun, presses = time.monotonic(), 0
