@@ -185,7 +185,7 @@ def main() -> None:
         more = ["--lon", "33.531142", "--spacing", "4", "--format", "gpkg", "--out", str(folder)]
         subprocess.run([*run, *more], check=True, capture_output=True)
         for what, plan, number, goals in (
-            ("3.6 ha, 21 obstacles", folder / "field.gpkg", 8, ("1 s", "150 ms", "10")),
+            ("3.6 ha, 20 obstacles", folder / "field.gpkg", 8, ("1 s", "150 ms", "10")),
             ("100 ha, 400 obstacles", large_plan(folder), 200, ("-", "500 ms", "-")),
         ):
             with served(plan) as (address, _, ready):
