@@ -15,7 +15,12 @@ if TYPE_CHECKING:
 
 
 def save_plan(
-    plan: Plan, output: Path, *, read_from: Path | None = None, overwrite: bool = False
+    plan: Plan,
+    output: Path,
+    *,
+    read_from: Path | None = None,
+    picture: Path | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write a plan as one GeoPackage.
 
@@ -26,6 +31,8 @@ def save_plan(
         May be `read_from`: a stage that adds to a file replaces it in one step.
     read_from : Path, optional
         The GeoPackage that the plan was read from.
+    picture : Path, optional
+        That the project shows; the one that belongs to `read_from` when not given.
     overwrite : bool
         Replace a file other than `read_from`.
     """
@@ -39,9 +46,11 @@ def save_plan(
         )
     same = read_from is not None and output.resolve() == read_from.resolve()
     dataset = plan.to_dataset()
-    if read_from is not None and output.resolve().parent == read_from.resolve().parent:
+    if picture is None and read_from is not None:
+        picture = scene_beside(read_from)
+    if picture is not None and output.resolve().parent == picture.resolve().parent:
         # The project goes on showing the picture that lies there.
-        dataset = replace(dataset, scene_path=scene_beside(read_from))
+        dataset = replace(dataset, scene_path=picture)
     with staged_folder(output.parent, overwrite=overwrite or same) as staging:
         keep_earlier(output, staging)
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 import shapely
 
 from geofield.errors import GeofieldError
+from geofield.formats import read_dataset
 from geofield.plan import Plan, read_plan
 from geofield.review import Session, apply_command
 from geofield.review.desk import ChangedError, Desk
@@ -212,3 +215,30 @@ def test_another_outline_is_chosen(plan_path: Path) -> None:
     assert desk.session.plan.field.polygon.equals(outlines[-1].polygon)
     with pytest.raises(GeofieldError, match="no outline 9"):
         desk.edit({"do": "choose", "no": 9})
+
+
+def test_an_undo_after_saving_cannot_be_lost_by_a_kill(plan_path: Path) -> None:
+    """What can be undone is what the journal beside the saved file can do again."""
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.save()
+    desk.edit({"do": "status", "no": 4, "status": "confirmed"})
+    for _ in range(2):
+        desk.edit({"do": "undo"})
+    again = Desk(plan_path)
+    assert again.session.plan == desk.session.plan
+    assert row(again.session.plan, 3)["status"] == "rejected"
+    assert row(again.session.plan, 4)["status"] == "detected"
+
+
+def test_edits_are_saved_elsewhere_while_another_program_holds_the_file(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    with closing(sqlite3.connect(plan_path)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(GeofieldError, match="open in another program"):
+            desk.save()
+        assert desk.save("mine")["saved_as"] == "mine.gpkg"
+    mine = plan_path.with_name("mine.gpkg")
+    assert row(read_plan(mine), 3)["status"] == "rejected"
+    assert read_dataset(mine).scene_path == plan_path.with_name("scene.tif")

@@ -115,19 +115,20 @@ class Desk:
         from geofield.plan_files import save_plan
 
         with self.lock:
-            place = self.path if target is None else self._beside(target)
-            if place == self.path and fingerprint(self.path) != self.seen:
+            step = self.session.step
+            if target is not None:
+                # Whatever other programs do to the plan's own file, this one comes into being.
+                place = self._beside(target)
+                save_plan(step.plan, place, picture=self._picture_path)
+                return {**state_of(self.session), "saved_as": place.name}
+            if fingerprint(self.path) != self.seen:
                 raise ChangedError(
                     f"Another program changed {self.path.name} since it was opened here.",
                     hint="Reload it (edits made here are kept in a file beside it), or save your "
                     "edits under another name.",
                 )
             refuse_locked(self.path)
-            step = self.session.step
-            same = place == self.path
-            save_plan(step.plan, place, read_from=self.path, overwrite=same)
-            if not same:
-                return {**state_of(self.session), "saved_as": place.name}
+            save_plan(step.plan, self.path, read_from=self.path)
             self.journal.clear()
             self.seen = fingerprint(self.path)
             self.session.mark_saved(step)

@@ -119,8 +119,11 @@ class Session:
         return self.step
 
     def mark_saved(self, step: Step) -> None:
-        """Note which state lies in the file now."""
-        self._saved = step
+        """Begin anew from the state that lies in the file now.
+
+        What can be undone must be what a journal beside that file can do again.
+        """
+        self._steps, self._at, self._saved = [step], 0, step
 
 
 def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
