@@ -118,6 +118,11 @@ def test_tracks_turn_with_a_dragged_line(plan: Plan) -> None:
         ({"do": "tracks", "settings": {"spacing_m": -2}}, "spacing_m"),
         ({"do": "tracks", "settings": {"spacing_m": 5000}}, "larger than the field"),
         ({"do": "tracks", "settings": {"colour": "red"}}, "no setting"),
+        ({"do": "tracks", "settings": [1]}, "by their names"),
+        ({"do": ["status"]}, "no edit"),
+        ({"do": "status", "no": [8], "status": "rejected"}, "not a whole number"),
+        ({"do": "delete", "no": True}, "not a whole number"),
+        ({"do": "choose", "no": "two"}, "not a whole number"),
     ],
 )
 def test_bad_edits_are_refused_in_words_and_change_nothing(

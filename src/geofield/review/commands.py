@@ -52,7 +52,7 @@ def apply_command(plan: Plan, command: Command) -> Plan:
         shape that crosses itself or lies outside the picture.
     """
     name = command.get("do")
-    if name not in COMMANDS:
+    if not isinstance(name, str) or name not in COMMANDS:
         raise EditError(f"There is no edit {name!r}.", hint=f"Edits: {', '.join(COMMANDS)}.")
     try:
         return COMMANDS[name](plan, command)
@@ -138,15 +138,14 @@ def set_outline(plan: Plan, command: Command) -> Plan:
 
 def choose(plan: Plan, command: Command) -> Plan:
     """One of the outlines that the search found: ``no``, 1 is the most likely."""
-    number = command["no"]
-    if isinstance(number, bool) or not isinstance(number, int):
-        raise EditError(f"no is not a whole number: {number!r}.")
-    return replace(plan, field=plan.field.choose(number))
+    return replace(plan, field=plan.field.choose(_whole(command, "no")))
 
 
 def set_tracks(plan: Plan, command: Command) -> Plan:
     """Settings of the tracks by their names: ``settings``."""
-    given = dict(command["settings"])
+    given = command["settings"]
+    if not isinstance(given, Mapping):
+        raise EditError("settings are values by their names.")
     unknown = sorted(set(given) - set(TrackSettings.model_fields))
     if unknown:
         raise EditError(f"Tracks have no setting {unknown[0]!r}.")
@@ -190,11 +189,12 @@ COMMANDS: dict[str, Callable[[Plan, Command], Plan]] = {
 
 
 def _row(plan: Plan, command: Command) -> Any:
+    number = _whole(command, "no")
     if plan.obstacles is not None:
-        rows = plan.obstacles[plan.obstacles["obstacle_no"] == command["no"]]
+        rows = plan.obstacles[plan.obstacles["obstacle_no"] == number]
         if len(rows):
             return rows.iloc[0]
-    raise EditError(f"There is no obstacle {command['no']}.")
+    raise EditError(f"There is no obstacle {number}.")
 
 
 def _with_row(plan: Plan, command: Command, values: Mapping[str, Any]) -> Plan:
@@ -253,6 +253,13 @@ def _on_the_picture(plan: Plan, shape: Any) -> None:
     x, y = plan.grid.from_crs(centre.x, centre.y, plan.field.crs)
     if not plan.grid.contains_px(float(x), float(y)):
         raise EditError("That place lies outside the picture.", hint="Draw on the picture.")
+
+
+def _whole(command: Command, name: str) -> int:
+    value = command[name]
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise EditError(f"{name} is not a whole number: {value!r}.")
+    return value
 
 
 def _number(command: Command, name: str) -> float:

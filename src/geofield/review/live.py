@@ -16,6 +16,7 @@ import shapely
 
 from geofield.errors import GeofieldError
 from geofield.review.session import Step, planned
+from geofield.web.view import ends_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -105,8 +106,8 @@ def _told(step: Step) -> dict[str, Any]:
     if tracks is None:
         raise GeofieldError("There are no tracks.")
     return {
-        "segments": _lines(tracks.segments),
-        "gaps": _lines(tracks.gaps),
+        "segments": ends_of(tracks.segments),
+        "gaps": ends_of(tracks.gaps),
         "figures": {
             "tracks": len(tracks.lines),
             "segments": len(tracks.segments),
@@ -114,11 +115,3 @@ def _told(step: Step) -> dict[str, Any]:
         },
         "notes": [*step.notes, *tracks.notes],
     }
-
-
-def _lines(table: gpd.GeoDataFrame) -> list[list[float]]:
-    """Ends of straight lines, metric CRS: x, y, x, y; to the millimetre."""
-    return [
-        [round(float(value), 3) for place in (line.coords[0], line.coords[-1]) for value in place]
-        for line in table.geometry
-    ]

@@ -80,6 +80,10 @@ def _page_files() -> dict[str, tuple[bytes, str]]:
     return found
 
 
+class _NoSuchRequestError(Exception):
+    """A page of another version asked."""
+
+
 class _Handler(BaseHTTPRequestHandler):
     server: ReviewServer
     protocol_version = "HTTP/1.1"
@@ -140,7 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._json(409, _words(error))
         except GeofieldError as error:
             self._json(422, _words(error))
-        except LookupError:
+        except _NoSuchRequestError:
             self._json(404, {"message": "There is no such request."})
 
     def _answer(self, path: str, value: dict[str, Any]) -> dict[str, Any]:
@@ -170,7 +174,7 @@ class _Handler(BaseHTTPRequestHandler):
             return desk.reload()
         if path == "/api/export":
             return desk.export(str(value.get("format", "")))
-        raise LookupError(path)
+        raise _NoSuchRequestError(path)
 
     def _tile(self, path: str) -> None:
         show, *places = path.split("/")[2:]

@@ -43,10 +43,10 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
     numbers = tracks.segments["track_no"].to_numpy(dtype=np.int64).tolist()
     gaps, around, turns = tracks.gaps, tracks.headland_tracks, tracks.turns
     return {
-        "tracks": [[no, *end] for no, end in zip(numbers, _ends(tracks.segments), strict=True)],
+        "tracks": [[no, *end] for no, end in zip(numbers, ends_of(tracks.segments), strict=True)],
         "gaps": [
             [*end, "" if cause is None else str(cause)]
-            for end, cause in zip(_ends(gaps), gaps["cause"], strict=True)
+            for end, cause in zip(ends_of(gaps), gaps["cause"], strict=True)
         ],
         "headland": [] if around is None else _lines(around.geometry.to_numpy()),
         "route": []
@@ -161,7 +161,7 @@ def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:
     }
 
 
-def _ends(lines: gpd.GeoDataFrame) -> list[list[float]]:
+def ends_of(lines: gpd.GeoDataFrame) -> list[list[float]]:
     """First and last place of each line: x0, y0, x1, y1."""
     xy = shapely.get_coordinates(lines.geometry.to_numpy()).reshape(-1, 4)
     rounded: list[list[float]] = np.round(xy, _DIGITS).tolist()
