@@ -95,11 +95,8 @@ def as_text(
     name = names[0]
     kind = _kind(row)
     if kind == "points":
-        texts = []
-        for each in names:
-            point = algorithm.parameterAsPoint(values, each, context, LONLAT)
-            texts += [f"{point.x():.9f}", f"{point.y():.9f}"]
-        return texts
+        points = [algorithm.parameterAsPoint(values, each, context, LONLAT) for each in names]
+        return [f"{value:.9f}" for point in points for value in (point.x(), point.y())]
     if kind == "flag":
         value = algorithm.parameterAsBoolean(values, name, context)
         return None if value == bool(row["default"]) else [str(value).lower()]
@@ -108,19 +105,19 @@ def as_text(
         given = [float(each) for each in value]
         unsaid = not given or any(math.isnan(each) for each in given)
         return None if unsaid or given == row["default"] else [repr(each) for each in given]
-    if kind == "integer":
-        number: float = algorithm.parameterAsInt(values, name, context)
-        return None if number == row["default"] else [str(number)]
-    if kind == "float":
-        number = algorithm.parameterAsDouble(values, name, context)
+    if kind in ("integer", "float"):
+        whole = kind == "integer"
+        read = algorithm.parameterAsInt if whole else algorithm.parameterAsDouble
+        number = read(values, name, context)
         return None if number == row["default"] else [repr(number)]
     if kind == "choices":
         chosen = algorithm.parameterAsEnumStrings(values, name, context)
         return None if chosen == row["default"] else chosen
-    if kind == "choice":
-        text = algorithm.parameterAsEnumString(values, name, context)
-    else:
-        text = algorithm.parameterAsString(values, name, context).strip()
+    read = algorithm.parameterAsEnumString if kind == "choice" else algorithm.parameterAsString
+    return _as_words(row, read(values, name, context).strip())
+
+
+def _as_words(row: dict[str, Any], text: str) -> list[str] | None:
     if not text or text == row["default"]:
         return None
     if row.get("multiple"):
@@ -171,6 +168,16 @@ def _asked(row: dict[str, Any]) -> list[tuple[str, str]]:
     return [(name_of(row), label)]
 
 
+def _number(name: str, label: str, row: dict[str, Any]) -> QgsProcessingParameterDefinition:
+    kind = compat.WHOLE if _kind(row) == "integer" else compat.REAL
+    made = QgsProcessingParameterNumber(name, label, kind, row["default"], True)
+    if "minimum" in row or "above" in row:
+        made.setMinimum(row.get("minimum", 1e-6))
+    if "maximum" in row:
+        made.setMaximum(row["maximum"])
+    return made
+
+
 def _definition(name: str, label: str, row: dict[str, Any]) -> QgsProcessingParameterDefinition:
     kind, default = _kind(row), row["default"]
     if kind == "points":
@@ -192,14 +199,7 @@ def _definition(name: str, label: str, row: dict[str, Any]) -> QgsProcessingPara
         text = ",".join(str(each) for each in default) if default else None
         return QgsProcessingParameterRange(name, label, compat.REAL, text, True)
     if kind in ("float", "integer"):
-        made = QgsProcessingParameterNumber(
-            name, label, compat.WHOLE if kind == "integer" else compat.REAL, default, True
-        )
-        if "minimum" in row or "above" in row:
-            made.setMinimum(row.get("minimum", 1e-6))
-        if "maximum" in row:
-            made.setMaximum(row["maximum"])
-        return made
+        return _number(name, label, row)
     if kind in ("path", "file"):
         return QgsProcessingParameterFile(name, label, optional=True)
     if kind == "directory":

@@ -274,6 +274,15 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
 
 def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) -> None:
     font = ImageFont.load_default(14)
+    for index, (color, text, dash) in enumerate(_legend_entries(dataset)):
+        x, y = left + 190 * (index // 3), top + 22 * (index % 3)
+        for a, b in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
+            draw.line([*a, *b], fill=theme.rgb(color), width=3)
+        draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
+
+
+def _legend_entries(dataset: Dataset) -> list[tuple[str, str, tuple[float, float] | None]]:
+    """Colour, words and dashes of what the map shows."""
     statuses = list(dict.fromkeys(dataset.table("obstacles")["status"].tolist()))
     dashed: tuple[float, float] = (5.0, 5.0)
     entries: list[tuple[str, str, tuple[float, float] | None]] = [(theme.OUTLINE, "field", None)]
@@ -294,11 +303,7 @@ def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) ->
         entries.append((theme.TURN, "turn", None))
     if unfit:
         entries.append((theme.UNFIT, f"turn that does not fit ({unfit})", None))
-    for index, (color, text, dash) in enumerate(entries):
-        x, y = left + 190 * (index // 3), top + 22 * (index % 3)
-        for a, b in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
-            draw.line([*a, *b], fill=theme.rgb(color), width=3)
-        draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
+    return entries
 
 
 def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) -> None:

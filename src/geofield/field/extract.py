@@ -90,24 +90,9 @@ def extract_field(
     FieldWarning
         When the outline should not be trusted unseen.
     """
-    if method not in FIELD:
-        raise SettingsError(
-            f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(FIELD)}."
-        )
-    if regions and method != "study":
-        raise SettingsError(
-            f"Numbered regions belong to method study, not {method}.", hint="Use method study."
-        )
-    if (include or exclude) and method != "auto":
-        raise SettingsError(
-            f"Further points belong to method auto, not {method}.", hint="Use method auto."
-        )
-    if holes not in (None, "fill", "keep"):
-        raise SettingsError(f"Unknown choice {holes!r} for holes.", hint="Use fill or keep.")
+    _check(method, regions, (*include, *exclude), holes, smooth)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
-    if smooth not in ("none", "diffusion"):
-        raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
     seed = scene.pixel_of(lat=lat, lon=lon)
     belong, apart = (
         tuple(scene.pixel_of(lat=y, lon=x) for x, y in places) for places in (include, exclude)
@@ -178,6 +163,28 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
         The point in the field, degrees, WGS 84.
     """
     return search_field(scene, *scene.pixel_of(lat=lat, lon=lon))
+
+
+def _check(
+    method: str, regions: Sequence[int], further: Places, holes: str | None, smooth: str
+) -> None:
+    """Refuse choices that do not exist or do not go together."""
+    if method not in FIELD:
+        raise SettingsError(
+            f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(FIELD)}."
+        )
+    if regions and method != "study":
+        raise SettingsError(
+            f"Numbered regions belong to method study, not {method}.", hint="Use method study."
+        )
+    if further and method != "auto":
+        raise SettingsError(
+            f"Further points belong to method auto, not {method}.", hint="Use method auto."
+        )
+    if holes not in (None, "fill", "keep"):
+        raise SettingsError(f"Unknown choice {holes!r} for holes.", hint="Use fill or keep.")
+    if smooth not in ("none", "diffusion"):
+        raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
 
 
 def _to_metric(outline_px: Polygon, scene: Scene) -> Polygon:

@@ -200,13 +200,8 @@ class Client:
                 last = GaveUpError(f"status {status}")
                 self._count(f"status {status}")
                 if asked is not None:
-                    if asked > _MAX_PAUSE_S:
-                        raise GaveUpError(f"status {status}, asks to wait {asked:.0f} s")
-                    with self._lock:  # the host as a whole asked for quiet
-                        until = time.monotonic() + asked
-                        self._not_before[host] = max(self._not_before.get(host, 0.0), until)
-                    pause = asked
-                self._pause(pause)
+                    self._keep_quiet(host, asked, status)
+                self._pause(pause if asked is None else asked)
                 continue
             if status != 200:
                 raise GaveUpError(f"status {status}{_meaning(status)}")
@@ -223,6 +218,14 @@ class Client:
             hint="Check the network and the address. What was fetched is kept in the cache: repeat "
             "to go on, or use --offline to work from the cache alone.",
         )
+
+    def _keep_quiet(self, host: str, asked_s: float, status: int) -> None:
+        """Ask a host for nothing, in any thread, for as long as it wants."""
+        if asked_s > _MAX_PAUSE_S:
+            raise GaveUpError(f"status {status}, asks to wait {asked_s:.0f} s")
+        with self._lock:
+            until = time.monotonic() + asked_s
+            self._not_before[host] = max(self._not_before.get(host, 0.0), until)
 
     def text(self, url: str) -> bytes:
         """A document (capabilities, STAC), with the same patience.

@@ -6,6 +6,8 @@ progress. A few rows are under way at a time, so memory does not grow with the b
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections import Counter, deque
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -115,41 +117,22 @@ class TileFetcher:
         pending: deque[tuple[int, list[tuple[Tile, Future[_Got]]]]] = deque()
         executor = ThreadPoolExecutor(self._threads, thread_name_prefix="tiles")
         ahead = max(2, -(-_AHEAD // block.columns) + 1)
-        done = 0
         width, height = block.level.tile_px
         strip = np.empty((height, width * block.columns, 3), np.uint8)
         submitted = 0
+        numbers = itertools.count(1)
+
+        def one_arrived() -> None:
+            if progress is not None:
+                progress(next(numbers), block.count, "tiles")
+
         try:
             while pending or submitted < block.rows:
                 while submitted < block.rows and len(pending) < ahead:
                     pending.append((submitted, self._submitted(executor, block, submitted)))
                     submitted += 1
                 row, futures = pending[0]
-                valid: NDArray[np.bool_] | None = None
-                keep: list[tuple[int, int, int, bytes]] = []
-                try:
-                    for i, (tile, future) in enumerate(futures):
-                        pixels, body, reason, is_hole = future.result()
-                        part = np.s_[:, i * width : (i + 1) * width]
-                        if body is not None:
-                            keep.append((tile.zoom, tile.column, tile.row, body))
-                            self.report.downloaded += 1
-                        if pixels is None:
-                            self._absent(reason, is_hole)
-                            strip[part] = 0
-                        else:
-                            strip[part] = pixels[0]
-                        if pixels is None or pixels[1] is not None:
-                            if valid is None:
-                                valid = np.ones(strip.shape[:2], bool)
-                            valid[part] = False if pixels is None else pixels[1]
-                        done += 1
-                        if progress is not None:
-                            progress(done, block.count, "tiles")
-                finally:
-                    # Also when this stops here: a restart then fetches only the rest.
-                    if self._cache is not None:
-                        self._cache.put(keep)
+                valid = self._filled(strip, futures, one_arrived)
                 pending.popleft()
                 yield row, strip, valid
         except BaseException:
@@ -163,6 +146,37 @@ class TileFetcher:
                 self.report.troubles = self._client.troubles
 
     # -- inside ----------------------------------------------------------------------------
+
+    def _filled(
+        self,
+        strip: NDArray[np.uint8],
+        futures: list[tuple[Tile, Future[_Got]]],
+        one_arrived: Callable[[], None],
+    ) -> NDArray[np.bool_] | None:
+        """Fill a strip with its row of tiles; where it has pixels, None when everywhere."""
+        valid: NDArray[np.bool_] | None = None
+        keep: list[tuple[int, int, int, bytes]] = []
+        width = strip.shape[1] // len(futures)
+        try:
+            for i, (tile, future) in enumerate(futures):
+                pixels, body, reason, is_hole = future.result()
+                part = np.s_[:, i * width : (i + 1) * width]
+                if body is not None:
+                    keep.append((tile.zoom, tile.column, tile.row, body))
+                    self.report.downloaded += 1
+                if pixels is None:
+                    self._absent(reason, is_hole)
+                strip[part] = 0 if pixels is None else pixels[0]
+                if pixels is None or pixels[1] is not None:
+                    if valid is None:
+                        valid = np.ones(strip.shape[:2], bool)
+                    valid[part] = False if pixels is None else pixels[1]
+                one_arrived()
+        finally:
+            # Also when this stops here: a restart then fetches only the rest.
+            if self._cache is not None:
+                self._cache.put(keep)
+        return valid
 
     def _submitted(
         self, executor: ThreadPoolExecutor, block: Block, row: int
@@ -186,20 +200,11 @@ class TileFetcher:
     def _get(self, tile: Tile, size_px: tuple[int, int], kept: CachedTile | None) -> _Got:
         """One tile, in a worker thread."""
         if kept is not None:
-            try:
-                pixels = decode_tile(kept.body, "", size_px)
-            except BrokenBodyError:
-                pass  # a tile damaged on disk is fetched anew
-            else:
-                return pixels, None, "", False
+            # A tile damaged on disk is fetched anew.
+            with contextlib.suppress(BrokenBodyError):
+                return decode_tile(kept.body, "", size_px), None, "", False
         if isinstance(self.source, LocalTiles):
-            body = self.source.read(tile)
-            if body is None:
-                return None, None, "not in the file", True
-            try:
-                return decode_tile(body, "", size_px), None, "", False
-            except BrokenBodyError as error:
-                return None, None, str(error), False
+            return _of_file(self.source.read(tile), size_px)
         if self._client is None:
             return None, None, "not in the cache (offline)", True
         request = self.source.request(tile)
@@ -246,6 +251,15 @@ class TileFetcher:
                     if body is not None:
                         keep.append((tile.zoom, tile.column, tile.row, body))
         self._cache.put(keep)
+
+
+def _of_file(body: bytes | None, size_px: tuple[int, int]) -> _Got:
+    if body is None:
+        return None, None, "not in the file", True
+    try:
+        return decode_tile(body, "", size_px), None, "", False
+    except BrokenBodyError as error:
+        return None, None, str(error), False
 
 
 def absence_error(name: str, report: FetchReport, *, offline: bool) -> ImageryError:

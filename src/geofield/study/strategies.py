@@ -8,7 +8,7 @@ keeps what a share of all the scan's settings agree on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -147,46 +147,23 @@ def run_strategy(
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STUDY_STRATEGIES)}."
         )
-    one = strategy in ("single", "t_range")
-    chosen: tuple[EdgeMethod, ...] = (
-        (("sobel",) if one else EDGE_METHODS) if methods is None else tuple(methods)
-    )
-    if not chosen or (one and len(chosen) != 1):
-        raise ObstacleError(f"Strategy {strategy!r} needs {'one' if one else 'an'} edge method.")
     plan: list[tuple[EdgeMethod, float | None]] = []
-    for method in chosen:
-        if method not in EDGE_METHODS:
-            raise ObstacleError(
-                f"Unknown edge method {method!r}.", hint=f"Choose from {', '.join(EDGE_METHODS)}."
-            )
+    for method in _edge_methods(strategy, methods):
         if strategy in ("single", "max_of_all"):
             plan.append((method, threshold if strategy == "single" else None))
         else:
             steps = thresholds({**DEFAULT_RANGES, **(ranges or {})}[method])
             plan.extend((method, float(t)) for t in steps)
 
-    scans: dict[str, EdgeScan] = {}
     counts: dict[str, list[tuple[float, int]]] = {}
     best: tuple[int, EdgeMethod, float, Circles] | None = None
     seen: list[Circles] = []
-    before: tuple[NDArray[np.bool_], Circles] | None = None
-    for done, (method, setting) in enumerate(plan):
-        if method not in scans:
-            scans[method] = EdgeScan.of(grey, method)
-        scan = scans[method]
-        at = scan.default_threshold if setting is None else setting
-        edges = scan.at(at)
-        # Neighbouring thresholds often give the very same map.
-        if before is not None and np.array_equal(before[0], edges):
-            circles = before[1]
-        else:
-            circles = how.find(edges, region)
-        before = (edges, circles)
+    for done, (method, at, circles) in enumerate(_scanned(grey, region, plan, how)):
         counts.setdefault(method, []).append((at, len(circles)))
         # Strictly more: of equal counts the smallest threshold, the first method, stays.
         if best is None or len(circles) > best[0]:
             best = (len(circles), method, at, circles)
-        if strategy == "consensus" and len(circles):
+        if len(circles):
             seen.append(circles)
         if progress is not None:
             progress(done + 1, len(plan), f"{method} {at:.3f}")
@@ -196,6 +173,44 @@ def run_strategy(
     if best is None:
         return StrategyResult(Circles(), None, None, counts)
     return StrategyResult(best[3], best[1], best[2], counts)
+
+
+def _edge_methods(
+    strategy: StudyStrategy, methods: Iterable[EdgeMethod] | None
+) -> tuple[EdgeMethod, ...]:
+    """The edge methods that a strategy runs with."""
+    one = strategy in ("single", "t_range")
+    default: tuple[EdgeMethod, ...] = ("sobel",) if one else EDGE_METHODS
+    chosen = default if methods is None else tuple(methods)
+    if not chosen or (one and len(chosen) != 1):
+        raise ObstacleError(f"Strategy {strategy!r} needs {'one' if one else 'an'} edge method.")
+    for method in chosen:
+        if method not in EDGE_METHODS:
+            raise ObstacleError(
+                f"Unknown edge method {method!r}.", hint=f"Choose from {', '.join(EDGE_METHODS)}."
+            )
+    return chosen
+
+
+def _scanned(
+    grey: NDArray[np.generic],
+    region: NDArray[np.bool_],
+    plan: Iterable[tuple[EdgeMethod, float | None]],
+    how: EdgeCircles,
+) -> Iterator[tuple[EdgeMethod, float, Circles]]:
+    """The circles of each method and threshold; without one, at the method's own."""
+    scans: dict[EdgeMethod, EdgeScan] = {}
+    edges: NDArray[np.bool_] | None = None
+    circles = Circles()
+    for method, threshold in plan:
+        if method not in scans:
+            scans[method] = EdgeScan.of(grey, method)
+        at = scans[method].default_threshold if threshold is None else threshold
+        before, edges = edges, scans[method].at(at)
+        # Neighbouring thresholds often give the very same map.
+        if before is None or not np.array_equal(before, edges):
+            circles = how.find(edges, region)
+        yield method, at, circles
 
 
 def thresholds(span: ThresholdRange) -> NDArray[np.float64]:

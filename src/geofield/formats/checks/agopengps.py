@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import ring_headings
@@ -57,18 +58,23 @@ def _check_boundary(path: Path) -> Iterator[Finding]:
         if len(rows) != count or count < 3 or vertices.shape[1] != 3:
             yield Finding("error", where, f"{len(rows)} vertices instead of {count}, or too few")
             return
-        ring = vertices[:, :2]
-        if np.allclose(ring[0], ring[-1]):
-            yield Finding("error", where, "it is closed: the first vertex must not be repeated")
-        wrong = np.abs((vertices[:, 2] - ring_headings(ring) + np.pi) % (2 * np.pi) - np.pi)
-        if (wrong > HEADING_TOLERANCE).any():
-            yield Finding(
-                "error", where, f"{int((wrong > HEADING_TOLERANCE).sum())} headings do not fit"
-            )
-        polygon = shapely.Polygon(ring)
-        if not polygon.is_valid:
-            yield Finding("error", where, "it crosses itself")
-        elif outer is None:
-            outer = polygon
-        elif not outer.intersects(polygon):
-            yield Finding("error", where, "an inner ring lies outside the field")
+        yield from _check_ring(vertices, outer, where)
+        outer = shapely.Polygon(vertices[:, :2]) if outer is None else outer
+
+
+def _check_ring(
+    vertices: NDArray[np.float64], outer: shapely.Polygon | None, where: str
+) -> Iterator[Finding]:
+    """One ring of easting, northing and heading; `outer` is the first one of its file."""
+    ring = vertices[:, :2]
+    if np.allclose(ring[0], ring[-1]):
+        yield Finding("error", where, "it is closed: the first vertex must not be repeated")
+    turned = np.abs((vertices[:, 2] - ring_headings(ring) + np.pi) % (2 * np.pi) - np.pi)
+    wrong = int((turned > HEADING_TOLERANCE).sum())
+    if wrong:
+        yield Finding("error", where, f"{wrong} headings do not fit")
+    polygon = shapely.Polygon(ring)
+    if not polygon.is_valid:
+        yield Finding("error", where, "it crosses itself")
+    elif outer is not None and outer.is_valid and not outer.intersects(polygon):
+        yield Finding("error", where, "an inner ring lies outside the field")

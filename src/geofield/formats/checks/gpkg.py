@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from geofield.formats.validation import Finding
 
@@ -45,19 +46,29 @@ def _check(connection: sqlite3.Connection, name: str) -> Iterator[Finding]:
         "SELECT c.table_name, c.data_type, g.column_name, g.srs_id, c.srs_id "
         "FROM gpkg_contents c LEFT JOIN gpkg_geometry_columns g USING (table_name)"
     ).fetchall()
+    yield from _check_layers(connection, layers, tables)
+
+
+def _check_layers(
+    connection: sqlite3.Connection, layers: list[tuple[Any, ...]], tables: set[str]
+) -> Iterator[Finding]:
     for table, kind, column, srs, contents_srs in layers:
         if table not in tables:
             yield Finding("error", table, "is in gpkg_contents, but there is no such table")
+        elif kind == "features" and column is None:
+            yield Finding("error", table, "has no entry in gpkg_geometry_columns")
         elif kind == "features":
-            if column is None:
-                yield Finding("error", table, "has no entry in gpkg_geometry_columns")
-                continue
             if srs != contents_srs:
                 yield Finding("error", table, "has two different srs_id")
             if f"rtree_{table}_{column}" not in tables:
                 yield Finding("warning", table, "has no spatial index: slow in large fields")
-            empty = connection.execute(
-                f'SELECT count(*) FROM "{table}" WHERE "{column}" IS NULL'  # noqa: S608
-            ).fetchone()[0]
-            if empty:
-                yield Finding("warning", table, f"{empty} rows have no geometry")
+            yield from _check_rows(connection, table, column)
+
+
+def _check_rows(connection: sqlite3.Connection, table: str, column: str) -> Iterator[Finding]:
+    table_sql, column_sql = (name.replace('"', '""') for name in (table, column))
+    (empty,) = connection.execute(
+        f'SELECT count(*) FROM "{table_sql}" WHERE "{column_sql}" IS NULL'  # noqa: S608
+    ).fetchone()
+    if empty:
+        yield Finding("warning", table, f"{empty} rows have no geometry")

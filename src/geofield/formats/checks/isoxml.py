@@ -131,21 +131,30 @@ def _check_field(field: ET.Element, version: str) -> Iterator[Finding]:
     if order != sorted(order):
         yield Finding("error", where, f"children are not in the order {', '.join(_ORDER_V4)}")
     for polygon in field.iter("PLN"):
-        outer = [line for line in polygon.findall("LSG") if line.get("A") == "1"]
-        if not outer:
-            yield Finding("error", f"PLN {polygon.get('B')}", "no exterior ring")
-        for line in polygon.findall("LSG"):
-            points = [(p.get("C"), p.get("D")) for p in line.findall("PNT")]
-            if len(points) < 4 or points[0] != points[-1]:
-                yield Finding("warning", f"PLN {polygon.get('B')}", "a ring is not closed")
+        yield from _check_polygon(polygon)
     for pattern in field.iter("GPN"):
-        lines = pattern.findall("LSG")
-        if len(lines) != 1:
-            yield Finding("error", f"GPN {pattern.get('B')}", f"{len(lines)} lines instead of one")
-            continue
-        kinds = [point.get("A") for point in lines[0].findall("PNT")]
-        if pattern.get("C") == "1" and kinds != ["6", "7"]:
-            yield Finding("error", f"GPN {pattern.get('B')}", "an AB line is a point 6, then a 7")
-        heading = pattern.get("G")
-        if heading is not None and not 0 <= float(heading) <= 360:
-            yield Finding("error", f"GPN {pattern.get('B')}", f"the heading is {heading}")
+        yield from _check_pattern(pattern)
+
+
+def _check_polygon(polygon: ET.Element) -> Iterator[Finding]:
+    where = f"PLN {polygon.get('B')}"
+    if not any(line.get("A") == "1" for line in polygon.findall("LSG")):
+        yield Finding("error", where, "no exterior ring")
+    for line in polygon.findall("LSG"):
+        points = [(p.get("C"), p.get("D")) for p in line.findall("PNT")]
+        if len(points) < 4 or points[0] != points[-1]:
+            yield Finding("warning", where, "a ring is not closed")
+
+
+def _check_pattern(pattern: ET.Element) -> Iterator[Finding]:
+    where = f"GPN {pattern.get('B')}"
+    lines = pattern.findall("LSG")
+    if len(lines) != 1:
+        yield Finding("error", where, f"{len(lines)} lines instead of one")
+        return
+    kinds = [point.get("A") for point in lines[0].findall("PNT")]
+    if pattern.get("C") == "1" and kinds != ["6", "7"]:
+        yield Finding("error", where, "an AB line is a point 6, then a 7")
+    heading = pattern.get("G")
+    if heading is not None and not 0 <= float(heading) <= 360:
+        yield Finding("error", where, f"the heading is {heading}")

@@ -170,33 +170,40 @@ def kind_of(what: str) -> tuple[str, str]:
         if what.lower().startswith(prefix) and not what.lower().startswith(prefix + "//"):
             return prefix[:-1], what[len(prefix) :]
     if urlsplit(what).scheme in ("http", "https"):
-        if "{" in what:
-            return "xyz", what
-        service = query_value(what, "service").lower()
-        path = urlsplit(what).path.lower()
-        if service in ("wms", "wmts"):
-            return service, what
-        if path.endswith("wmtscapabilities.xml") or "/wmts" in path:
-            return "wmts", what
-        if "wms" in path.rpartition("/")[2] or path.endswith("/wmsserver"):
-            return "wms", what
-        return "picture", what
+        return _kind_of_address(what), what
     if what.startswith(("/vsi", "s3://", "gs://")):
         return "picture", what
     if "{" in what and "}" in what:
         return "xyz", what
-    file = Path(what)
+    return _kind_of_file(Path(what)), what
+
+
+def _kind_of_address(address: str) -> str:
+    if "{" in address:
+        return "xyz"
+    service = query_value(address, "service").lower()
+    path = urlsplit(address).path.lower()
+    if service in ("wms", "wmts"):
+        return service
+    if path.endswith("wmtscapabilities.xml") or "/wmts" in path:
+        return "wmts"
+    if "wms" in path.rpartition("/")[2] or path.endswith("/wmsserver"):
+        return "wms"
+    return "picture"
+
+
+def _kind_of_file(file: Path) -> str:
     if not file.exists():
-        return "", what
+        return ""
     if file.suffix.lower() == ".mbtiles":
-        return "mbtiles-file", what
+        return "mbtiles-file"
     if file.suffix.lower() == ".xml":
         head = file.read_bytes()[:2000]
         if b"wmts" in head.lower():
-            return "wmts-file", what
+            return "wmts-file"
         if b"WMS_Capabilities" in head or b"WMT_MS_Capabilities" in head:
-            return "wms-file", what
-    return "picture-file", what
+            return "wms-file"
+    return "picture-file"
 
 
 def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
