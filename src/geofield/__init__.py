@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from geofield.errors import GeofieldError, GeofieldWarning
     from geofield.evaluation import evaluate
+    from geofield.farm import Farm, plan_fields, read_farm
     from geofield.field import extract_field, prepare_field
     from geofield.grid import Grid
     from geofield.imagery import read_scene, write_scene
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from geofield.tracks import plan_route, plan_tracks
 
 _HOME = {
+    "Farm": "farm",
     "Field": "model",
     "GeofieldError": "errors",
     "GeofieldWarning": "errors",
@@ -43,9 +45,11 @@ _HOME = {
     "extract_field": "field",
     "load_settings": "settings",
     "plan_field": "pipeline",
+    "plan_fields": "farm",
     "plan_route": "tracks",
     "plan_tracks": "tracks",
     "prepare_field": "field",
+    "read_farm": "farm",
     "read_plan": "plan",
     "read_scene": "imagery",
     "simulate_field": "simulate",
@@ -54,6 +58,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Farm",
     "Field",
     "GeofieldError",
     "GeofieldWarning",
@@ -68,9 +73,11 @@ __all__ = [
     "extract_field",
     "load_settings",
     "plan_field",
+    "plan_fields",
     "plan_route",
     "plan_tracks",
     "prepare_field",
+    "read_farm",
     "read_plan",
     "read_scene",
     "simulate_field",

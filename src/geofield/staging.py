@@ -60,7 +60,7 @@ def staged_folder(
         staging = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
     except OSError as error:
         _remove_made(made)
-        raise _cannot_write(target, error) from error
+        raise cannot_write(target, error) from error
     done = False
     try:
         with alive(staging):
@@ -71,7 +71,7 @@ def staged_folder(
                 with alone(target):
                     _publish(work, target, staging, overwrite, inputs, before)
             except OSError as error:
-                raise _cannot_write(target, error) from error
+                raise cannot_write(target, error) from error
             done = True
     finally:
         shutil.rmtree(staging, ignore_errors=True)
@@ -132,7 +132,7 @@ def _make_folder(target: Path) -> list[Path]:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         _remove_made(made)
-        raise _cannot_write(target, error) from error
+        raise cannot_write(target, error) from error
     return made
 
 
@@ -246,7 +246,8 @@ def refuse_locked(place: Path) -> None:
         return  # damaged: nothing in it to protect from being replaced
 
 
-def _cannot_write(target: Path, error: OSError) -> FormatError:
+def cannot_write(target: Path, error: OSError) -> FormatError:
+    """The error in words that a person can do something with."""
     place = error.filename or target
     if error.errno == errno.ENOSPC:
         return FormatError(f"The disk is full: {place}.", hint="Free some space, then repeat.")

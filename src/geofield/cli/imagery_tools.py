@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import urllib.request
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -155,42 +154,25 @@ def as_picture(
     progress: Progress | None = None,
 ) -> Iterator[str]:
     """A path that `read_scene` reads: the user's own picture, or one fetched for the moment."""
-    from geofield.imagery import Where, acquire, read_scene, with_provenance, write_scene
-    from geofield.imagery.sources import PictureSource
+    from geofield.imagery import is_own_picture, picture_at
     from geofield.imagery.terms import check_terms
 
-    if "{" not in what and Path(what).exists() and Path(what).suffix.lower() != ".mbtiles":
+    if is_own_picture(what):
         yield what
         return
     options = fetch_options(settings, cache_dir_of(settings))
     source = resolve(what, settings, point=(lon, lat), options=options)
-    if isinstance(source, PictureSource):
-        check_terms(source.name, source.terms, acknowledged=acknowledged)
-        if settings.imagery.bands or source.terms.attribution + source.terms.licence == "":
-            yield source.path
-            return
-        # What the settings say of its terms must travel with it: as a file that says so.
-        scene = read_scene(
-            source.path,
-            lat=lat,
-            lon=lon,
-            size_m=settings.imagery.size_m,
-            allow=settings.fetch.allow,
-        )
-        with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
-            yield str(write_scene(with_provenance(scene, source), Path(folder) / "scene.tif"))
-        return
-    size_m = settings.imagery.size_m
-    where = Where(lat=lat, lon=lon, size_m=size_m, size_px=None if size_m else 1024)
-    with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
-        done = acquire(
-            source,
-            where,
-            Path(folder) / "scene.tif",
-            options=replace(options, acknowledged=acknowledged),
-            progress=progress,
-        )
-        yield str(done.path)
+    check_terms(source.name, source.terms, acknowledged=acknowledged)
+    with picture_at(
+        source,
+        lat=lat,
+        lon=lon,
+        size_m=settings.imagery.size_m,
+        bands=settings.imagery.bands,
+        options=replace(options, acknowledged=acknowledged),
+        progress=progress,
+    ) as path:
+        yield path
 
 
 def describe(done: Acquired) -> None:

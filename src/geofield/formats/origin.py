@@ -25,8 +25,16 @@ UNDATED = "1980-01-01"
 
 def to_json(dataset: Dataset) -> str:
     """Name, CRS, grid and provenance of a dataset; the same text for the same dataset."""
+    try:
+        return json.dumps(content_of(dataset), ensure_ascii=False, indent=1)
+    except (TypeError, ValueError) as error:
+        raise FormatError(f"The provenance is not plain JSON: {error}.") from error
+
+
+def content_of(dataset: Dataset) -> dict[str, Any]:
+    """What the JSON says, as plain values."""
     grid = dataset.grid
-    content = {
+    return {
         "version": VERSION,
         "name": dataset.name,
         "crs": dataset.crs.to_wkt(),
@@ -44,10 +52,6 @@ def to_json(dataset: Dataset) -> str:
         "settings": _plain(dataset.provenance.settings),
         "evidence": _plain(dataset.provenance.evidence),
     }
-    try:
-        return json.dumps(content, ensure_ascii=False, indent=1)
-    except (TypeError, ValueError) as error:
-        raise FormatError(f"The provenance is not plain JSON: {error}.") from error
 
 
 def _plain(value: Any) -> Any:
@@ -78,7 +82,14 @@ def from_json(text: str) -> Origin:
         When it is damaged or of a later version.
     """
     try:
-        content = json.loads(text)
+        return from_content(json.loads(text))
+    except ValueError as error:
+        raise FormatError(f"The record of the file's origin is damaged: {error!r}.") from error
+
+
+def from_content(content: Mapping[str, Any]) -> Origin:
+    """The same from what the JSON says."""
+    try:
         if content["version"] > VERSION:
             raise FormatError(
                 "The file was written by a later version of geofield.", hint="Update geofield."

@@ -1,6 +1,7 @@
 """Stage 1: from a GPS point to a georeferenced picture."""
 
 from geofield.imagery.acquire import Acquired, FetchOptions, Where, acquire, with_provenance
+from geofield.imagery.at_place import is_own_picture, picture_at
 from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.scene import read_scene
@@ -14,7 +15,9 @@ __all__ = [
     "Where",
     "acquire",
     "find_source",
+    "is_own_picture",
     "open_reader",
+    "picture_at",
     "read_scene",
     "with_provenance",
     "write_scene",

@@ -1,0 +1,8 @@
+"""The farm: many fields in one place, planned here or on a cluster."""
+
+from geofield.farm.place_reader import read_places
+from geofield.farm.places import Place, Places
+from geofield.farm.stream import plan_fields
+from geofield.farm.value import Farm, read_farm
+
+__all__ = ["Farm", "Place", "Places", "plan_fields", "read_farm", "read_places"]

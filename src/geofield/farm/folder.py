@@ -1,0 +1,203 @@
+"""A farm's folder: ``<layer>/chunk=0007/part-0.parquet``, and which chunks count.
+
+    FARM/farm.json                         what was asked, and how the places are cut into chunks
+    FARM/<layer>/chunk=0007/part-0.parquet GeoParquet 1.1: boxes of the rows, zstd
+    FARM/plan/chunk=0007/part-0.parquet    what is no layer: settings, source, evidence
+    FARM/status/chunk=0007/part-0.parquet  one row per place; written last, it makes the chunk count
+    FARM/reviewed/ID.gpkg                  plans that a person put back
+
+The same places and settings give the same bytes in every layer but `status`, which tells
+seconds and workers.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from geofield import __version__, schema
+from geofield.crs import LONLAT
+from geofield.errors import FormatError
+from geofield.farm.layers import EXACT, GEOMETRY, LAYERS, PLAN, Tables
+from geofield.farm.store import Store
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+VERSION = 1
+RECORD = "farm.json"
+STATUS = "status"
+REVIEWED = "reviewed"
+#: What may become of a place.
+STATUSES = ("done", "doubtful", "failed", "lost")
+_SIDES = ("xmin", "ymin", "xmax", "ymax")
+_CHUNK = re.compile(r"chunk=(\d+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What `farm.json` says.
+
+    Attributes
+    ----------
+    digest : str
+        Of all that decides the result: settings, places, imagery, software.
+    settings : mapping
+        Plain JSON values.
+    places : mapping
+        File, number and digest of the places.
+    imagery : mapping
+        What the pictures are, with their terms; empty without imagery.
+    chunk_fields : int
+        Places per chunk.
+    chunks : int
+    """
+
+    digest: str = ""
+    settings: Mapping[str, Any] | None = None
+    places: Mapping[str, Any] | None = None
+    imagery: Mapping[str, Any] | None = None
+    chunk_fields: int = 250
+    chunks: int = 0
+
+    def to_json(self) -> bytes:
+        """As the file's bytes."""
+        content = {
+            "version": VERSION,
+            "software": f"geofield {__version__}",
+            "digest": self.digest,
+            "chunks": self.chunks,
+            "chunk_fields": self.chunk_fields,
+            "places": self.places or {},
+            "imagery": self.imagery or {},
+            "settings": self.settings or {},
+        }
+        return (json.dumps(content, ensure_ascii=False, indent=2) + "\n").encode()
+
+    @classmethod
+    def read(cls, store: Store) -> Record | None:
+        """The record of a farm; None where there is no farm."""
+        data = store.get(RECORD)
+        if data is None:
+            return None
+        try:
+            content = json.loads(data)
+            if content["version"] > VERSION:
+                raise FormatError(
+                    f"{store.place} was written by a later version of geofield.",
+                    hint="Update geofield.",
+                )
+            return cls(
+                str(content["digest"]),
+                content["settings"],
+                content["places"],
+                content["imagery"],
+                int(content["chunk_fields"]),
+                int(content["chunks"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise FormatError(f"{store.place}/{RECORD} is damaged: {error!r}.") from None
+
+
+def file_of(layer: str, chunk: int) -> str:
+    """The file of a layer's chunk."""
+    return f"{layer}/chunk={chunk:04d}/part-0.parquet"
+
+
+def committed(store: Store) -> list[int]:
+    """The chunks that count, in order: those with a status."""
+    found = (_CHUNK.fullmatch(name) for name in store.names(STATUS))
+    numbers = [int(match[1]) for match in found if match]
+    if store.folder is None:
+        return sorted(numbers)
+    # A folder may be there before its file.
+    return sorted(n for n in numbers if (store.folder / file_of(STATUS, n)).is_file())
+
+
+def write_chunk(store: Store, chunk: int, tables: Tables, status: pa.Table) -> None:
+    """Write the layers of a chunk, and last its status, which makes it count."""
+    for layer in (*(each.name for each in LAYERS), PLAN):
+        if layer in tables:
+            store.put(file_of(layer, chunk), parquet_bytes(layer, tables[layer]))
+    store.put(file_of(STATUS, chunk), parquet_bytes(STATUS, status))
+
+
+def parquet_bytes(layer: str, table: pa.Table) -> memoryview:
+    """A table as a Parquet file; GeoParquet 1.1 with boxes where it has shapes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if GEOMETRY in table.column_names:
+        geometry = table[GEOMETRY].combine_chunks()
+        shapes = shapely.from_wkb(geometry.to_numpy(zero_copy_only=False))
+        bounds = shapely.bounds(shapes).reshape(-1, 4)
+        # Single precision, rounded outwards: half the bytes, and no row is missed.
+        outward = np.array([-np.inf, -np.inf, np.inf, np.inf], dtype=np.float32)
+        boxes = bounds.astype(np.float32)
+        inside = np.where(outward < 0, boxes > bounds, boxes < bounds)
+        boxes = np.where(inside, np.nextafter(boxes, outward), boxes)
+        box = pa.StructArray.from_arrays(
+            [pa.array(boxes[:, side], from_pandas=True) for side in range(4)], names=list(_SIDES)
+        )
+        table = table.append_column("bbox", box)
+        table = table.replace_schema_metadata({"geo": json.dumps(_geo(layer, bounds))})
+    sink = io.BytesIO()
+    # Exact shapes are all different: looking for repetition in them is time for nothing.
+    plain = [EXACT, GEOMETRY, *(f"bbox.{side}" for side in _SIDES)]
+    names = [name for name in table.column_names if name not in {*plain, "bbox"}]
+    pq.write_table(table, sink, compression="zstd", use_dictionary=names)
+    return sink.getbuffer()
+
+
+def _geo(layer: str, bounds: Any) -> dict[str, Any]:
+    kind = "Point" if layer == STATUS else schema.layer(layer).geometry
+    # At the 180th meridian shapes are cut into parts.
+    kinds = [kind] if kind.startswith("Multi") or kind == "Point" else [kind, f"Multi{kind}"]
+    column: dict[str, Any] = {
+        "encoding": "WKB",
+        "crs": LONLAT.to_json_dict(),
+        "geometry_types": kinds,
+        "orientation": "counterclockwise",
+        "covering": {"bbox": {side: ["bbox", side] for side in _SIDES}},
+    }
+    known = bounds[np.isfinite(bounds).all(axis=1)]
+    if len(known):
+        column["bbox"] = [*known[:, :2].min(axis=0).tolist(), *known[:, 2:].max(axis=0).tolist()]
+    return {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+
+
+def read_layer(
+    store: Store, layer: str, chunks: Sequence[int], columns: Sequence[str] | None = None
+) -> pa.Table | None:
+    """A layer of some chunks, in order; None where none of them has it."""
+    import pyarrow as pa
+
+    parts = [part for chunk in chunks if (part := read_part(store, layer, chunk, columns))]
+    return pa.concat_tables(parts, promote_options="permissive") if parts else None
+
+
+def read_part(
+    store: Store, layer: str, chunk: int, columns: Sequence[str] | None = None
+) -> pa.Table | None:
+    """A layer of one chunk, without its boxes; None where the chunk has no such layer."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    data = store.get(file_of(layer, chunk))
+    if data is None:
+        return None
+    try:
+        table = pq.read_table(pa.BufferReader(data), columns=columns)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(
+            f"{store.place}/{file_of(layer, chunk)} is damaged: {error}.",
+            hint="Remove that chunk's file in status/, and run geofield batch again.",
+        ) from None
+    return table.drop_columns("bbox") if "bbox" in table.column_names else table

@@ -1,0 +1,288 @@
+"""Plans as tables of many fields, and back: one Arrow table per layer.
+
+Every row carries `field_id` and `utm_epsg`. `geometry` is WGS 84, for every reader and any
+number of zones; `geometry_utm` is the same shape in the metric CRS of its field, to the last
+bit, so that a plan comes back as it was. What is no table (settings, source, evidence, grid)
+stands in the layer `plan`, one row per field.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, transformer
+from geofield.errors import FormatError
+from geofield.formats import origin
+from geofield.formats.antimeridian import split
+from geofield.formats.arrow import arrow_type, arrow_values
+from geofield.model import Dataset
+from geofield.plan import Plan
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    import pyarrow as pa
+
+FIELD_ID = "field_id"
+EPSG = "utm_epsg"
+GEOMETRY = "geometry"
+EXACT = "geometry_utm"
+#: One row per field: what is no layer of its own.
+PLAN = "plan"
+#: Written for every chunk, with rows or not: readers of a folder then always find them.
+ALWAYS = ("field", "obstacles", "tracks", "segments", "gaps", PLAN)
+#: The layers of a farm, in the schema's order; track points follow from the segments.
+LAYERS = tuple(each for each in schema.LAYERS if each.name != schema.TRACK_POINTS.name)
+
+Tables = dict[str, "pa.Table"]
+
+
+def tables_of(plans: Iterable[Plan], own: pa.Schema | None = None) -> Tables:
+    """The tables of some plans.
+
+    Parameters
+    ----------
+    plans : iterable of Plan
+        Each with a `field_id` of its own.
+    own : pa.Schema, optional
+        Names and types of the user's own columns of the field; found out when not given.
+
+    Returns
+    -------
+    dict of str to pa.Table
+        By layer name, with `plan`; optional layers only where they have rows.
+    """
+    sets = [plan.to_dataset() for plan in plans]
+    ids = [str(one.tables[schema.FIELD.name][FIELD_ID].iloc[0]) for one in sets]
+    tables: Tables = {}
+    for layer in LAYERS:
+        parts = [
+            (at, one.tables[layer.name])
+            for at, one in enumerate(sets)
+            if layer.name in one.tables and len(one.tables[layer.name])
+        ]
+        if parts or layer.name in ALWAYS:
+            given = own if layer.name == schema.FIELD.name else None
+            tables[layer.name] = _layer(layer, parts, sets, ids, given)
+    tables[PLAN] = _records(sets, ids)
+    return tables
+
+
+def _layer(
+    of: schema.Layer,
+    parts: Sequence[tuple[int, gpd.GeoDataFrame]],
+    sets: Sequence[Dataset],
+    ids: Sequence[str],
+    own: pa.Schema | None,
+) -> pa.Table:
+    import pandas as pd
+    import pyarrow as pa
+
+    counts = [len(frame) for _, frame in parts]
+    mine = [ids[at] for at, _ in parts]
+    zones = [epsg_of(sets[at].crs) for at, _ in parts]
+    columns: dict[str, Any] = {
+        FIELD_ID: pa.array(np.repeat(np.array(mine, dtype=object), counts), pa.string()),
+        EPSG: pa.array(np.repeat(np.array(zones, dtype=object), counts), pa.int32()),
+    }
+    for column in of.columns:
+        if column.name == FIELD_ID:
+            continue
+        if not parts:
+            columns[column.name] = pa.array([], arrow_type(column))
+            continue
+        series = [frame[column.name] for _, frame in parts]
+        if column.type == "float":
+            series = [pd.Series(np.concatenate([each.to_numpy() for each in series]))]
+        elif column.type != "int":
+            values = np.concatenate([each.to_numpy(dtype=object) for each in series])
+            series = [pd.Series(values, dtype=object)]
+        whole = series[0] if len(series) == 1 else pd.concat(series, ignore_index=True)
+        columns[column.name] = arrow_values(column, whole)
+    columns |= _own(of, [frame for _, frame in parts], own)
+    shapes = [np.asarray(frame.geometry.array, dtype=object) for _, frame in parts]
+    lonlat = [np.empty(0, dtype=object)]
+    for zone, group in _grouped([sets[at].crs for at, _ in parts], shapes):
+        lonlat.append(_lonlat(np.concatenate(group), zone))
+    exact = np.concatenate([np.empty(0, dtype=object), *shapes])
+    columns[GEOMETRY] = pa.array(shapely.to_wkb(np.concatenate(lonlat), flavor="iso"), pa.binary())
+    columns[EXACT] = pa.array(shapely.to_wkb(exact, flavor="iso"), pa.binary())
+    return pa.table(columns)
+
+
+def _own(
+    of: schema.Layer, frames: Sequence[gpd.GeoDataFrame], own: pa.Schema | None
+) -> dict[str, Any]:
+    """The user's own columns, by name; of given types where they are known before."""
+    import pyarrow as pa
+
+    names = list(own.names) if own is not None else []
+    names += [
+        name
+        for frame in frames
+        for name in schema.own_columns(of, frame)
+        if name not in (EPSG, EXACT, FIELD_ID)
+    ]
+    columns = {}
+    for name in dict.fromkeys(names):
+        values: list[Any] = []
+        for frame in frames:
+            values += _plain(frame[name]) if name in frame.columns else [None] * len(frame)
+        kind = None if own is None or name not in own.names else own.field(name).type
+        try:
+            found = pa.array(values, kind, from_pandas=True)
+        except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):
+            # One says 7 and another "7 a": text holds both.
+            texts = [None if each is None else str(each) for each in values]
+            found = pa.array(texts, pa.string())
+        columns[name] = found.cast(pa.string()) if pa.types.is_null(found.type) else found
+    return columns
+
+
+def _plain(series: Any) -> list[Any]:
+    import pandas as pd
+
+    return [None if pd.isna(value) else value for value in series.tolist()]
+
+
+def _grouped(zones: Sequence[CRS], shapes: Sequence[Any]) -> list[tuple[CRS, list[Any]]]:
+    """Runs of neighbours in one CRS, so that each is transformed by one call."""
+    groups: list[tuple[CRS, list[Any]]] = []
+    for zone, part in zip(zones, shapes, strict=True):
+        if groups and (groups[-1][0] is zone or groups[-1][0] == zone):
+            groups[-1][1].append(part)
+        else:
+            groups.append((zone, [part]))
+    return groups
+
+
+def _lonlat(shapes: Any, crs: CRS) -> Any:
+    """Shapes in WGS 84, rings counter-clockwise, cut at the 180th meridian."""
+    project = transformer(crs, LONLAT)
+    moved = shapely.transform(
+        shapes, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
+    )
+    west, _, east, _ = shapely.total_bounds(moved)
+    if east - west > 180.0:
+        moved = split(moved)
+    return shapely.orient_polygons(moved)
+
+
+def _records(sets: Sequence[Dataset], ids: Sequence[str]) -> pa.Table:
+    """What is no layer, as text; the same texts for many fields take no room."""
+    import pyarrow as pa
+
+    rows = [_record(one) for one in sets]
+    names = ("name", "crs", "tables", "software", "settings", "source", "evidence", "grid")
+    columns: dict[str, Any] = {
+        FIELD_ID: pa.array(list(ids), pa.string()),
+        EPSG: pa.array([epsg_of(one.crs) for one in sets], pa.int32()),
+    }
+    for name in names:
+        columns[name] = pa.array([row[name] for row in rows], pa.string())
+    return pa.table(columns)
+
+
+def _record(one: Dataset) -> dict[str, str]:
+    content = origin.content_of(one)
+    tables = {
+        name: schema.own_columns(schema.layer(name), table) for name, table in one.tables.items()
+    }
+    texts = {"settings", "source", "evidence", "grid"}
+    return {
+        "name": one.name,
+        "crs": content["crs"],
+        "tables": _json(tables),
+        "software": content["software"],
+        **{name: _json(content[name]) for name in texts},
+    }
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+
+
+@lru_cache(maxsize=256)
+def _epsg(wkt: str) -> int | None:
+    return CRS(wkt).to_epsg(min_confidence=100)
+
+
+def epsg_of(crs: CRS) -> int | None:
+    """The EPSG code of a metric CRS; None where it has none."""
+    return _epsg(crs.srs)
+
+
+@lru_cache(maxsize=64)
+def _crs(wkt: str) -> CRS:
+    return CRS.from_wkt(wkt)
+
+
+def plan_of(tables: Mapping[str, pa.Table]) -> Plan:
+    """The plan of one field.
+
+    Parameters
+    ----------
+    tables : mapping
+        The rows of that field, by layer name, with `plan`.
+    """
+    if PLAN not in tables or tables[PLAN].num_rows != 1:
+        raise FormatError("The farm's record of this field is missing or double.")
+    record = tables[PLAN].to_pylist()[0]
+    crs = _crs(record["crs"])
+    parsed = {name: json.loads(record[name]) for name in ("settings", "source", "evidence", "grid")}
+    parsed |= {"version": origin.VERSION, "name": record["name"], "software": record["software"]}
+    back = origin.from_content({**parsed, "crs": record["crs"]})
+    frames = {
+        name: _frame(schema.layer(name), tables.get(name), own, crs)
+        for name, own in json.loads(record["tables"]).items()
+    }
+    return Plan.from_dataset(Dataset(frames, crs, record["name"], back.provenance, back.grid))
+
+
+def _frame(
+    of: schema.Layer, table: pa.Table | None, own: Sequence[str], crs: CRS
+) -> gpd.GeoDataFrame:
+    """A layer of one field as it was before :func:`tables_of`."""
+    import geopandas as gpd
+
+    if table is None or not table.num_rows:
+        return schema.empty(of, crs)
+    names = [name for name in (*of.column_names, *own) if name in table.column_names]
+    shapes = shapely.from_wkb(table[EXACT].to_numpy(zero_copy_only=False))
+    frame = gpd.GeoDataFrame(table.select(names).to_pandas(), geometry=shapes, crs=crs)
+    return schema.conform(of, frame, extras=True)
+
+
+def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
+    """A layer of many fields as people use it.
+
+    In the metric CRS where all its fields share one, else in WGS 84; lengths and areas are true
+    metres and hectares in their columns either way.
+    """
+    import geopandas as gpd
+    import pyarrow.compute as pc
+
+    zones = pc.unique(table[EPSG].combine_chunks() if table.num_rows else table[EPSG])
+    shared = len(zones) == 1 and zones[0].is_valid
+    column, crs = (EXACT, CRS.from_epsg(zones[0].as_py())) if shared else (GEOMETRY, LONLAT)
+    shapes = shapely.from_wkb(table[column].to_numpy(zero_copy_only=False))
+    rest = table.drop_columns(
+        [each for each in (GEOMETRY, EXACT, "bbox") if each in table.column_names]
+    )
+    return gpd.GeoDataFrame(_nullable(rest), geometry=shapes, crs=crs)
+
+
+def _nullable(table: pa.Table) -> Any:
+    """As pandas, whole numbers whole beside missing ones."""
+    import pandas as pd
+    import pyarrow as pa
+
+    kinds = {pa.int64(): pd.Int64Dtype(), pa.bool_(): pd.BooleanDtype()}
+    return table.to_pandas(types_mapper=kinds.get)

@@ -1,0 +1,176 @@
+"""Reading files of places into Arrow: CSV, Parquet, and whatever GDAL reads."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shapely
+
+from geofield.errors import FormatError
+from geofield.strangers import check_vector
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_CSV = (".csv", ".tsv", ".txt")
+_ROWS = "Give one row per field."
+_GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
+
+
+@dataclass(frozen=True, slots=True)
+class RawPlaces:
+    """A file of places as it is.
+
+    Attributes
+    ----------
+    name : str
+        For people.
+    table : pa.Table
+        All columns but the geometry.
+    geometry : pa.Array or None
+        Well-known binary.
+    geometry_name : str
+    crs : Any
+        Of the geometry, as the file says; None where it does not.
+    notes : tuple of str
+    """
+
+    name: str
+    table: pa.Table
+    geometry: pa.Array | None = None
+    geometry_name: str = ""
+    crs: Any = None
+    notes: tuple[str, ...] = ()
+
+
+def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawPlaces:
+    """A file of places.
+
+    Parameters
+    ----------
+    path : Path
+    layer : str, optional
+    texts : sequence of str
+        Columns that are text whatever they look like: 007 is no 7.
+
+    Raises
+    ------
+    FormatError
+        When the file is missing, damaged, or has several layers of which none was named.
+    """
+    if not path.exists():
+        raise FormatError(
+            f"There is no file {path}.", hint="PLACES is a file with a row per field."
+        )
+    if path.suffix.lower() in _CSV:
+        return _csv(path, {text.lower() for text in texts if text})
+    if path.suffix.lower() in (".parquet", ".geoparquet", ".pq"):
+        return _parquet(path)
+    return _vector(path, layer)
+
+
+def _csv(path: Path, texts: set[str]) -> RawPlaces:
+    import pyarrow as pa
+    import pyarrow.csv as pc
+
+    try:
+        with path.open("rb") as file:
+            head = file.read(1 << 16)
+        first = head.decode("utf-8-sig", errors="replace").partition("\n")[0].strip("\r")
+        if not first:
+            raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS)
+        mark = max(";\t,", key=first.count)
+        names = [name.strip().strip('"') for name in first.split(mark)]
+        # 35,0754;33,5311 is how spreadsheets write it in half of Europe.
+        comma = mark == ";" and re.search(rb"[;\n]-?\d+,\d+", head) is not None
+        table = pc.read_csv(
+            path,
+            read_options=pc.ReadOptions(column_names=names, skip_rows=1),
+            parse_options=pc.ParseOptions(delimiter=mark, newlines_in_values=True),
+            convert_options=pc.ConvertOptions(
+                column_types={name: pa.string() for name in names if name.lower() in texts},
+                strings_can_be_null=True,
+                quoted_strings_can_be_null=True,
+                decimal_point="," if comma else ".",
+            ),
+        )
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read: {error}.") from None
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        if "Empty CSV" in str(error):
+            raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS) from None
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Save it as UTF-8.") from None
+    if len(set(names)) < len(names):
+        raise FormatError(f"{path} has two columns of the same name.")
+    column = next((name for name in names if name.lower() in _GEOMETRY), None)
+    if column is None:
+        return RawPlaces(path.name, table)
+    wkt = table[column].to_numpy()
+    shapes = shapely.from_wkt(wkt, on_invalid="ignore")
+    geometry = pa.array(shapely.to_wkb(shapes), pa.binary(), from_pandas=True)
+    return RawPlaces(path.name, table.drop_columns(column), geometry, column, "EPSG:4326")
+
+
+def _parquet(path: Path) -> RawPlaces:
+    import json
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from None
+    geo = json.loads((table.schema.metadata or {}).get(b"geo", b"{}"))
+    table = table.replace_schema_metadata(None)
+    name = geo.get("primary_column")
+    if name not in table.column_names:
+        return RawPlaces(path.name, table)
+    column = geo["columns"][name]
+    if column.get("encoding") != "WKB":
+        raise FormatError(
+            f"{path}: geometry in the encoding {column.get('encoding')} is not read.",
+            hint='Write it as WKB: gdf.to_parquet(path, geometry_encoding="WKB").',
+        )
+    crs = column.get("crs", "OGC:CRS84")
+    geometry = table[name].combine_chunks()
+    boxes = column.get("covering", {}).get("bbox", {}).get("xmin", [None])[0]
+    rest = table.drop_columns([each for each in {name, boxes} if each in table.column_names])
+    if isinstance(crs, dict):
+        crs = json.dumps(crs)
+    return RawPlaces(path.name, rest, geometry, name, crs)
+
+
+def _vector(path: Path, layer: str | None) -> RawPlaces:
+    import pyarrow as pa
+    import pyogrio
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+
+    check_vector(path)
+    try:
+        layers = [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        if layer is None and "field" in layers:
+            layer = "field"
+        if layer is None and len(layers) > 1:
+            raise FormatError(
+                f"{path} has {len(layers)} layers: {', '.join(layers[:8])}.",
+                hint="Say which one holds the places: --layer NAME.",
+            )
+        meta, table = pyogrio.read_arrow(path, layer=layer)
+    except (DataSourceError, DataLayerError, FeatureError) as error:
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from None
+    except (UnicodeDecodeError, pa.ArrowInvalid) as error:
+        raise FormatError(
+            f"{path}: its text is not in the encoding it claims ({error}).",
+            hint="Save it as UTF-8 (a Shapefile with a .cpg file beside it).",
+        ) from None
+    name = meta["geometry_name"] or "wkb_geometry"
+    table = table.replace_schema_metadata(None)
+    if name not in table.column_names:
+        return RawPlaces(path.name, table)
+    geometry = table[name].combine_chunks()
+    return RawPlaces(path.name, table.drop_columns(name), geometry, name, meta["crs"])

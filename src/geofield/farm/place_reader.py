@@ -1,0 +1,305 @@
+"""Reading places: positions, outlines, ids and names of whatever file a person has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from geofield import schema
+from geofield.crs import LONLAT, parse_crs, transformer
+from geofield.errors import CRSError, FormatError
+from geofield.farm.place_files import RawPlaces, read_raw
+from geofield.farm.place_settings import check_settings, setting_names
+from geofield.farm.places import Places
+from geofield.formats.foreign_tables import _ID, _NAME
+from geofield.settings import Settings
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_LAT = ("lat", "latitude")
+_LON = ("lon", "lng", "long", "longitude")
+_BATCH = 50_000
+
+
+def read_places(
+    path: str | Path,
+    *,
+    settings: Settings | None = None,
+    layer: str | None = None,
+    crs: str | None = None,
+    id_column: str | None = None,
+    name_column: str | None = None,
+    lat_column: str | None = None,
+    lon_column: str | None = None,
+) -> Places:
+    """Read places: points (columns lat and lon, or geometry) or parcels.
+
+    Parameters
+    ----------
+    path : path
+        CSV, Parquet, or any vector file that GDAL reads.
+    settings : Settings, optional
+        What columns named like settings are judged with.
+    layer : str, optional
+        Of a file with several.
+    crs : str, optional
+        Of coordinates that do not say theirs.
+    id_column, name_column, lat_column, lon_column : str, optional
+        Usual names are found when not given.
+
+    Raises
+    ------
+    FormatError
+        When there is no such column, an id comes twice, there are no places, positions are no
+        positions, or a column that is named like a setting holds something else.
+    CRSError
+        When the file does not say its CRS.
+    """
+    raw = read_raw(Path(path), layer=layer, texts=(*_ID, *_NAME, id_column, name_column))
+    if not raw.table.num_rows:
+        raise FormatError(f"{path} is empty: it holds no places.", hint="Give one row per field.")
+    find = _Columns(raw)
+    id_name, name_name = find(id_column, _ID), find(name_column, _NAME)
+    lat_name, lon_name = find(lat_column, _LAT), find(lon_column, _LON)
+    notes: list[str] = list(raw.notes)
+    kept = np.arange(raw.table.num_rows)
+    outlines, part = None, np.zeros(raw.table.num_rows, dtype=np.int64)
+    source = LONLAT
+    if raw.geometry is not None:
+        source = _crs_of(raw, crs)
+        kept, part, outlines, lat, lon = _shapes(raw, raw.geometry, source, notes)
+        used = {id_name, name_name, raw.geometry_name}
+    elif lat_name and lon_name:
+        lat, lon = (_numbers(raw, name) for name in (lat_name, lon_name))
+        used = {id_name, name_name, lat_name, lon_name}
+    else:
+        raise FormatError(
+            f"{raw.name} has no columns lat and lon and no geometry.",
+            hint=f"It has {', '.join(raw.table.column_names)}; name them with --lat-column and "
+            "--lon-column.",
+        )
+    _check_positions(raw, lat, lon)
+    rest = [name for name in raw.table.column_names if name not in used]
+    per_place = [name for name in rest if name in setting_names()]
+    own = raw.table.select([name for name in rest if name not in per_place]).take(kept)
+    said = raw.table.select(per_place).take(kept)
+    check_settings(raw.name, said, settings)
+    ids, names = _names(raw, id_name, name_name, kept, part, lat, lon)
+    return Places(
+        str(path), ids, names, lat, lon, kept + 1, outlines, source,
+        own.rename_columns([_unlike_ours(name) for name in own.column_names]),
+        said, tuple(notes),
+    )  # fmt: skip
+
+
+class _Columns:
+    """Finds columns: the one that was named, or one with a usual name."""
+
+    def __init__(self, raw: RawPlaces) -> None:
+        self._raw = raw
+        self._by_name = {name.lower(): name for name in reversed(raw.table.column_names)}
+
+    def __call__(self, asked: str | None, usual: Sequence[str]) -> str | None:
+        if asked is None:
+            return next((self._by_name[name] for name in usual if name in self._by_name), None)
+        if asked not in self._raw.table.column_names:
+            import difflib
+
+            close = difflib.get_close_matches(asked, self._raw.table.column_names, n=1)
+            raise FormatError(
+                f"{self._raw.name} has no column {asked!r}."
+                + (f" Did you mean {close[0]!r}?" if close else ""),
+                hint=f"It has {', '.join(self._raw.table.column_names)}.",
+            )
+        return asked
+
+
+def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
+    if raw.crs is None and crs is None:
+        raise CRSError(
+            f"{raw.name} does not say its CRS.", hint="Name it: --crs EPSG:4326, for instance."
+        )
+    own = None if raw.crs is None else parse_crs(raw.crs)
+    given = own if crs is None else parse_crs(crs)
+    if own is not None and given is not None and not own.equals(given, ignore_axis_order=True):
+        raise CRSError(
+            f"{raw.name} is in {own.name} by its own word, not in {given.name}.",
+            hint="Leave out --crs, or correct the file.",
+        )
+    return given if own is None else own  # type: ignore[return-value]
+
+
+def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -> tuple[Any, ...]:
+    """The rows that are places, the part of the row, outlines, latitudes and longitudes."""
+    import pyarrow as pa
+
+    kept, part, outlines, xs, ys, other = [], [], [], [], [], 0
+    for begin in range(0, len(geometry), _BATCH):
+        binary = geometry.slice(begin, _BATCH).to_numpy(zero_copy_only=False)
+        shapes = shapely.force_2d(shapely.from_wkb(binary, on_invalid="fix"))
+        single, row = shapely.get_parts(shapes, return_index=True)
+        # A row without shape is a place that fails and says so.
+        absent = np.setdiff1d(np.arange(len(shapes)), row)
+        kind = shapely.get_type_id(single)
+        usable = np.isin(kind, (0, 3)) & ~shapely.is_empty(single)
+        other += int((~usable).sum())
+        single = np.append(single[usable], np.full(len(absent), None))
+        row = np.append(row[usable], absent)
+        order = np.argsort(row, kind="stable")
+        single, row = single[order], row[order]
+        within = np.arange(len(row)) - np.searchsorted(row, row)
+        several = np.bincount(row, minlength=len(shapes))[row] > 1
+        where = shapely.point_on_surface(single)
+        kept.append(row + begin)
+        part.append(np.where(several, within + 1, 0))
+        xs.append(shapely.get_x(where))
+        ys.append(shapely.get_y(where))
+        area = shapely.get_type_id(single) == 3
+        wkb = shapely.to_wkb(single)
+        wkb[~area] = None
+        outlines.append(pa.array(wkb, pa.binary(), from_pandas=True))
+    if other:
+        notes.append(f"{other} shapes that are no points and no polygons are left out.")
+    rows, parts = np.concatenate(kept), np.concatenate(part)
+    if not len(rows):
+        raise FormatError(
+            f"{raw.name} holds no points and no polygons.", hint="Give a point or a parcel a row."
+        )
+    if parts.any():
+        notes.append(
+            f"{len(np.unique(rows[parts > 0]))} parcels have several parts: each is a field."
+        )
+    joined = pa.concat_arrays(outlines)
+    lon, lat = transformer(source, LONLAT).transform(np.concatenate(xs), np.concatenate(ys))
+    return rows, parts, joined if joined.null_count < len(joined) else None, lat, lon
+
+
+def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
+    """A column's numbers; missing ones are not a number."""
+    import pyarrow as pa
+
+    column = raw.table[name]
+    try:
+        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+            import pyarrow.compute as pc
+
+            column = pc.utf8_trim_whitespace(column)
+            column = pc.if_else(pc.equal(column, ""), None, column)
+        return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+    except pa.ArrowInvalid as error:
+        raise FormatError(
+            f"{raw.name}: column {name!r} holds something that is no number ({error}).",
+            hint="Write degrees as 35.0754.",
+        ) from None
+
+
+def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
+    """Refuse what cannot be a latitude or longitude.
+
+    Raises
+    ------
+    FormatError
+        Saying whether the two look swapped, or some rows are in another CRS.
+    """
+    if not (np.isfinite(lat) & np.isfinite(lon)).any():
+        raise FormatError(f"{raw.name} holds no row with a position.")
+    wrong = np.flatnonzero((np.abs(lat) > 90) | (np.abs(lon) > 180))
+    if not len(wrong):
+        return
+    shown = ", ".join(str(row + 1) for row in wrong[:5]) + (", ..." if len(wrong) > 5 else "")
+    first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
+    swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
+    if swapped.all():
+        hint = "Latitude and longitude look swapped: exchange the columns' names."
+    elif len(wrong) < len(lat):
+        hint = "Other rows are degrees: these may be in another CRS. Bring all rows into one."
+    else:
+        hint = "Give degrees (WGS 84), or a vector file that says its CRS."
+    raise FormatError(f"{raw.name}: no position on earth in row {shown} ({first}).", hint=hint)
+
+
+def _names(
+    raw: RawPlaces, id_name: str | None, name_name: str | None, kept: Any, part: Any,
+    lat: Any, lon: Any,
+) -> tuple[pa.Array, pa.Array]:  # fmt: skip
+    """Ids and names of all places.
+
+    Raises
+    ------
+    FormatError
+        When an id of the file comes twice.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    ids: list[str | None] = [None] * len(kept)
+    if id_name is not None:
+        column = _texts(raw.table[id_name])
+        counts = pc.value_counts(column.drop_null())
+        double = counts.filter(pc.greater(counts.field("counts"), 1)).field("values").to_pylist()
+        if double:
+            first = double[0]
+            rows = [i + 1 for i, one in enumerate(column.to_pylist()) if one == first]
+            raise FormatError(
+                f"{raw.name}: column {id_name!r} holds {len(double)} ids more than once, such as "
+                f"{first!r} in rows {', '.join(map(str, rows[:5]))}.",
+                hint="Give each place an id of its own, or name another column: --id-column.",
+            )
+        ids = column.take(kept).to_pylist()
+    names = (
+        [None] * len(kept)
+        if name_name is None
+        else _texts(raw.table[name_name]).take(kept).to_pylist()
+    )
+    taken = {one for one in ids if one}
+    for at, one in enumerate(ids):
+        if one:
+            ids[at] = f"{one}.{part[at]}" if part[at] else one
+        else:
+            ids[at] = _unlike(_place_id(lat[at], lon[at], int(kept[at]) + 1), taken)
+    return pa.array(ids, pa.string()), pa.array(
+        [name or one for name, one in zip(names, ids, strict=True)], pa.string()
+    )
+
+
+def _texts(column: Any) -> Any:
+    """A column as text; whole numbers without a point, what is empty missing."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if pa.types.is_floating(column.type):
+        whole = pc.equal(pc.floor(column), column)
+        if pc.all(whole.drop_null()).as_py():
+            column = column.cast(pa.int64())
+    text = pc.utf8_trim_whitespace(column.cast(pa.string()).combine_chunks())
+    return pc.if_else(pc.equal(text, ""), pa.scalar(None, pa.string()), text)
+
+
+def _place_id(lat: float, lon: float, row: int) -> str:
+    """An id for a place without one: where it is, to about 10 m."""
+    if not (np.isfinite(lat) and np.isfinite(lon)):
+        return f"row{row}"
+    north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
+    return f"{abs(lat):.4f}{north}{abs(lon):.4f}{east}"
+
+
+def _unlike(name: str, taken: set[str]) -> str:
+    unique, number = name, 1
+    while unique in taken:
+        number += 1
+        unique = f"{name}-{number}"
+    taken.add(unique)
+    return unique
+
+
+def _unlike_ours(name: str) -> str:
+    """A name for a user's column that is none of ours."""
+    ours = {*schema.FIELD.column_names, "geometry", "geometry_utm", "utm_epsg", "bbox", "chunk"}
+    return f"place_{name}" if name.lower() in ours or name.lower() == "fid" else name

@@ -1,0 +1,138 @@
+"""Places: the rows of a file that each become a field, as points or as parcels.
+
+Kept as Arrow columns and well-known binary, so that a million places fit into memory; one
+becomes a :class:`Place` when it is its turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from geofield.farm.place_settings import missing
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One field to be planned.
+
+    Attributes
+    ----------
+    row : int
+        In the file, from 1.
+    field_id, name : str
+    lat, lon : float
+        Degrees, WGS 84; not a number where the row has no position.
+    outline : bytes or None
+        The parcel, well-known binary in `crs`.
+    crs : str
+        WKT or code; empty for points.
+    own : tuple of (str, value)
+        The user's own columns.
+    settings : mapping
+        Those that hold for this field alone, by name.
+    notes : tuple of str
+    """
+
+    row: int
+    field_id: str
+    name: str
+    lat: float
+    lon: float
+    outline: bytes | None = None
+    crs: str = ""
+    own: tuple[tuple[str, Any], ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """The places of a file, in its order.
+
+    Attributes
+    ----------
+    path : str
+    ids, names : pa.Array of str
+    lat, lon : float arrays
+    rows : int array
+        In the file, from 1: a parcel of several parts is several places.
+    outlines : pa.Array of binary or None
+    crs : CRS
+        Of the outlines.
+    own : pa.Table
+        The user's own columns.
+    settings : pa.Table
+        The columns that are settings.
+    notes : tuple of str
+        What the person should know of the file.
+    remarks : mapping of int to str
+        What is to be told of single places, by position.
+    """
+
+    path: str
+    ids: pa.Array
+    names: pa.Array
+    lat: NDArray[np.float64]
+    lon: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    outlines: pa.Array | None
+    crs: CRS
+    own: pa.Table
+    settings: pa.Table
+    notes: tuple[str, ...] = ()
+    remarks: Mapping[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def parcels(self) -> bool:
+        """Whether every place is a parcel."""
+        return self.outlines is not None and self.outlines.null_count == 0
+
+    def take(self, positions: Sequence[int] | NDArray[np.int64]) -> Iterator[Place]:
+        """Some of the places."""
+        at = np.asarray(positions, dtype=np.int64)
+        own = self.own.take(at).to_pylist() if self.own.num_columns else [{}] * len(at)
+        said = self.settings.take(at).to_pylist() if self.settings.num_columns else [{}] * len(at)
+        for one, mine, its in zip(at.tolist(), own, said, strict=True):
+            outline = None if self.outlines is None else self.outlines[one].as_py()
+            yield Place(
+                int(self.rows[one]),
+                self.ids[one].as_py(),
+                self.names[one].as_py(),
+                float(self.lat[one]),
+                float(self.lon[one]),
+                outline,
+                self.crs.srs if outline is not None else "",
+                tuple((k, v) for k, v in mine.items() if not missing(v)),
+                {k: v for k, v in its.items() if not missing(v)},
+                (self.remarks[one],) if one in self.remarks else (),
+            )
+
+    def __iter__(self) -> Iterator[Place]:
+        return self.take(np.arange(len(self)))
+
+    def order(self) -> NDArray[np.int64]:
+        """Positions along a space-filling curve (Hilbert's): neighbours beside each other."""
+        import geopandas as gpd
+
+        known = np.isfinite(self.lat) & np.isfinite(self.lon)
+        far = np.full(len(self), np.iinfo(np.int64).max)
+        if known.any():
+            points = gpd.GeoSeries(gpd.points_from_xy(self.lon[known], self.lat[known]))
+            west, south, east, north = points.total_bounds
+            # A square that is never a point.
+            side = max(east - west, north - south, 1e-6)
+            frame = (west, south, west + side, south + side)
+            far[known] = points.hilbert_distance(frame, level=16).to_numpy(dtype=np.int64)
+        return np.argsort(far, kind="stable")

@@ -1,0 +1,115 @@
+"""Plans of many places, one after the other, as they are ready."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from geofield.errors import FieldWarning, GeofieldError, ImageryError
+from geofield.farm.place_reader import read_places
+from geofield.farm.places import Place, Places
+from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, told
+from geofield.plan import Plan
+from geofield.settings import Settings, with_values
+
+#: Places per worker that wait in the scheduler.
+_AHEAD = 4
+
+
+def plan_fields(
+    places: str | Path | Places,
+    imagery: str | Path | None = None,
+    *,
+    settings: Settings | None = None,
+    obstacles: str | Path | None = None,
+    client: Any = None,
+    **by_name: Any,
+) -> Iterator[Plan]:
+    """Plan many fields; each plan is handed out as soon as it is ready.
+
+    A place that cannot be planned gives a warning with the reason, and the others go on.
+
+    Parameters
+    ----------
+    places : path or Places
+        Points (columns lat and lon, or geometry) or parcels; see `geofield batch`.
+    imagery : path, optional
+        A picture, a folder or an index of pictures. Parcels need none.
+    settings : Settings, optional
+        Columns of the places that are named like settings win over them.
+    obstacles : path, optional
+        A file of what to avoid.
+    client : distributed.Client, optional
+        Of a Dask cluster, whose workers see the same files; here, one after the other, when not
+        given. Plans of a cluster come in the order in which they are ready.
+    **by_name
+        Any setting by its own name: ``spacing_m=4``.
+
+    Yields
+    ------
+    Plan
+        With the place's `field_id`, name and columns.
+
+    Examples
+    --------
+    >>> for plan in gf.plan_fields("parcels.gpkg", spacing_m=4):      # doctest: +SKIP
+    ...     print(plan.field.name, plan.tracks.statistics.length_m)
+    """
+    settings = with_values(settings, **by_name)
+    found = places if isinstance(places, Places) else read_places(places, settings=settings)
+    if imagery is not None and "://" not in str(imagery) and not Path(imagery).exists():
+        raise ImageryError(
+            f"There is no picture {imagery}.",
+            hint="For other sources use `geofield batch`, or fetch with `geofield tiles`.",
+        )
+    job = Job(
+        settings,
+        None if imagery is None else Imagery(str(imagery)),
+        None if obstacles is None else Path(obstacles),
+    )
+    waiting = iter(found.take(found.order()))
+    for plan, why in _here(waiting, job) if client is None else _there(waiting, job, client):
+        if plan is None:
+            warnings.warn(why, FieldWarning, stacklevel=2)
+        else:
+            if why:
+                warnings.warn(f"{plan.field.name}: {why}", FieldWarning, stacklevel=2)
+            yield plan
+
+
+def _one(place: Place, job: Job) -> tuple[Plan | None, str]:
+    """A plan and what was told, or no plan and why."""
+    with listening() as heard:
+        try:
+            plan = plan_place(place, job)
+        except GeofieldError as error:
+            said = in_words(error)
+            return None, f"{place.name} ({place.field_id}): {said['error']} {said['hint']}".strip()
+    return plan, told(place, heard)
+
+
+def _here(places: Iterator[Place], job: Job) -> Iterator[tuple[Plan | None, str]]:
+    for place in places:
+        yield _one(place, job)
+
+
+def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Plan | None, str]]:
+    """On a cluster, never more than a few places per worker in the scheduler."""
+    from distributed import FIRST_COMPLETED, wait
+
+    ahead = max(_AHEAD, _AHEAD * sum(client.nthreads().values()))
+    running: set[Any] = set()
+    more = True
+    while more or running:
+        while more and len(running) < ahead:
+            place = next(places, None)
+            more = place is not None
+            if place is not None:
+                running.add(client.submit(_one, place, job, pure=False))
+        if running:
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            running -= done
+            for future in done:
+                yield future.result()

@@ -1,0 +1,213 @@
+"""The work on one place and on one chunk of places: what a worker does, wherever it is."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.errors import FieldError, GeofieldWarning
+from geofield.farm.place_settings import as_settings
+from geofield.farm.places import Place
+from geofield.farm.standing import obstacles_of, with_obstacles
+from geofield.model.field import Field
+from geofield.pipeline import open_scene, run_field, run_obstacles, run_tracks
+from geofield.plan import Plan
+from geofield.settings import Settings
+from geofield.tracks.outline import clean_outline
+
+if TYPE_CHECKING:
+    from geofield.imagery import FetchOptions
+    from geofield.imagery.sources import Source
+
+#: Side of the window around a place where no size was asked for; it grows with the field.
+WINDOW_M = 400.0
+#: Ground around a parcel that its window shows, metres.
+_AROUND_M = 20.0
+
+
+@dataclass(frozen=True)
+class Imagery:
+    """Where pictures come from; a value that any worker can use.
+
+    Attributes
+    ----------
+    path : str
+        The user's own picture, or set of pictures; empty for a source.
+    source : Source or None
+    options : FetchOptions or None
+        Of the source.
+    """
+
+    path: str = ""
+    source: Source | None = None
+    options: FetchOptions | None = None
+
+    @contextmanager
+    def at(self, lat: float, lon: float, settings: Settings) -> Iterator[str]:
+        """A path that `read_scene` reads at a place."""
+        if self.source is None or self.options is None:
+            yield self.path
+            return
+        from geofield.imagery import picture_at
+
+        imagery = settings.imagery
+        with picture_at(
+            self.source, lat=lat, lon=lon, size_m=imagery.size_m, bands=imagery.bands,
+            options=self.options,
+        ) as path:  # fmt: skip
+            yield path
+
+
+@dataclass(frozen=True)
+class Job:
+    """What holds for all places.
+
+    Attributes
+    ----------
+    settings : Settings
+    imagery : Imagery or None
+        None for parcels that are planned as they are.
+    obstacles : Path or None
+        A file of what to avoid.
+    obstacles_crs : str or None
+        Of that file, where it does not say its CRS.
+    """
+
+    settings: Settings
+    imagery: Imagery | None = None
+    obstacles: Path | None = None
+    obstacles_crs: str | None = None
+
+
+def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
+    """The plan of one place.
+
+    Parameters
+    ----------
+    place : Place
+    job : Job
+    previous : Plan, optional
+        As a person left it: their outline and obstacles are kept.
+
+    Raises
+    ------
+    GeofieldError
+        When it cannot be planned, in words.
+    """
+    settings = as_settings(job.settings, place.settings)
+    if not (np.isfinite(place.lat) and np.isfinite(place.lon)):
+        raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
+    boundary = None if place.outline is None else parcel_of(place)
+    if job.imagery is not None:
+        plan = _on_picture(place, boundary, settings, job, previous)
+    elif previous is not None:
+        plan = previous
+    elif boundary is not None:
+        plan = _around(Plan(boundary), job)
+    else:
+        raise FieldError(
+            "A point alone has no outline, and there is no picture to find it in.",
+            hint="Name the IMAGERY, or give parcels.",
+        )
+    plan = run_tracks(plan, settings=settings)
+    field = replace(plan.field, field_id=place.field_id, name=place.name, own=place.own)
+    return replace(plan, field=field, scene=None)
+
+
+def _on_picture(
+    place: Place, boundary: Field | None, settings: Settings, job: Job, previous: Plan | None
+) -> Plan:
+    """Outline, unless it is given, and obstacles."""
+    size_m = settings.imagery.size_m or WINDOW_M
+    if boundary is not None:
+        size_m = max(size_m, _reach_m(boundary, place))
+    seen = settings.model_copy(
+        update={"imagery": settings.imagery.model_copy(update={"size_m": size_m})}
+    )
+    with job.imagery.at(place.lat, place.lon, seen) if job.imagery else nullcontext("") as path:
+        window = open_scene(path, place.lat, place.lon, seen)
+        plan = run_field(
+            path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
+            boundary=boundary, window=window,
+        )  # fmt: skip
+        if previous is None:
+            plan = _around(plan, job)
+        return run_obstacles(plan, plan.scene or window, settings=seen)
+
+
+def _around(plan: Plan, job: Job) -> Plan:
+    """A plan with the obstacles of the user's file."""
+    if job.obstacles is None:
+        return plan
+    return with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
+
+
+def _reach_m(boundary: Field, place: Place) -> float:
+    """Side of the window around a place that shows all of a parcel."""
+    x, y = transformer(LONLAT, boundary.crs).transform(place.lon, place.lat)
+    away = shapely.get_coordinates(boundary.polygon) - (x, y)
+    return float(2.0 * (np.abs(away).max() + _AROUND_M))
+
+
+def parcel_of(place: Place) -> Field:
+    """The parcel of a place as a field, in its metric CRS.
+
+    Raises
+    ------
+    TrackError
+        When its outline is no area.
+    """
+    source = _crs(place.crs)
+    geometry = shapely.from_wkb(place.outline)
+    metric = metric_crs(place.lon, place.lat, source)
+    if metric != source:
+        project = transformer(source, metric)
+        geometry = shapely.transform(
+            geometry, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
+        )
+    polygon, _ = clean_outline(geometry)
+    return Field(
+        polygon, metric, name=place.name, field_id=place.field_id, method="boundary", own=place.own
+    )
+
+
+_KNOWN: dict[str, CRS] = {}
+
+
+def _crs(text: str) -> CRS:
+    """A CRS by its text; made once, which costs more than a parcel."""
+    if text not in _KNOWN:
+        _KNOWN[text] = CRS(text)
+    return _KNOWN[text]
+
+
+def told(place: Place, heard: Sequence[warnings.WarningMessage]) -> str:
+    """What the stages had to tell of a place, each thing once."""
+    words = [str(each.message) for each in heard if issubclass(each.category, GeofieldWarning)]
+    return "; ".join(dict.fromkeys([*place.notes, *words]))
+
+
+@contextmanager
+def listening() -> Iterator[list[warnings.WarningMessage]]:
+    """Hear the warnings of a block, and nobody else does."""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", GeofieldWarning)
+        yield heard
+
+
+def in_words(error: BaseException) -> dict[str, Any]:
+    """An error as `error` and `hint` of a status row."""
+    message = getattr(error, "message", None)
+    if message is None:
+        message = f"{type(error).__name__}: {error}".strip(": ")
+    return {"status": "failed", "error": str(message), "hint": getattr(error, "hint", None) or ""}

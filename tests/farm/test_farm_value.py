@@ -1,0 +1,185 @@
+"""`gf.Farm`: many plans in one value, written as a folder that foreign programs read."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import subprocess
+import warnings
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import shapely
+
+import geofield as gf
+from geofield.errors import FormatError, OutputExistsError
+from geofield.farm import Farm, read_farm
+
+SQUARE = shapely.box(0.0, 0.0, 120.0, 90.0)
+
+
+def plan_at(x: float, y: float, epsg: int, name: str, **own: object) -> gf.Plan:
+    """A plan with obstacles, a headland and a route, in any zone."""
+    from geofield.pipeline import run_tracks
+    from geofield.settings import with_values
+
+    outline = shapely.affinity.translate(SQUARE, x, y)
+    hole = shapely.Point(x + 70.0, y + 50.0).buffer(5.0)
+    field = gf.Field(
+        outline.difference(hole), f"EPSG:{epsg}", name=name, field_id=name, method="boundary",
+        own=tuple(own.items()),
+    )  # fmt: skip
+    trees = gpd.GeoDataFrame(
+        {"radius_m": [3.0, 2.5]},
+        geometry=[shapely.Point(x + 30.0, y + 30.0), shapely.Point(x + 90.0, y + 20.0)],
+        crs=field.crs,
+    )
+    from geofield.formats.foreign_tables import obstacle_table
+
+    plan = gf.Plan(field, obstacles=obstacle_table(trees, field.crs, Path("trees")))
+    settings = with_values(None, spacing_m=6, headland_m=8.0, route="shortest", buffer_m=2.25)
+    return run_tracks(plan, settings=settings)
+
+
+@pytest.fixture(scope="module")
+def plans() -> list[gf.Plan]:
+    return [
+        plan_at(500_000.0, 5_500_000.0, 32632, "Süd 1", farmer="Mayer", plots=3, organic=True),
+        plan_at(500_400.0, 5_500_100.0, 32632, "north/2", farmer="Özil", yield_t=7.25),
+        plan_at(300_000.0, 5_300_000.0, 32633, "east"),
+    ]
+
+
+def test_plans_come_back_equal(plans: list[gf.Plan], tmp_path: Path) -> None:
+    Farm(plans).write(tmp_path / "farm")
+    back = read_farm(tmp_path / "farm")
+    assert len(back) == 3
+    assert back.ids == ["Süd 1", "north/2", "east"]
+    for plan, again in zip(plans, back, strict=True):
+        assert plan == again
+        assert plan == back[plan.field.field_id]
+        assert again.settings == plan.settings
+    assert back["Süd 1"].field.own == (("farmer", "Mayer"), ("plots", 3), ("organic", True))
+    assert "east" in back
+    assert "west" not in back
+    with pytest.raises(KeyError, match="did you mean 'east'"):
+        back["eest"]
+
+
+def test_one_zone_is_metric_and_several_are_wgs84(plans: list[gf.Plan]) -> None:
+    several, one = Farm(plans), Farm(plans[:2])
+    assert several.tracks.crs.to_epsg() == 4326
+    assert one.tracks.crs.to_epsg() == 32632
+    assert list(one.fields["utm_epsg"]) == [32632, 32632]
+    # True lengths stand in the columns, whatever the CRS.
+    for farm, mine in ((several, plans), (one, plans[:2])):
+        for plan in mine:
+            rows = farm.segments[farm.segments["field_id"] == plan.field.field_id]
+            assert np.array_equal(rows["length_m"], plan.tracks.segments["length_m"])
+    lonlat = several.segments.geometry.iloc[[0]].to_crs(32632).iloc[0]
+    assert lonlat.hausdorff_distance(plans[0].tracks.segments.geometry.iloc[0]) < 1e-6
+    assert all(len(several.layer(name)) for name in ("route", "headland", "turns"))
+    assert len(several.layer("alternatives")) == 0
+
+
+def test_the_users_columns_stand_beside_each_other(plans: list[gf.Plan]) -> None:
+    fields = Farm(plans).fields.set_index("field_id")
+    assert list(fields["farmer"].fillna("")) == ["Mayer", "Özil", ""]
+    assert fields.loc["Süd 1", "plots"] == 3
+    assert fields.loc["north/2", "yield_t"] == 7.25
+
+
+def test_ids_that_come_twice_are_refused(plans: list[gf.Plan]) -> None:
+    with pytest.raises(FormatError, match="Süd 1"):
+        Farm([plans[0], plans[0]])
+
+
+def test_foreign_programs_read_the_folder(plans: list[gf.Plan], tmp_path: Path) -> None:
+    Farm(plans).write(tmp_path / "farm")
+    part = tmp_path / "farm" / "tracks" / "chunk=0000" / "part-0.parquet"
+    geo = json.loads(pq.read_metadata(part).metadata[b"geo"])
+    assert geo["version"] == "1.1.0"
+    assert geo["columns"]["geometry"]["covering"]["bbox"]["xmin"] == ["bbox", "xmin"]
+    assert pq.ParquetFile(part).metadata.row_group(0).column(0).compression == "ZSTD"
+    whole = gpd.read_parquet(tmp_path / "farm" / "tracks")
+    assert set(whole["field_id"]) == {"Süd 1", "north/2", "east"}
+    west = whole[whole["field_id"] == "Süd 1"].total_bounds
+    some = gpd.read_parquet(tmp_path / "farm" / "tracks", bbox=tuple(west))
+    assert set(some["field_id"]) == {"Süd 1"}
+    # No row is missed for a box that was rounded.
+    assert len(some) == (whole["field_id"] == "Süd 1").sum()
+    for row in whole.geometry.iloc[:5]:
+        assert len(gpd.read_parquet(tmp_path / "farm" / "tracks", bbox=row.bounds))
+    tool = subprocess.run(
+        ["ogrinfo", "-so", "-al", str(part)], capture_output=True, text=True, check=False
+    )
+    if "Parquet" in subprocess.run(["ogrinfo", "--formats"], capture_output=True, text=True,
+                                   check=False).stdout:  # fmt: skip
+        assert "Multi Line String" in tool.stdout
+
+
+def test_a_validator_of_geoparquet_has_nothing_to_say(plans: list[gf.Plan], tmp_path: Path) -> None:
+    import dask_geopandas
+    import geoparquet_validator
+
+    Farm(plans).write(tmp_path / "farm")
+    for layer in ("field", "segments", "obstacles", "status"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            assert len(dask_geopandas.read_parquet(tmp_path / "farm" / layer).compute())
+        report = geoparquet_validator.check(
+            str(tmp_path / "farm" / layer / "chunk=0000" / "part-0.parquet")
+        )
+        assert geoparquet_validator.failed(report) == []
+
+
+def test_a_farm_is_not_written_over_something_else(plans: list[gf.Plan], tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("years of work")
+    for overwrite in (False, True):
+        with pytest.raises(OutputExistsError):
+            Farm(plans).write(tmp_path, overwrite=overwrite)
+    Farm(plans).write(tmp_path / "farm")
+    with pytest.raises(OutputExistsError):
+        Farm(plans[:1]).write(tmp_path / "farm")
+    Farm(plans[:1]).write(tmp_path / "farm", overwrite=True)
+    assert len(read_farm(tmp_path / "farm")) == 1
+
+
+def test_the_same_plans_give_the_same_bytes(plans: list[gf.Plan], tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        Farm(plans).write(tmp_path / name)
+    files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.parquet"))
+    assert len(files) > 8
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+
+
+def test_a_chunk_without_status_does_not_count(plans: list[gf.Plan], tmp_path: Path) -> None:
+    Farm(plans).write(tmp_path / "farm")
+    (tmp_path / "farm" / "status" / "chunk=0000" / "part-0.parquet").unlink()
+    assert len(read_farm(tmp_path / "farm")) == 0
+
+
+def test_a_field_of_a_farm_is_written_like_any_plan(plans: list[gf.Plan], tmp_path: Path) -> None:
+    Farm(plans).write(tmp_path / "farm")
+    read_farm(tmp_path / "farm")["Süd 1"].write(tmp_path / "one", formats=["gpkg"])
+    with sqlite3.connect(tmp_path / "one" / "field.gpkg") as file:
+        assert file.execute("SELECT farmer, plots FROM field").fetchone() == ("Mayer", 3)
+
+
+def test_a_farm_shows_itself(plans: list[gf.Plan]) -> None:
+    farm = Farm(plans)
+    assert "Farm of 3 fields" in repr(farm)
+    assert "3 done" in repr(farm)
+    assert "<svg" in farm._repr_html_()
+
+
+def test_what_is_no_farm_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="no farm"):
+        read_farm(tmp_path)
+    (tmp_path / "farm.json").write_text('{"version": 99}')
+    with pytest.raises(FormatError, match="later version"):
+        read_farm(tmp_path)

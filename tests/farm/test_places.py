@@ -1,0 +1,187 @@
+"""Places from whatever file a person has, and what is refused."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+
+import geofield as gf
+from geofield.errors import CRSError, FormatError
+from geofield.farm import read_places
+
+POINTS = pd.DataFrame(
+    {
+        "id": ["007", "8", "9"],
+        "name": ["Zum See", "b", None],
+        "lat": [50.001, 50.0, 50.002],
+        "lon": [10.0, 10.001, 10.002],
+        "spacing_m": [3.0, None, 12.0],
+        "farmer": ["Öz", "May;er", "x"],
+        "area_ha": [1.0, 2.0, None],
+    }
+)
+
+
+def as_frame(table: pd.DataFrame) -> gpd.GeoDataFrame:
+    shapes = gpd.points_from_xy(table["lon"], table["lat"])
+    return gpd.GeoDataFrame(table.drop(columns=["lat", "lon"]), geometry=shapes, crs=4326)
+
+
+def written(kind: str, folder: Path) -> Path:
+    path = folder / f"places.{kind}"
+    if kind == "csv":
+        POINTS.to_csv(path, index=False)
+    elif kind == "german.csv":
+        POINTS.to_csv(path, index=False, sep=";", decimal=",", encoding="utf-8-sig")
+    elif kind == "plain.parquet":
+        POINTS.to_parquet(path)
+    elif kind == "parquet":
+        as_frame(POINTS).to_parquet(path, write_covering_bbox=True)
+    elif kind == "wkt.csv":
+        table = POINTS.assign(wkt=[f"POINT ({x} {y})" for x, y in zip(POINTS["lon"], POINTS["lat"],
+                                                                       strict=True)])  # fmt: skip
+        table.drop(columns=["lat", "lon"]).to_csv(path, index=False)
+    else:
+        as_frame(POINTS).to_crs(32632).to_file(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["csv", "german.csv", "wkt.csv", "plain.parquet", "parquet", "gpkg", "shp", "geojson", "fgb"],
+)
+def test_every_kind_of_file_gives_the_same_places(kind: str, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = written(kind, tmp_path)
+    places = sorted(read_places(path), key=lambda place: place.row)
+    if kind == "fgb":  # a packed tree has an order of its own
+        places.sort(key=lambda place: place.field_id)
+    assert [place.field_id for place in places] == ["007", "8", "9"]
+    assert [place.name for place in places] == ["Zum See", "b", "9"]
+    assert [place.lat for place in places] == pytest.approx(list(POINTS["lat"]), abs=1e-8)
+    assert [place.lon for place in places] == pytest.approx(list(POINTS["lon"]), abs=1e-8)
+    assert [dict(place.settings) for place in places] == [
+        {"spacing_m": 3.0}, {}, {"spacing_m": 12.0}
+    ]  # fmt: skip
+    assert dict(places[0].own) == {"farmer": "Öz", "place_area_ha": 1.0}
+    assert dict(places[2].own) == {"farmer": "x"}
+
+
+def test_neighbours_lie_beside_each_other(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    table = pd.DataFrame({"lat": rng.uniform(50, 51, 900), "lon": rng.uniform(10, 11, 900)})
+    table.to_csv(tmp_path / "many.csv", index=False)
+    places = read_places(tmp_path / "many.csv")
+    order = places.order()
+    assert sorted(order) == list(range(900))
+    steps = np.hypot(np.diff(places.lat[order]), np.diff(places.lon[order]))
+    assert np.median(steps) < 2.0 / np.sqrt(900)
+    assert len(set(places.ids.to_pylist())) == 900
+
+
+def parcels(tmp_path: Path) -> Path:
+    shapes = [
+        shapely.box(500_000, 5_500_000, 500_100, 5_500_090),
+        shapely.MultiPolygon(
+            [shapely.box(500_200, 5_500_000, 500_300, 5_500_080),
+             shapely.box(500_400, 5_500_000, 500_450, 5_500_080)]
+        ),
+        shapely.LineString([(500_000, 5_500_000), (500_100, 5_500_000)]),
+    ]  # fmt: skip
+    frame = gpd.GeoDataFrame(
+        {"id": [1, 2, 3], "crop": ["rye", "oats", ""]}, geometry=shapes, crs=25832
+    )
+    frame.to_file(tmp_path / "parcels.gpkg")
+    return tmp_path / "parcels.gpkg"
+
+
+def test_parcels_keep_their_columns_and_their_zone(tmp_path: Path) -> None:
+    places = read_places(parcels(tmp_path))
+    assert places.parcels
+    assert [place.field_id for place in places] == ["1", "2.1", "2.2"]
+    assert "1 parcels have several parts" in places.notes[1]
+    plans = {plan.field.field_id: plan for plan in gf.plan_fields(places, spacing_m=4)}
+    assert set(plans) == {"1", "2.1", "2.2"}
+    one = plans["1"]
+    assert one.field.crs.to_epsg() == 25832
+    assert one.field.polygon.equals(shapely.box(500_000, 5_500_000, 500_100, 5_500_090))
+    assert one.field.own == (("crop", "rye"),)
+    assert one.settings.tracks.spacing_m == 4.0
+
+
+def test_a_column_named_like_a_setting_holds_for_its_field(tmp_path: Path) -> None:
+    frame = gpd.read_file(parcels(tmp_path)).iloc[:2].explode(ignore_index=True)
+    frame["id"] = ["a", "b", "c"]
+    frame["heading_deg"] = [30.0, None, 120.0]
+    frame["spacing_m"] = [None, 6.0, 9.0]
+    frame.to_file(tmp_path / "said.geojson", driver="GeoJSON")
+    plans = {p.field.field_id: p for p in gf.plan_fields(tmp_path / "said.geojson", spacing_m=5)}
+    assert plans["a"].tracks.heading_deg == pytest.approx(30.0, abs=1e-6)
+    assert plans["c"].tracks.heading_deg == pytest.approx(120.0, abs=1e-6)
+    assert plans["b"].settings.tracks.direction == "dominant"
+    assert [plans[one].tracks.spacing_m for one in "abc"] == [5.0, 6.0, 9.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"id": ["x", "x", "y"]}, "'x' in rows 1, 2"),
+        ({"lat": [50.0, 95.0, 50.0]}, "row 2"),
+        ({"lat": [110.0, 120.0, 130.0], "lon": [50.0, 50.0, 50.0]}, "swapped"),
+        ({"lat": [50.0, 5_500_000.0, 50.0], "lon": [10.0, 500_000.0, 10.0]}, "another CRS"),
+        ({"lat": ["50", "fifty", "51"]}, "no number"),
+        ({"lat": [None, None, None]}, "no row with a position"),
+        ({"spacing_m": ["3", "wide", "4"]}, "row 2: column 'spacing_m'"),
+        ({"spacing_m": [3, -2, 4]}, "row 2: column 'spacing_m'"),
+        ({"route": ["none", "shortest", "zigzag"]}, "row 3: column 'route'"),
+    ],
+)
+def test_bad_rows_are_told_by_their_number(
+    change: dict[str, list[object]], words: str, tmp_path: Path
+) -> None:
+    POINTS.assign(**change).to_csv(tmp_path / "bad.csv", index=False)
+    with pytest.raises(FormatError, match=words):
+        read_places(tmp_path / "bad.csv")
+
+
+def test_a_column_that_is_not_there(tmp_path: Path) -> None:
+    POINTS.to_csv(tmp_path / "p.csv", index=False)
+    with pytest.raises(FormatError, match=r"no column 'farmr'\. Did you mean 'farmer'"):
+        read_places(tmp_path / "p.csv", id_column="farmr")
+    POINTS.drop(columns="lat").to_csv(tmp_path / "q.csv", index=False)
+    with pytest.raises(FormatError, match="no columns lat and lon"):
+        read_places(tmp_path / "q.csv")
+
+
+@pytest.mark.parametrize("text", ["", "lat,lon\n", "lat,lon"])
+def test_an_empty_file(text: str, tmp_path: Path) -> None:
+    (tmp_path / "none.csv").write_text(text)
+    with pytest.raises(FormatError, match="empty"):
+        read_places(tmp_path / "none.csv")
+
+
+def test_a_file_without_crs_must_be_told_it(tmp_path: Path) -> None:
+    frame = as_frame(POINTS).set_crs(None, allow_override=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        frame.to_file(tmp_path / "bare.shp")
+    with pytest.raises(CRSError, match="does not say its CRS"):
+        read_places(tmp_path / "bare.shp")
+    assert len(read_places(tmp_path / "bare.shp", crs="EPSG:4326")) == 3
+
+
+def test_a_place_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
+    frame = gpd.read_file(parcels(tmp_path)).iloc[:2].explode(ignore_index=True)
+    frame["id"] = ["a", "b", "c"]
+    frame["spacing_m"] = [5.0, 500.0, 5.0]
+    frame.to_file(tmp_path / "wide.gpkg")
+    with pytest.warns(gf.GeofieldWarning, match="b .*500 m is larger than the field"):
+        plans = list(gf.plan_fields(tmp_path / "wide.gpkg"))
+    assert {plan.field.field_id for plan in plans} == {"a", "c"}
