@@ -88,6 +88,10 @@ class FormatError(GeofieldError):
     """A product cannot be written, read or validated."""
 
 
+class ChangedError(FormatError):
+    """Another program changed a file since it was read."""
+
+
 class UnknownFormatError(FormatError):
     """A format was named that is not there: wrong usage, not work that failed."""
 

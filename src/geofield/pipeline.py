@@ -24,6 +24,7 @@ from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
+from geofield.model.tracks import Tracks
 from geofield.model.written import Written
 from geofield.plan import Plan, outline_digest
 from geofield.settings import Settings, with_values
@@ -294,22 +295,12 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
 
 def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
-    from geofield.tracks import plan_with_settings
-
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     obstacles, evidence = None, plan.evidence
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
         evidence = replace(evidence, written=written)
-    _refuse_too_wide(field, settings.tracks.spacing_m)
-    tracks = plan_with_settings(
-        field.polygon, obstacles, settings.tracks, crs=field.crs, grid=plan.grid
-    )
-    if not len(tracks.lines) and not tracks.blocked_count:
-        raise TrackError(
-            f"The field of {field.area_ha:.4f} ha is smaller than one track.",
-            hint="Choose a smaller spacing or headland, or check the outline.",
-        )
+    tracks = tracks_of_plan(replace(plan, field=field, obstacles=obstacles), settings)
     if field is not plan.field:
         evidence = replace(evidence, outline=outline_digest(field))
     return replace(
@@ -320,6 +311,23 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence=evidence,
     )
+
+
+def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
+    """The tracks alone, for field and obstacles as they stand in the plan."""
+    from geofield.tracks import plan_with_settings
+
+    field = plan.field
+    _refuse_too_wide(field, settings.tracks.spacing_m)
+    tracks = plan_with_settings(
+        field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid
+    )
+    if not len(tracks.lines) and not tracks.blocked_count:
+        raise TrackError(
+            f"The field of {field.area_ha:.4f} ha is smaller than one track.",
+            hint="Choose a smaller spacing or headland, or check the outline.",
+        )
+    return tracks
 
 
 def _refuse_elsewhere(boundary: Field, scene: Scene) -> None:

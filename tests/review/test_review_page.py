@@ -173,6 +173,25 @@ def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> N
     assert page.state()["tracks"] == before["tracks"]
 
 
+def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
+    before = page.obstacle(8)
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    time.sleep(0.3)
+    page.driver.execute_async_script(
+        "const done = arguments[0]; import('/map.js').then(({view}) => {"
+        " view.setResolution(1.2); setTimeout(done, 300); });"
+    )
+    x, y = before["centre"]
+    page.drag((x, y), (x + 400, y))
+    page.wait(lambda: "outside the picture" in page.text("message"))
+    assert page.obstacle(8) == before
+    shown = page.driver.execute_async_script(
+        "const done = arguments[0]; import('/map.js').then(({sources}) => "
+        "done(sources.obstacles.getFeatureById(8).getGeometry().getExtent()));"
+    )
+    assert (shown[0] + shown[2]) / 2 == pytest.approx(x, abs=0.1)
+
+
 def test_edits_come_back_after_the_server_is_killed(
     driver: webdriver.Chrome, plan_path: Path
 ) -> None:

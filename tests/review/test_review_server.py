@@ -16,6 +16,7 @@ import rasterio
 from PIL import Image
 from rasterio.warp import Resampling, calculate_default_transform, reproject
 
+from geofield.errors import GeofieldError
 from geofield.imagery.display import TILE_PX, TiledPicture
 from geofield.review.desk import Desk
 from geofield.review.server import MOST_BYTES, ReviewServer
@@ -56,13 +57,45 @@ class Visitor:
 
 @pytest.fixture
 def visitor(plan_path: Path) -> Iterator[Visitor]:
-    server = ReviewServer(Shelf(plan_path))
+    server = ReviewServer()
+    server.load(lambda: Shelf(plan_path))
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
     thread.start()
     yield Visitor(server)
     server.shutdown()
     server.server_close()
     thread.join()
+
+
+def test_the_page_is_there_before_the_plan_is_read(plan_path: Path) -> None:
+    server = ReviewServer()
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
+    thread.start()
+    visitor = Visitor(server)
+    answers: list[int] = []
+    asking = threading.Thread(
+        target=lambda: answers.append(visitor.ask("GET", "/api/state", Cookie=visitor.cookie)[0])
+    )
+    asking.start()
+    assert visitor.ask("GET", "/web/vendor/ol.js", Cookie=visitor.cookie)[0] == 200
+    assert not answers
+    server.load(lambda: Shelf(plan_path))
+    asking.join(20)
+    assert answers == [200]
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_plan_that_cannot_be_read_is_told_to_the_page(tmp_path: Path) -> None:
+    server = ReviewServer()
+    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+    with pytest.raises(GeofieldError, match="no plan"):
+        server.load(lambda: Shelf(tmp_path))
+    visitor = Visitor(server)
+    status, _, body = visitor.ask("GET", "/api/state", Cookie=visitor.cookie)
+    assert (status, "no plan" in json.loads(body)["message"]) == (422, True)
+    server.shutdown()
+    server.server_close()
 
 
 def test_only_the_printed_address_opens(visitor: Visitor) -> None:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import shapely
 
-from geofield.errors import GeofieldError
+from geofield.errors import ChangedError, GeofieldError
 from geofield.formats import read_dataset
 from geofield.plan import Plan, read_plan
 from geofield.review import Session, apply_command
-from geofield.review.desk import ChangedError, Desk
+from geofield.review.desk import Desk
 from geofield.review.journal import journal_path
 
 
@@ -46,7 +46,7 @@ def test_a_rejected_obstacle_gives_its_track_back(plan: Plan) -> None:
 
 def test_a_moved_obstacle_stands_where_it_was_put(plan: Plan) -> None:
     old = row(plan, 8)
-    moved = row(apply_command(plan, {"do": "move", "no": 8, "dx_m": 3.0, "dy_m": -2.0}), 8)
+    moved = row(Session(plan).do({"do": "move", "no": 8, "dx_m": 3.0, "dy_m": -2.0}).plan, 8)
     shift = np.subtract(moved.geometry.centroid.coords[0], old.geometry.centroid.coords[0])
     assert shift == pytest.approx([3.0, -2.0], abs=1e-6)
     assert moved["status"] == "confirmed"
@@ -133,6 +133,27 @@ def test_bad_edits_are_refused_in_words_and_change_nothing(
     with pytest.raises(GeofieldError, match=words):
         session.do(command)
     assert session.step is before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        {"do": "move", "no": 8, "dx_m": 3.0, "dy_m": -2.0},
+        {"do": "radius", "no": 8, "radius_m": 7.0},
+        {"do": "tracks", "settings": {"spacing_m": 7.0, "headland_m": 8.0}},
+    ],
+)
+def test_what_is_shown_in_a_drag_are_the_tracks_of_its_end(
+    plan: Plan, command: dict[str, object]
+) -> None:
+    session = Session(plan)
+    shown = session.preview(command).tracks
+    assert session.plan is plan
+    made = session.do(command).plan.tracks
+    assert shown is not None
+    assert made is not None
+    assert shown.segments.geometry.equals(made.segments.geometry)
+    assert shown.statistics == made.statistics
 
 
 def test_edits_come_back_after_a_kill(plan_path: Path) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from geofield.cli.console import say
+
+if TYPE_CHECKING:
+    from geofield.review.shelf import Shelf
 
 
 @click.command(
@@ -49,28 +54,37 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     """
     from geofield.errors import GeofieldError
     from geofield.review.server import ReviewServer
-    from geofield.review.shelf import Shelf
 
-    shelf = Shelf(plan_file, picture)
     try:
-        server = ReviewServer(shelf, port)
+        server = ReviewServer(port)
     except OSError as error:
         raise GeofieldError(
             f"Port {port} cannot be used: {error.strerror}.", hint="Choose another --port."
         ) from error
-    if shelf.desk.brought_back:
-        say(shelf.desk.brought_back)
+    serving = threading.Thread(target=server.serve_forever, args=(0.2,), daemon=True)
+    serving.start()
     click.echo(server.address)
     say("Open this address in a browser on this machine. Ctrl-C ends the session.")
     if not no_browser:
         import webbrowser
 
         webbrowser.open(server.address)
+    shelf = server.load(lambda: _shelf(plan_file, picture))
+    if shelf.desk.brought_back:
+        say(shelf.desk.brought_back)
     try:
-        server.serve_forever(poll_interval=0.2)
+        while serving.is_alive():  # waiting without end would hear no Ctrl-C on Windows
+            serving.join(0.5)
     except KeyboardInterrupt:
         say("Ended.")
     finally:
         server.server_close()
     for journal in shelf.unsaved():
         say(f"Edits that were not saved lie in {journal}; the next session has them.")
+
+
+def _shelf(plan_file: Path, picture: Path | None) -> Shelf:
+    """The plans, read while the browser already asks for the page."""
+    from geofield.review.shelf import Shelf
+
+    return Shelf(plan_file, picture)

@@ -84,14 +84,7 @@ def track_statistics(tracks: Tracks) -> TrackStatistics:
     area = worked = coverage = overlap = nan
     if outline is not None:
         area = float(outline.area)
-        strips = _strips(tracks.segments, tracks.headland_tracks, tracks.spacing_m * scale)
-        together = shapely.union_all(strips)
-        union = shapely.intersection(together, outline).area
-        single = union
-        # Cutting an outline of a million vertices once for every strip takes its time.
-        if shapely.area(strips).sum() > together.area * (1.0 + 1e-9):
-            single = float(shapely.area(shapely.intersection(strips, outline)).sum())
-        worked = float(union)
+        worked, single = _worked(tracks, outline, tracks.spacing_m * scale)
         coverage = 100.0 * worked / area
         overlap = 100.0 * max(0.0, single - worked) / area
     return TrackStatistics(
@@ -111,6 +104,40 @@ def track_statistics(tracks: Tracks) -> TrackStatistics:
         overlap_percent=overlap,
         losses=tracks.losses,
     )
+
+
+def _worked(tracks: Tracks, outline: shapely.Polygon, width: float) -> tuple[float, float]:
+    """Area of the outline within a strip: counted once, and once for every strip."""
+    strips = _strips(tracks.segments, tracks.headland_tracks, width)
+    if tracks.headland_tracks is None and _apart(tracks.segments, width):
+        # Strips of every other track do not even touch: their union is the list of them.
+        even = tracks.segments["track_no"].to_numpy(dtype=np.int64) % 2 == 0
+        rows = [shapely.multipolygons(strips[even]), shapely.multipolygons(strips[~even])]
+        alone = float(shapely.area(shapely.intersection(rows, outline)).sum())
+        return alone, alone
+    together = shapely.union_all(strips)
+    worked = float(shapely.intersection(together, outline).area)
+    # Cutting an outline of a million vertices once for every strip takes its time.
+    if shapely.area(strips).sum() <= together.area * (1.0 + 1e-9):
+        return worked, worked
+    return worked, float(shapely.area(shapely.intersection(strips, outline)).sum())
+
+
+def _apart(segments: gpd.GeoDataFrame, width: float) -> bool:
+    """Whether neighbouring tracks lie a width apart, and the segments of each behind each other."""
+    ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
+    number = segments["track_no"].to_numpy(dtype=np.int64)
+    if not len(ends):
+        return False
+    along = ends[0, 1] - ends[0, 0]
+    along /= np.hypot(*along)
+    start, end = ((ends - ends[0, 0]) @ along).T
+    across = (ends[:, 0] - ends[0, 0]) @ np.array([-along[1], along[0]])
+    order = np.lexsort((start, number))
+    same = number[order][1:] == number[order][:-1]
+    step = np.abs(np.diff(across[order]))
+    behind = start[order][1:] - end[order][:-1] > 0.0
+    return bool(np.where(same, behind, step >= width * (1.0 - 1e-9)).all())
 
 
 def _strips(

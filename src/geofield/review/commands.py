@@ -21,7 +21,6 @@ from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
-from geofield.model.review import reconcile
 from geofield.settings import Settings, TrackSettings
 
 if TYPE_CHECKING:
@@ -38,6 +37,8 @@ class EditError(GeofieldError):
 
 def apply_command(plan: Plan, command: Command) -> Plan:
     """The plan after an edit; its tracks are those of before, to be planned again.
+
+    Planning brings the other columns of an obstacle that was moved or reshaped up to date.
 
     Parameters
     ----------
@@ -210,10 +211,7 @@ def _reshaped(plan: Plan, command: Command, shape: Any, values: Mapping[str, Any
     """A shape or place that a person gave says that the thing is there."""
     _on_the_picture(plan, shape)
     status = "added" if _row(plan, command)["status"] == "added" else "confirmed"
-    edited = _with_row(plan, command, {**values, "status": status, "geometry": shape})
-    assert edited.obstacles is not None  # noqa: S101 - a row was found in it
-    obstacles, written = reconcile(edited.obstacles, plan.evidence.written, plan.grid)
-    return replace(edited, obstacles=obstacles, evidence=replace(plan.evidence, written=written))
+    return _with_row(plan, command, {**values, "status": status, "geometry": shape})
 
 
 def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: float | None) -> Plan:

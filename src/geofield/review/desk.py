@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.crs import ground_scale_of
-from geofield.errors import FormatError, GeofieldError
+from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
 from geofield.pipeline import scene_of_plan
@@ -26,10 +26,6 @@ from geofield.settings import Settings
 from geofield.staging import refuse_locked
 from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
-
-
-class ChangedError(FormatError):
-    """Another program changed the plan's file since it was read."""
 
 
 class Desk:
@@ -98,9 +94,7 @@ class Desk:
 
     def preview(self, command: Command) -> dict[str, Any]:
         """The tracks that an edit would lead to."""
-        session = self.session
-        step = session.preview(command)
-        return tracks_of(step.plan, step.notes)
+        return tracks_of(self.session.preview(command))
 
     def save(self, target: str | None = None) -> dict[str, Any]:
         """Write the plan into its file, or under another name beside it.

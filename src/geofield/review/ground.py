@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
-from geofield.field import extract_field, prepare_field
 from geofield.plan import outline_digest
 from geofield.review.commands import Command, EditError
 from geofield.settings import Settings
@@ -60,6 +59,9 @@ class Ground:
             x, y = (float(value) for value in command["place"])
         except (KeyError, TypeError, ValueError):
             raise EditError("A place is two numbers, x and y.") from None
+        # Searching needs the most libraries of all, and most sessions never do it.
+        from geofield.field import extract_field, prepare_field
+
         lon, lat = transformer(plan.field.crs, LONLAT).transform(x, y)
         settings = plan.settings or Settings()
         said = settings.field

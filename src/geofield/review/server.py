@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import json
 import threading
+from collections.abc import Callable
+from concurrent.futures import Future
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from geofield.errors import GeofieldError
-from geofield.review.desk import ChangedError
+from geofield.errors import ChangedError, GeofieldError
 from geofield.review.guard import SECURITY_HEADERS, Guard
-from geofield.review.shelf import Shelf
+
+if TYPE_CHECKING:
+    from geofield.review.shelf import Shelf
 
 #: The largest request that is read: an outline of a hundred thousand corners.
 MOST_BYTES = 4_000_000
@@ -32,9 +35,10 @@ _TYPES = {
 class ReviewServer(ThreadingHTTPServer):
     """A server for one session, bound to 127.0.0.1.
 
+    The page itself is served at once; what it asks of the plan waits until :meth:`load` has it.
+
     Parameters
     ----------
-    shelf : Shelf
     port : int
         0 takes a free one.
     """
@@ -42,11 +46,31 @@ class ReviewServer(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 32
 
-    def __init__(self, shelf: Shelf, port: int = 0) -> None:
+    def __init__(self, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), _Handler)
-        self.shelf = shelf
         self.guard = Guard(self.server_port)
         self.files = _page_files()
+        self._shelf: Future[Shelf] = Future()
+
+    @property
+    def shelf(self) -> Shelf:
+        """The plans; waits until they are read.
+
+        Raises
+        ------
+        GeofieldError
+            When they could not be read.
+        """
+        return self._shelf.result()
+
+    def load(self, read: Callable[[], Shelf]) -> Shelf:
+        """Read the plans, and let the requests that wait for them go on."""
+        try:
+            self._shelf.set_result(read())
+        except BaseException as error:
+            self._shelf.set_exception(error)
+            raise
+        return self.shelf
 
     @property
     def address(self) -> str:
@@ -88,6 +112,9 @@ class _Handler(BaseHTTPRequestHandler):
     server: ReviewServer
     protocol_version = "HTTP/1.1"
     timeout = 60
+    # An answer is one packet that must not wait for the browser's word about the last one.
+    disable_nagle_algorithm = True
+    wbufsize = 1 << 16
 
     def log_message(self, *_: Any) -> None:
         """Requests are no news."""
@@ -107,10 +134,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self._refused():
             return
         if address.path == "/api/state":
-            shelf = self.server.shelf
-            opening = shelf.desk.opening()
-            plans = {"plans": shelf.names, "plan": shelf.current}
-            self._json(200, {**opening, **plans, "token": self.server.guard.token})
+            self._state()
         elif address.path.startswith("/tile/"):
             self._tile(address.path)
         else:
@@ -146,6 +170,16 @@ class _Handler(BaseHTTPRequestHandler):
             self._json(422, _words(error))
         except _NoSuchRequestError:
             self._json(404, {"message": "There is no such request."})
+
+    def _state(self) -> None:
+        try:
+            shelf = self.server.shelf
+            opening = shelf.desk.opening()
+        except GeofieldError as error:
+            self._json(422, _words(error))
+            return
+        plans = {"plans": shelf.names, "plan": shelf.current}
+        self._json(200, {**opening, **plans, "token": self.server.guard.token})
 
     def _answer(self, path: str, value: dict[str, Any]) -> dict[str, Any]:
         shelf, tab = self.server.shelf, self.headers.get("X-Geofield-Tab", "")

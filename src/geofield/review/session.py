@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geofield.errors import GeofieldWarning
-from geofield.pipeline import run_tracks
+from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
 
@@ -95,18 +95,28 @@ class Session:
         GeofieldError
             When the edit or the tracks after it are refused; nothing has changed then.
         """
-        step = self.preview(command)
+        step = planned(self._edited(command), command)
         self._steps = [*self._steps[: self._at + 1], step][-MOST_STEPS:]
         self._at = len(self._steps) - 1
         return step
 
-    def preview(self, command: Command) -> Step:
-        """What an edit would lead to, without making it."""
-        if command.get("do") == "ground":
-            if self._ground is None:
-                raise EditError("There is no picture beside this plan to find its outline on.")
-            return planned(self._ground.find(self.plan, command), command)
-        return planned(apply_command(self.plan, command), command)
+    def preview(self, command: Command) -> Plan:
+        """The plan that an edit would lead to, its tracks and nothing else brought up to date.
+
+        It follows a hand that drags: what is shown then needs no record of who said what.
+        """
+        plan = self._edited(command)
+        settings = plan.settings or Settings()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", GeofieldWarning)
+            return replace(plan, tracks=tracks_of_plan(plan, settings))
+
+    def _edited(self, command: Command) -> Plan:
+        if command.get("do") != "ground":
+            return apply_command(self.plan, command)
+        if self._ground is None:
+            raise EditError("There is no picture beside this plan to find its outline on.")
+        return self._ground.find(self.plan, command)
 
     def undo(self) -> Step:
         """Go one edit back, if there is one."""

@@ -26,14 +26,18 @@ export const frameStyle = () => [new ol.style.Style({stroke: stroke("#fff", 4)})
 
 export const gapStyle = () => new ol.style.Style({stroke: stroke(theme.gap, 1.4, [3, 5])});
 
+// Styles are made once, not for each of a thousand lines in each frame.
+const made = {};
+const once = (name, make) => made[name] ??= make();
+
 export function trackStyle(feature, resolution) {
-  const styles = cased(theme.track, 1.6);
-  if (resolution < 0.35) styles.push(lettering(String(feature.get("no")), "italic 12px system-ui, sans-serif", theme.track, "line"));
-  return styles;
+  const lines = once("track", () => cased(theme.track, 1.6));
+  if (resolution >= 0.35 || feature.get("no") === undefined) return lines;
+  return [...lines, lettering(String(feature.get("no")), "italic 12px system-ui, sans-serif", theme.track, "line")];
 }
 
-export const turnStyle = feature =>
-  cased(feature.get("fits") ? theme.turn : theme.unfit, feature.get("fits") ? 1.4 : 3);
+export const turnStyle = feature => feature.get("fits")
+  ? once("turn", () => cased(theme.turn, 1.4)) : once("unfit", () => cased(theme.unfit, 3));
 
 // Which way a segment is driven, and as which of all: an arrow at its middle.
 export function driveStyle(feature, resolution) {

@@ -95,22 +95,23 @@ def obstacles_view(
     centres = np.round(
         shapely.get_coordinates(shapely.centroid(obstacles.geometry.to_numpy())), _DIGITS
     ).tolist()
-    rows = []
-    for row, centre in zip(obstacles.itertuples(), centres, strict=True):
-        parts = shapely.get_parts(row.geometry)
-        rows.append(
-            {
-                "no": int(row.obstacle_no),
-                "kind": row.kind,
-                "status": row.status,
-                "confidence": _number(row.confidence),
-                "radius_m": _number(row.radius_m),
-                "buffer_m": _number(row.buffer_m),
-                "lost_m": _number(lost.get(int(row.obstacle_no))),
-                "centre": centre,
-                "rings": [ring for part in parts for ring in rings_of(part)],
-            }
-        )
+    rings, of_row = shapely.get_rings(obstacles.geometry.to_numpy(), return_index=True)
+    rows: list[dict[str, Any]] = [
+        {
+            "no": int(row.obstacle_no),
+            "kind": row.kind,
+            "status": row.status,
+            "confidence": _number(row.confidence),
+            "radius_m": _number(row.radius_m),
+            "buffer_m": _number(row.buffer_m),
+            "lost_m": _number(lost.get(int(row.obstacle_no))),
+            "centre": centre,
+            "rings": [],
+        }
+        for row, centre in zip(obstacles.itertuples(), centres, strict=True)
+    ]
+    for at, ring in zip(of_row.tolist(), _lines(rings), strict=True):
+        rows[at]["rings"].append(ring[:-1])
     return rows
 
 

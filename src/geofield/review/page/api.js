@@ -44,30 +44,31 @@ export const openPlan = plan => ask("/api/open", {plan});
 export const stop = () => ask("/api/stop", {});
 export const exportAs = format => ask("/api/export", {format});
 
-let flying = false, waiting = null;
+let drag = 0, waiting = null, flying = false;
 
-// While a person drags, only the newest place counts: one request flies, one waits.
+// While a person drags, only the newest place counts: one request flies, one waits. Answers
+// that come after the drag has ended are of no use to anybody.
 export function preview(command, show, refused) {
-  waiting = command;
-  if (flying) return;
-  const send = async () => {
-    flying = true;
-    while (waiting) {
-      const next = waiting;
-      waiting = null;
-      try {
-        const answer = await ask("/api/preview", next);
-        if (waiting !== false) show(answer);
-      } catch (error) {
-        refused(error);
-      }
-    }
-    flying = false;
+  waiting = {command, show, refused, drag};
+  if (!flying) fly();
+}
+
+async function fly() {
+  flying = true;
+  while (waiting) {
+    const one = waiting;
     waiting = null;
-  };
-  send();
+    try {
+      const answer = await ask("/api/preview", one.command);
+      if (one.drag === drag) one.show(answer);
+    } catch (error) {
+      if (one.drag === drag) one.refused(error);
+    }
+  }
+  flying = false;
 }
 
 export function endPreview() {
-  waiting = flying ? false : null;
+  drag++;
+  waiting = null;
 }

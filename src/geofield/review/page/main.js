@@ -68,8 +68,8 @@ function show(answer) {
   document.title = `${state.edited ? "* " : ""}${state.name} – geofield`;
 }
 
-function showTracks(answer) {
-  maps.showTracks(answer);
+function showTracks(answer, moving = false) {
+  maps.showTracks(answer, moving);
   const f = answer.figures;
   if (f.tracks === undefined) return;
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
@@ -222,7 +222,7 @@ async function start() {
   maps.build(state, () => chosen);
   show(state);
   maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
-  tools.begin({chosen: () => chosen, row, choose, commit, showTracks, refused, scale: () => state.scale,
+  tools.begin({chosen: () => chosen, row, choose, commit, again: () => show({}), showTracks, refused, scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
   listen(ACTIONS);

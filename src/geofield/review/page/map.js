@@ -6,7 +6,7 @@ import {number} from "./web/words.js";
 const source = () => new ol.source.Vector();
 export const sources = {
   outline: source(), frame: source(), tracks: source(), gaps: source(), headland: source(),
-  turns: source(), drive: source(), obstacles: source(), handle: source(), sketch: source(),
+  turns: source(), unfit: source(), drive: source(), obstacles: source(), handle: source(), sketch: source(),
 };
 export let map, view;
 let picture, pictureFacts, places;
@@ -27,6 +27,7 @@ export function build(state, chosen) {
   add("headland", symbols.cased(state.theme.headland, 1.6));
   add("gaps", symbols.gapStyle());
   add("turns", symbols.turnStyle);
+  add("unfit", symbols.turnStyle);
   add("drive", symbols.driveStyle);
   add("outline", feature => symbols.cased(feature.get("color"), 3));
   add("frame", symbols.frameStyle());
@@ -73,13 +74,19 @@ function fill(name, features) {
   sources[name].addFeatures(features);
 }
 
-export function showTracks(answer) {
-  fill("tracks", symbols.trackFeatures(answer.tracks));
-  fill("gaps", symbols.gapFeatures(answer.gaps));
-  fill("headland", answer.headland.map(xy => symbols.line(xy)));
+// While they follow a hand, tracks are one shape: drawn many times faster than hundreds with numbers.
+export function showTracks(answer, moving = false) {
+  fill("tracks", moving ? together(ends(answer.tracks.map(row => row.slice(1)))) : symbols.trackFeatures(answer.tracks));
+  fill("gaps", together(ends(answer.gaps)));
+  fill("headland", together(answer.headland));
   fill("drive", symbols.driveFeatures(answer.drive));
-  fill("turns", answer.route.map(({line: xy, fits}) => symbols.line(xy, {fits})));
+  for (const fits of [true, false])
+    fill(fits ? "turns" : "unfit", together(answer.route.filter(turn => turn.fits === fits).map(turn => turn.line), {fits}));
 }
+
+const ends = rows => rows.map(([x0, y0, x1, y1]) => [[x0, y0], [x1, y1]]);
+const together = (lines, values = {}) =>
+  lines.length ? [new ol.Feature({geometry: new ol.geom.MultiLineString(lines), ...values})] : [];
 
 export function showOutline(field) {
   fill("outline", [new ol.Feature({geometry: symbols.closed(field.rings), color: symbols.outlineColor(field)})]);
@@ -91,8 +98,21 @@ export function showOther(rings) {
   fill("sketch", rings ? [new ol.Feature(symbols.closed(rings))] : []);
 }
 
+// A hand that drags changes the shape itself, until the edit is made or refused.
+const shapeOf = feature => `${ol.util.getUid(feature.getGeometry())} ${feature.getGeometry().getRevision()}`;
+
+// Only what is not as it was drawn before is drawn anew.
 export function showObstacles(rows) {
-  fill("obstacles", rows.map(symbols.obstacleFeature));
+  const old = sources.obstacles, left = new Set(rows.map(row => row.no));
+  for (const feature of old.getFeatures()) if (!left.has(feature.getId())) old.removeFeature(feature);
+  for (const row of rows) {
+    const text = JSON.stringify(row), before = old.getFeatureById(row.no);
+    if (before?.get("text") === text && before.get("shape") === shapeOf(before)) continue;
+    if (before) old.removeFeature(before);
+    const feature = symbols.obstacleFeature(row);
+    feature.setProperties({text, shape: shapeOf(feature)}, true);
+    old.addFeature(feature);
+  }
 }
 
 export function showHandle(row) {

@@ -8,7 +8,7 @@ let desk, active = "select", held = [];
 const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
 const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
 
-// `desk`: {chosen(), row(no), choose(no), commit(command), showTracks(answer), refused(error), measured(text), changed()}
+// `desk`: {chosen(), row(no), choose(no), commit(command), again(), showTracks(answer, moving), refused(error), measured(text), changed()}
 export function begin(given) {
   desk = given;
   maps.map.on("singleclick", event => {
@@ -36,7 +36,7 @@ export function use(name) {
   desk.changed();
 }
 
-const live = command => preview(command, desk.showTracks, desk.refused);
+const live = command => preview(command, answer => desk.showTracks(answer, true), desk.refused);
 
 function commit(command) {
   endPreview();
@@ -128,6 +128,7 @@ function mover() {
   translate.on("translateend", event => {
     const final = command(event);
     if (Math.hypot(final.dx_m, final.dy_m) > 0) commit(final);
+    else desk.again();
   });
   return translate;
 }
