@@ -119,8 +119,20 @@ def _transformer(source: str, target: str) -> Transformer:
 
 
 def transformer(source: CRS, target: CRS) -> Transformer:
-    """A transformer between two CRS; always x (easting, longitude) before y."""
-    return _transformer(source.srs, target.srs)
+    """A transformer between two CRS; always x (easting, longitude) before y.
+
+    Raises
+    ------
+    CRSError
+        PROJ cannot make one, as for a description that a damaged file gave.
+    """
+    try:
+        return _transformer(source.srs, target.srs)
+    except ProjCRSError as error:
+        raise CRSError(
+            f"Coordinates cannot be brought from {source.name[:80]!r} to {target.name[:80]!r}.",
+            hint="Is the file whole that says them? Name another system.",
+        ) from error
 
 
 def authority_name(crs: CRS) -> str:

@@ -24,6 +24,7 @@ _LOCK = "lock"
 #: A folder without a lock is another version's, or was made this moment.
 _OLD_S = 3600.0
 _PATIENCE_S = 30.0
+_SWEEPING_S = 0.5
 #: Not on Windows: there leftovers wait until they are old.
 _LOCKS = find_spec("fcntl") is not None
 
@@ -89,6 +90,24 @@ def sweep(target: Path) -> None:
             _sweep_old(staging)
         except OSError:
             continue  # locked by the living, or not ours to remove
+
+
+def is_living(staging: Path) -> bool:
+    """Whether the process that made a folder still runs; not known, and so false, on Windows."""
+    until = time.monotonic() + _SWEEPING_S
+    while True:
+        try:
+            with (staging / _LOCK).open("r+") as lock:
+                if _LOCKS and lock.read(1):
+                    _hold(lock.fileno())
+                return False
+        except BlockingIOError:
+            # Perhaps only held by one who sweeps it away.
+            if time.monotonic() > until:
+                return True
+            time.sleep(0.02)
+        except OSError:
+            return False
 
 
 def _hold(file: int) -> None:

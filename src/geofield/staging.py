@@ -8,17 +8,19 @@ are swept by the next one (see `leftovers`).
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
+import signal
 import sqlite3
-import stat
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from geofield.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.errors import FormatError, OutputExistsError
+from geofield.folders import cannot_write, made_folder
 from geofield.leftovers import MOVING, PREFIX, alive, alone, sweep
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
@@ -53,56 +55,26 @@ def staged_folder(
         program. The previous products are then as they were.
     """
     target, inputs = Path(folder), tuple(inputs)
-    made = _make_folder(target)
-    sweep(target)
-    before = _seen(target)
-    try:
-        staging = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
-    except OSError as error:
-        _remove_made(made)
-        raise cannot_write(target, error) from error
-    done = False
-    try:
-        with alive(staging):
-            work = staging / "new"
-            work.mkdir()
-            try:
-                yield work
-                with alone(target):
-                    _publish(work, target, staging, overwrite, inputs, before)
-            except OSError as error:
-                raise cannot_write(target, error) from error
-            done = True
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-        if not done:
-            _remove_made(made)
-
-
-#: Inode and time of change of files, by path.
-_Seen = dict[Path, tuple[int, int]]
-
-
-def _seen(target: Path) -> _Seen:
-    """What lies in a folder and one below, as far as it could be a product."""
-    found = {}
-    upper = _listed(target)
-    for place in (*upper, *(inner for one in upper for inner in _listed(one))):
+    with made_folder(target):
+        sweep(target)
+        refuse_claimed(target, ())
+        before = before_work(target)
         try:
-            facts = place.stat()
-        except OSError:
-            continue
-        if not place.name.startswith(PREFIX) and stat.S_ISREG(facts.st_mode):
-            found[place] = (facts.st_ino, facts.st_mtime_ns)
-    return found
-
-
-def _listed(folder: Path) -> list[Path]:
-    """What is in a folder; nothing in what is none, or has gone meanwhile."""
-    try:
-        return list(folder.iterdir())
-    except OSError:
-        return []
+            staging = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
+        except OSError as error:
+            raise cannot_write(target, error) from error
+        try:
+            with alive(staging):
+                work = staging / "new"
+                work.mkdir()
+                try:
+                    yield work
+                    with alone(target), _unstopped():
+                        _publish(work, target, staging, overwrite, inputs, before)
+                except OSError as error:
+                    raise cannot_write(target, error) from error
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 @contextmanager
@@ -121,27 +93,23 @@ def staged_file(
         yield folder / target.name
 
 
-def _make_folder(target: Path) -> list[Path]:
-    """Make a folder; returns the folders that were not there before, innermost first."""
-    made = []
-    current = target
-    while not current.exists():
-        made.append(current)
-        current = current.parent
+@contextmanager
+def _unstopped() -> Iterator[None]:
+    """Let a stop wait until the files are in place: it takes milliseconds, and none is between."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python handles signals in the main thread alone
+        return
+    came: list[int] = []
+    usual = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    for kind in usual:
+        signal.signal(kind, lambda number, _: came.append(number))
     try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        _remove_made(made)
-        raise cannot_write(target, error) from error
-    return made
-
-
-def _remove_made(made: list[Path]) -> None:
-    for folder in made:
-        try:
-            folder.rmdir()
-        except OSError:
-            return
+        yield
+    finally:
+        for kind, handler in usual.items():
+            signal.signal(kind, handler or signal.SIG_DFL)
+        if came:
+            signal.raise_signal(came[0])
 
 
 def _publish(
@@ -150,25 +118,27 @@ def _publish(
     staging: Path,
     overwrite: bool,
     inputs: Iterable[Path | str],
-    before: _Seen,
+    before: Seen,
 ) -> None:
-    old = staging / "old"
     files = sorted(path for path in work.rglob("*") if path.is_file())
     pairs = [(path, target / path.relative_to(work)) for path in files]
-    now = _seen(target)
-    for _, place in pairs:
-        if now.get(place) not in (None, before.get(place)):
-            raise OutputExistsError(
-                f"{place} was written by another program while this one worked: it is left as "
-                "it is now.",
-                hint="Repeat when the other one has finished.",
-            )
+    places = [place for _, place in pairs]
+    refuse_claimed(target, {place.relative_to(target).parts[0] for place in places})
+    refuse_changed(target, places, before)
+    for place in places:
         if not place.parent.resolve().is_relative_to(target.resolve()):
             raise FormatError(
                 f"{place.parent} is a link that leads out of {target}: nothing was written.",
                 hint="Remove the link, or write to another folder.",
             )
         _refuse(place, overwrite, inputs)
+    _move(pairs, target, staging)
+    before |= seen(target, places)  # a claim may write more than once
+
+
+def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
+    """Move all files into place, or none."""
+    old = staging / "old"
     moved: list[tuple[Path, Path | None]] = []
     (staging / MOVING).touch()
     try:
@@ -179,10 +149,10 @@ def _publish(
                 kept = old / place.relative_to(target)
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 _keep(place, kept)
-            source.replace(place)
             moved.append((place, kept))
+            source.replace(place)
     except BaseException:
-        # BaseException: an interrupt between two moves must not leave a mixture either.
+        # BaseException: nothing that comes between two moves may leave a mixture.
         for place, kept in reversed(moved):
             if kept is None:
                 place.unlink(missing_ok=True)
@@ -244,20 +214,3 @@ def refuse_locked(place: Path) -> None:
         ) from error
     except sqlite3.DatabaseError:
         return  # damaged: nothing in it to protect from being replaced
-
-
-def cannot_write(target: Path, error: OSError) -> FormatError:
-    """The error in words that a person can do something with."""
-    place = error.filename or target
-    if error.errno == errno.ENOSPC:
-        return FormatError(f"The disk is full: {place}.", hint="Free some space, then repeat.")
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return FormatError(
-            f"{target} cannot be written ({error.strerror}).",
-            hint="Choose a folder you may write to.",
-        )
-    if error.errno in (errno.EEXIST, errno.ENOTDIR):
-        return FormatError(
-            f"{target} is not a folder ({error.strerror}).", hint="Choose another --out."
-        )
-    return FormatError(f"{target}: {error.strerror or error}.")

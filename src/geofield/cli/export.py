@@ -68,6 +68,7 @@ def export(
     PLAN is a GeoPackage of geofield, or any file it can import. All products come into
     place together or not at all; what a format cannot carry is said once.
     """
+    from geofield.cli.claiming import claim_folder
     from geofield.formats import format_named, read_dataset, write_dataset
     from geofield.formats.export import unknown_option
     from geofield.formats.gpkg_read import scene_beside
@@ -76,10 +77,13 @@ def export(
     options = {key: value for key, value in given.items() if value is not None}
     options |= dict(_named(text) for text in further)
     names = [name for text in formats for name in text.split(",")]
-    unknown = unknown_option([format_named(name) for name in names], options)
+    chosen = [format_named(name) for name in names]
+    unknown = unknown_option(chosen, options)
     if unknown is not None:
         flag = f"--{unknown[0]}" if unknown[0] in given else f"--option {unknown[0]}"
         raise click.UsageError(f"No chosen format knows {flag}. {unknown[1]}")
+    products = [product.replace("{stem}", stem) for each in chosen for product in each.files]
+    claim_folder(folder, {product.partition("/")[0] for product in products})
     dataset = read_dataset(plan_file, crs=crs)
     for note in dataset.notes:
         say(note)

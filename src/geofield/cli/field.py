@@ -100,6 +100,7 @@ def field(
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.cli.claiming import claim_file
     from geofield.cli.imagery_tools import as_picture
     from geofield.pipeline import open_scene
 
@@ -109,6 +110,8 @@ def field(
         )
     if not list_regions and output is None:
         raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
+    if output is not None:
+        claim_file(output)
     with (
         progress_bar(quiet=as_json) as progress,
         as_picture(imagery, settings, lat=lat, lon=lon, progress=progress) as picture,

@@ -48,12 +48,14 @@ def import_(
     names (boundary, trees), their columns, and what lies in what decide. What was taken as what
     is said on stderr.
     """
+    from geofield.cli.claiming import claim_file
     from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged
 
     if output.suffix.lower() != ".gpkg":
         raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
+    claim_file(output)
     dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
     written = write_dataset(
         dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite, inputs=files

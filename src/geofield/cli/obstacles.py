@@ -53,10 +53,12 @@ def obstacles(
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.cli.claiming import claim_file
     from geofield.pipeline import run_obstacles, scene_of_plan
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
 
+    claim_file(output)
     plan = read_plan(plan_file)
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
     save_plan(plan, output, read_from=plan_file, overwrite=overwrite)

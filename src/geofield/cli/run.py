@@ -13,7 +13,6 @@ from geofield.cli.parcels import boundary_options, own_parcel
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
-    from geofield.settings import Settings
 
 
 @click.command(
@@ -88,10 +87,12 @@ def run(
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.cli.claiming import claim_folder
     from geofield.cli.imagery_tools import as_picture
     from geofield.pipeline import plan_field
 
-    _refuse_occupied(out, settings, overwrite=overwrite)
+    claim_folder(out)
+    _refuse_occupied(out, overwrite=overwrite)
     previous = None if fresh else _previous(out)
     timings: dict[str, float] = {}
     with (
@@ -131,11 +132,12 @@ def run(
         summarise(plan, files, timings)
 
 
-def _refuse_occupied(out: Path, settings: Settings, *, overwrite: bool) -> None:
+def _refuse_occupied(out: Path, *, overwrite: bool) -> None:
     """Say at once, not after the work, that there are products already."""
     from geofield.errors import OutputExistsError
+    from geofield.leftovers import PREFIX
 
-    if not overwrite and out.is_dir() and any(out.iterdir()):
+    if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
         raise OutputExistsError(
             f"{out} is not empty.",
             hint="Choose another --out, or --overwrite: reviewed obstacles are then kept.",

@@ -100,6 +100,7 @@ def simulate(
 
     The truth has the layers field and obstacles, as `geofield evaluate` reads them.
     """
+    from geofield.cli.claiming import claim_folder
     from geofield.simulate import SimulationSettings, simulate_fields
     from geofield.staging import staged_folder
 
@@ -114,6 +115,7 @@ def simulate(
         lat=lat,
         lon=lon,
     )
+    claim_folder(out)
     rows: list[dict[str, Any]] = []
     with staged_folder(out, overwrite=overwrite) as folder, progress_bar(quiet=as_json) as progress:
         for one in simulate_fields(fields, seed, settings):

@@ -135,6 +135,7 @@ def tiles(
 
     allow = section_values({"fetch__allow": place.pop("fetch__allow")})
     settings = load_settings(settings_file, allow)
+    from geofield.cli.claiming import claim_file
     from geofield.cli.imagery_tools import (
         cache_dir_of,
         describe,
@@ -152,6 +153,8 @@ def tiles(
         missing=missing,
         acknowledged=acknowledge_terms,
     )
+    if out.parent.is_dir():  # else it is told below
+        claim_file(out)
     middle_lat, middle_lon = where.point
     found = resolve(
         source,

@@ -62,11 +62,13 @@ def tracks(
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
+    from geofield.cli.claiming import claim_file, claim_folder
     from geofield.cli.polygon_files import obstacles_of, plans_of, with_obstacles
     from geofield.errors import GeofieldError, TrackError
     from geofield.pipeline import run_tracks
     from geofield.plan_files import save_plan
 
+    (claim_file if output.suffix else claim_folder)(output)
     plans, is_plan = plans_of(file, crs=crs)
     standing = None if obstacle_file is None else obstacles_of(obstacle_file, crs=crs)
     several = len(plans) > 1

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.errors import FormatError
-from geofield.staging import cannot_write
+from geofield.folders import cannot_write
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import shapely
 from pyproj import CRS
+from pyproj.exceptions import ProjError
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["RawLayer", "layer_names", "read_foreign", "read_vector"]
 
 
+#: Of GDAL's opening a file that has no layer, of dates that are none, of systems in pieces.
+_DAMAGED = (IndexError, ValueError, ProjError)
 #: No coordinate of a metric CRS is larger.
 _FAR_M = 1e8
 
@@ -55,14 +58,13 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
                 frame = pyogrio.read_dataframe(path, layer=layer)
             except GEOSException:
                 frame = _mended(path, layer)
-    except (DataSourceError, DataLayerError, FeatureError, GeometryError, IndexError) as error:
-        # IndexError: GDAL opened the file, and there was no layer in it.
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
     except UnicodeDecodeError as error:
         raise FormatError(
             f"{path}: its text is not in the encoding it claims ({error.reason}).",
             hint="Save it as UTF-8 (a Shapefile with a .cpg file beside it).",
         ) from error
+    except (*_DAMAGED, DataSourceError, DataLayerError, FeatureError, GeometryError) as error:
+        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
     return frame

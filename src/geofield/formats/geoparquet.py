@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from pyproj import CRS
+from pyproj.exceptions import ProjError
 
 from geofield import schema
+from geofield.crs import parse_crs
 from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.arrow import arrow_table
@@ -147,9 +149,12 @@ def read(path: Path) -> Dataset:
         try:
             text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
             frame = gpd.read_parquet(file)
-        except (pa.ArrowInvalid, ValueError, OSError) as error:
-            raise FormatError(f"{file} cannot be read: {error}.", hint="Is it whole?") from error
-        if text is not None:
-            record = origin.from_json(text.decode())
+            if frame.crs is not None:  # only now is it looked at
+                parse_crs(frame.crs)
+            if text is not None:
+                record = origin.from_json(text.decode())
+        except (pa.ArrowInvalid, ValueError, OSError, ProjError) as error:
+            reason = f"{error}"[:200]
+            raise FormatError(f"{file} cannot be read: {reason}.", hint="Is it whole?") from error
         layers.append(RawLayer(file.stem, frame.drop(columns="bbox", errors="ignore")))
     return origin.restored(read_foreign(layers, path), record)

@@ -91,7 +91,8 @@ def unpacked(path: Path) -> Iterator[Path]:
                 with archive.open(entry) as source, target.open("wb") as out:
                     shutil.copyfileobj(source, out)
             yield _innermost(folder)
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError) as error:
+    # OSError: a place in the archive that is none, as a bad entry names it.
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError) as error:
         raise FormatError(f"{path} cannot be unpacked: {error}.", hint="Is it whole?") from error
 
 

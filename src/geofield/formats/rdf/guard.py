@@ -97,6 +97,8 @@ def check_xml(path: Path) -> None:
         except expat.ExpatError as error:
             reason = f"it is not well-formed XML ({expat.ErrorString(error.code)})"
             raise _refused(path, error.lineno, reason) from error
+        except (LookupError, ValueError) as error:
+            raise _refused(path, 1, f"its encoding is not known ({error})") from error
 
 
 def _refused(path: Path, line: int, reason: str) -> FormatError:

@@ -36,7 +36,8 @@ _NUMBERS = tuple(XSD + name for name in ("double", "integer", "int", "decimal", 
 def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
     """Everything in a graph that breaks a shape of its class or a class above it."""
     nodes: dict[Any, Node] = {}
-    for quad in quads:
+    # A graph is a set: what a file says a thousand times counts once.
+    for quad in dict.fromkeys(quads):
         nodes.setdefault(quad.subject, {}).setdefault(quad.predicate.value, []).append(quad.object)
     for subject, node in nodes.items():
         types = _with_parents(node.get(TYPE, ()), nodes)

@@ -1,0 +1,173 @@
+"""Claims: who works on which products of a folder, and what lay there when the work began.
+
+A work that reads a folder, thinks for a minute and then replaces what is there must be alone
+with it from its first look on: of two runs the later one would else overwrite the other's
+products, or an edit that a person saved meanwhile. A claim is a hidden folder beside the products
+whose lock the operating system takes away however the process ends (see `leftovers`): none is ever
+stale.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from geofield.errors import OutputExistsError
+from geofield.folders import cannot_write, made_folder
+from geofield.leftovers import PREFIX, alive, alone, is_living, sweep
+
+_CLAIM = "claim"
+#: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
+_LEVELS = 2
+#: Inode and time of change of files, by path from the folder.
+Seen = dict[Path, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class _Claim:
+    """What this process holds, and how it was found."""
+
+    folder: Path
+    sign: Path
+    before: Seen
+
+
+_MINE: list[_Claim] = []
+
+
+@contextmanager
+def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterator[None]:
+    """Be the only geofield that works on a folder's products until the block ends.
+
+    What the block then writes there by `staging` replaces nothing that was changed since it began.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when it is missing, and removed again when nothing comes into it.
+    names : collection of str, optional
+        Files and folders in it that are claimed; all of it when not given.
+
+    Raises
+    ------
+    OutputExistsError
+        Another process holds them.
+    """
+    target = Path(folder)
+    chosen = None if names is None else frozenset(names)
+    with ExitStack() as held:
+        held.enter_context(made_folder(target))
+        sweep(target)
+        with alone(target):
+            refuse_claimed(target, chosen)
+            try:
+                sign = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
+                held.callback(shutil.rmtree, sign, ignore_errors=True)
+                held.enter_context(alive(sign))
+                claim = _Claim(target.resolve(), sign, seen(target))
+                _write(sign, chosen)
+            except OSError as error:
+                raise cannot_write(target, error) from error
+        _MINE.append(claim)
+        held.callback(_MINE.remove, claim)
+        yield
+
+
+def refuse_claimed(folder: Path, names: Collection[str] | None) -> None:
+    """Refuse names in a folder, or all of it, that a living process has claimed.
+
+    Raises
+    ------
+    OutputExistsError
+    """
+    mine = {claim.sign for claim in _MINE}
+    for sign in folder.glob(PREFIX + "*"):
+        if sign in mine:
+            continue
+        try:
+            said = json.loads((sign / _CLAIM).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # only a staging folder
+        theirs = said["names"]
+        if not (theirs is None or names is None or set(theirs) & set(names)):
+            continue
+        if is_living(sign):
+            what = folder if theirs is None or names is None else folder / sorted(names)[0]
+            raise OutputExistsError(
+                f"Another geofield is working on {what} (process {said['process']}, since "
+                f"{time.strftime('%H:%M:%S', time.localtime(said['since']))}): left to it.",
+                hint="Repeat when it has finished, or write to another folder.",
+            )
+
+
+def before_work(folder: Path) -> Seen:
+    """What lay in a folder when this process began its work on it; now, without a claim."""
+    place = folder.resolve()
+    for claim in _MINE:
+        if claim.folder == place:
+            return claim.before
+    return seen(folder)
+
+
+def seen(target: Path, places: Iterable[Path] | None = None) -> Seen:
+    """What tells one version of the files in a folder, and one below, from another.
+
+    Parameters
+    ----------
+    target : Path
+    places : iterable of Path, optional
+        Only these files of it.
+    """
+    if places is None:
+        upper = [place for place in _listed(target) if not place.name.startswith(PREFIX)]
+        places = (*upper, *(inner for one in upper for inner in _listed(one)))
+    found = {}
+    for place in places:
+        try:
+            facts = place.stat()
+        except OSError:
+            continue
+        if stat.S_ISREG(facts.st_mode):
+            found[place.relative_to(target)] = (facts.st_ino, facts.st_mtime_ns)
+    return found
+
+
+def refuse_changed(target: Path, places: Iterable[Path], before: Seen) -> None:
+    """Refuse to replace files that came or changed since a work began.
+
+    Raises
+    ------
+    OutputExistsError
+    """
+    for inside, facts in seen(target, places).items():
+        if len(inside.parts) <= _LEVELS and facts != before.get(inside):
+            raise OutputExistsError(
+                f"{target / inside} was written by another program while this one worked: it is "
+                "left as it is now.",
+                hint="Repeat when the other one has finished.",
+            )
+
+
+def _listed(folder: Path) -> list[Path]:
+    """What is in a folder; nothing in what is none, or has gone meanwhile."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _write(sign: Path, names: frozenset[str] | None) -> None:
+    said = {
+        "names": None if names is None else sorted(names),
+        "process": os.getpid(),
+        "since": time.time(),
+    }
+    (sign / _CLAIM).write_text(json.dumps(said), encoding="utf-8")

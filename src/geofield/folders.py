@@ -1,0 +1,55 @@
+"""Folders of products: made when they are missing, and why they cannot be written."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from geofield.errors import FormatError
+
+
+@contextmanager
+def made_folder(target: Path) -> Iterator[None]:
+    """Make a folder for as long as it takes; gone again, as its parents made, when it stays empty.
+
+    Raises
+    ------
+    FormatError
+        It cannot be made.
+    """
+    made = []
+    current = target
+    while not current.exists():
+        made.append(current)
+        current = current.parent
+    try:
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(target, error) from error
+        yield
+    finally:
+        for folder in made:
+            try:
+                folder.rmdir()
+            except OSError:
+                break  # something is in it
+
+
+def cannot_write(target: Path, error: OSError) -> FormatError:
+    """Why a folder takes no products, in words."""
+    place = error.filename or target
+    if error.errno == errno.ENOSPC:
+        return FormatError(f"The disk is full: {place}.", hint="Free some space, then repeat.")
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return FormatError(
+            f"{target} cannot be written ({error.strerror}).",
+            hint="Choose a folder you may write to.",
+        )
+    if error.errno in (errno.EEXIST, errno.ENOTDIR):
+        return FormatError(
+            f"{target} is not a folder ({error.strerror}).", hint="Choose another --out."
+        )
+    return FormatError(f"{target}: {error.strerror or error}.")
