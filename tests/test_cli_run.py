@@ -308,7 +308,7 @@ def test_doctor_reports_versions(capsys: pytest.CaptureFixture[str]) -> None:
 def test_simulate_writes_pictures_and_truth(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    args = ["simulate", "--fields", 2, "--seed", 4, "--size", 160, "--obstacles", 3, "--out"]
+    args = ["simulate", "--fields", 2, "--seed", 4, "--size", 160, "--trees", 3, "--out"]
     assert geofield(*args, tmp_path / "sim", "--json") == 0
     rows = json.loads(capsys.readouterr().out)
     assert len(rows) == 2

@@ -136,7 +136,7 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
     truth.to_crs(4326).to_file(tmp_path / "truth.geojson")
     arguments = [str(tmp_path / "found.gpkg"), str(tmp_path / "truth.geojson")]
     with pytest.raises(SystemExit, match="0"):
-        main(["evaluate", *arguments, "--json", "--picture", str(tmp_path / "hits.png")])
+        main(["evaluate", *arguments, "--json", "--draw", str(tmp_path / "hits.png")])
     out = capsys.readouterr().out
     assert '"hits": 1' in out
     with Image.open(tmp_path / "hits.png") as picture:

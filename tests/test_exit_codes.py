@@ -147,8 +147,8 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     ),
     "doctor": (("doctor --json",), (), ("doctor please",)),
     "simulate": (
-        ("simulate --size 96 --obstacles 1 --out sim",),
-        ("simulate --size 96 --obstacles 1 --out sim",),
+        ("simulate --size 96 --trees 1 --out sim",),
+        ("simulate --size 96 --trees 1 --out sim",),
         ("simulate", "simulate --fields 0 --out new"),
     ),
 }

@@ -157,3 +157,61 @@ def test_settings_and_stages_agree_on_defaults() -> None:
         assert len(shared) > 5
         own = {name: None if value == "none" else value for name, value in own.items()}
         assert {n: own[n] for n in shared} == {n: given[n].default for n in shared}
+
+
+MACHINES = """
+[machines.sprayer]
+width_m = 12
+overlap_m = 0.5
+turning_radius_m = 6
+overhang_m = 0.25
+[machines.mower]
+width_m = 3
+[tracks]
+spacing_m = 2.5
+turning_radius_m = 9
+"""
+
+
+def test_a_machine_says_width_turning_radius_and_clearance() -> None:
+    Path("geofield.toml").write_text(MACHINES)
+    assert load_settings().tracks.spacing_m == 2.5
+    tracks = load_settings(None, {"tracks": {"machine": "sprayer"}}).tracks
+    assert (tracks.spacing_m, tracks.turning_radius_m, tracks.clearance_m) == (11.5, 6.0, 6.25)
+    # What is said beside the machine wins over it.
+    tracks = load_settings(None, {"tracks": {"machine": "sprayer", "spacing_m": 10}}).tracks
+    assert (tracks.spacing_m, tracks.width_m, tracks.overlap_m) == (10.0, 12.0, None)
+    # Of another machine nothing stays.
+    settings = with_values(load_settings(), machine="sprayer", headland_passes=2)
+    assert settings.tracks.headland_m == 23.0
+    changed = with_values(settings, machine="mower").tracks
+    assert (changed.spacing_m, changed.turning_radius_m, changed.headland_m) == (3.0, None, 6.0)
+    assert from_mapping({"tracks": changed.model_dump()}).tracks == changed
+    assert with_values(None, machine={"width_m": 4}).tracks.spacing_m == 4.0
+
+
+def test_the_width_of_a_later_source_wins_over_an_earlier_spacing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Path("geofield.toml").write_text("[tracks]\nspacing_m = 2.5\n")
+    assert load_settings(None, {"tracks": {"width_m": 6}}).tracks.spacing_m == 6.0
+    monkeypatch.setenv("GEOFIELD_TRACKS__WIDTH_M", "8")
+    assert load_settings(None, {"tracks": {"overlap_m": 1}}).tracks.spacing_m == 7.0
+    assert load_settings(None, {"tracks": {"spacing_m": 5}}).tracks.spacing_m == 5.0
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"machine": "spayer"}, "no machine 'spayer'. Did you mean 'sprayer'"),
+        ({"overlap_m": 1}, "overlap needs the working width"),
+        ({"width_m": 2, "overlap_m": 2}, "overlap is not smaller"),
+    ],
+)
+def test_wrong_machines_are_named(said: dict[str, Any], message: str) -> None:
+    Path("geofield.toml").write_text(MACHINES)
+    with pytest.raises(SettingsError, match=message):
+        load_settings(None, {"tracks": said})
+    Path("geofield.toml").write_text("[machines.sprayer]\nwidht_m = 3\n")
+    with pytest.raises(SettingsError, match="Did you mean 'width_m'"):
+        load_settings()

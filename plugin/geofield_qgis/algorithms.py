@@ -206,7 +206,7 @@ class ImageryAlgorithm(GeofieldAlgorithm):
     """The picture of a place from any source."""
 
     identifier, title, section, command = "imagery", "Get imagery", STAGES, "tiles"
-    own = GeofieldAlgorithm.own | {"source", "lat", "lon", "area", "out"}
+    own = GeofieldAlgorithm.own | {"source", "lat", "lon", "area", "output"}
 
     def add_inputs(self) -> None:
         """Source, place and GeoTIFF."""
@@ -353,7 +353,7 @@ class EvaluateAlgorithm(GeofieldAlgorithm):
         words += ["--layer", "detected", "--json"]
         picture = self.parameterAsString(values, "PICTURE", context)
         if picture:
-            words += ["--picture", picture]
+            words += ["--draw", picture]
         scene = self.parameterAsRasterLayer(values, "SCENE", context)
         if scene is not None:
             words += ["--scene", sources.imagery(scene)[0]]

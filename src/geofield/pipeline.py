@@ -17,7 +17,14 @@ import numpy as np
 import shapely
 from pyproj import Geod
 
-from geofield.crs import LONLAT, transformer
+from geofield.earlier import (
+    holds,
+    keeps_outline,
+    outline_changed,
+    points_said,
+    refuse_to_forget,
+    with_points,
+)
 from geofield.errors import FieldError, GeofieldError, TrackError
 from geofield.model.evidence import Evidence
 from geofield.model.field import Field
@@ -45,6 +52,7 @@ def plan_field(
     boundary: Field | None = None,
     progress: Progress | None = None,
     timings_s: MutableMapping[str, float] | None = None,
+    name: str | None = None,
     **by_name: Any,
 ) -> Plan:
     """Run all four stages.
@@ -65,8 +73,11 @@ def plan_field(
         Called with (done, total, what) at each stage.
     timings_s : mutable mapping, optional
         Filled with the seconds of each stage.
+    name : str, optional
+        Of the field; its earlier plan's, or its place, when not given.
     **by_name
-        Any setting by its own name, over those of `settings`: ``spacing_m=6``.
+        Any setting by its own name, over those of `settings`: ``spacing_m=6``; ``machine`` may
+        be one of the settings, a `Machine` or a mapping such as ``{"width_m": 12}``.
 
     Returns
     -------
@@ -88,6 +99,7 @@ def plan_field(
             previous=previous,
             boundary=boundary,
             window=picture,
+            name=name,
         )
         picture = plan.scene or picture
     with _timed("obstacles", timings, tell):
@@ -126,6 +138,7 @@ def run_field(
     boundary: Field | None = None,
     window: Scene | None = None,
     choose: int | None = None,
+    name: str | None = None,
 ) -> Plan:
     """Stage 2: find the outline, unless a person drew it.
 
@@ -146,17 +159,19 @@ def run_field(
         The picture around the point, where it was read from the path already.
     choose : int, optional
         Take this one of the field's alternatives, by a person's word.
+    name : str, optional
+        Of the field.
     """
     if isinstance(picture, Scene):
         scene = picture
     else:
         scene = open_scene(picture, lat, lon, settings) if window is None else window
-    if previous is not None and not _holds(previous, lat=lat, lon=lon):
-        _refuse_to_forget(previous, lat, lon)
+    if previous is not None and not holds(previous, lat=lat, lon=lon):
+        refuse_to_forget(previous, lat, lon)
         previous = None
-    told = set() if previous is None else _points(previous.settings)
-    said = bool(_points(settings) - told)
-    settings = _with_points(settings, previous)
+    told = set() if previous is None else points_said(previous.settings)
+    said = bool(points_said(settings) - told)
+    settings = with_points(settings, previous)
     if previous is not None and boundary is None and choose and previous.field.alternatives:
         field = previous.field.choose(choose)
     elif (
@@ -189,6 +204,8 @@ def run_field(
             # The same field, found again: its names are the user's to keep.
             known = previous.field
             field = replace(field, field_id=known.field_id, name=known.name, own=known.own)
+    if name:
+        field = replace(field, name=name)
     obstacles = written = None
     if previous is not None and previous.obstacles is not None:
         obstacles, written = reconcile(previous.obstacles, previous.evidence.written, scene.grid)
@@ -202,7 +219,7 @@ def run_field(
         grid=scene.grid,
         evidence=Evidence((lat, lon), outline_digest(field), written=written),
         scene=scene,
-        changes=() if previous is None else (_outline_changed(previous, field),),
+        changes=() if previous is None else (outline_changed(previous, field),),
     )
 
 
@@ -234,26 +251,6 @@ def _find(
     return grow_field(
         read, lat=lat, lon=lon, size_m=size_m, largest_m=max(6400.0, size_m), **options
     )
-
-
-def _with_points(settings: Settings, previous: Plan | None) -> Settings:
-    """Settings with the points that an earlier plan of the field was told, too."""
-    if previous is None or previous.settings is None:
-        return settings
-    old, new = previous.settings.field, settings.field
-    # The last word on a place counts.
-    include = [one for one in old.include if one not in (*new.include, *new.exclude)]
-    exclude = [one for one in old.exclude if one not in (*new.include, *new.exclude)]
-    points = {"include": (*include, *new.include), "exclude": (*exclude, *new.exclude)}
-    return settings.model_copy(update={"field": new.model_copy(update=points)})
-
-
-def _points(settings: Settings | None) -> set[tuple[bool, tuple[float, float]]]:
-    """What was said of further places: whether each belongs, and where it is."""
-    if settings is None:
-        return set()
-    belong = {(True, place) for place in settings.field.include}
-    return belong | {(False, place) for place in settings.field.exclude}
 
 
 def _reach_m(lat: float, lon: float, settings: Settings) -> float:
@@ -352,44 +349,6 @@ def _refuse_too_wide(field: Field, spacing_m: float) -> None:
         raise TrackError(
             f"A spacing of {spacing_m:g} m is larger than the field ({longest_m:.0f} m long).",
             hint="Give the distance between two tracks in metres, for instance --spacing 3.",
-        )
-
-
-def keeps_outline(previous: Plan) -> bool:
-    """Whether an earlier plan's outline is a person's word."""
-    return previous.outline_edited or previous.field.method in ("drawn", "boundary", "chosen")
-
-
-def _outline_changed(previous: Plan, field: Field) -> str:
-    """What became of an earlier plan's outline, in words."""
-    if keeps_outline(previous) and field.method in ("drawn", previous.field.method):
-        return "your outline kept"
-    if previous.field.crs != field.crs:
-        return "outline found anew"
-    before, after = previous.field.polygon, field.polygon
-    other = before.symmetric_difference(after).area / before.union(after).area
-    return "outline as before" if other < 1e-9 else f"outline other by {other:.1%} of its area"
-
-
-def _holds(previous: Plan, *, lat: float, lon: float) -> bool:
-    """Whether an earlier plan is of the field at a point."""
-    x, y = transformer(LONLAT, previous.field.crs).transform(lon, lat)
-    return bool(shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)))
-
-
-def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
-    """Another field's plan may be replaced, but not a person's work on it."""
-    reviewed = 0
-    if previous.obstacles is not None:
-        _, written = reconcile(previous.obstacles, previous.evidence.written)
-        reviewed = sum(row.kept for row in written.rows) + len(written.removed)
-    if reviewed or keeps_outline(previous):
-        work = [f"{reviewed} reviewed obstacles"] if reviewed else []
-        work += ["an outline drawn by hand"] if keeps_outline(previous) else []
-        raise FieldError(
-            f"The earlier plan there is of another field ({previous.field.name}; lat {lat}, lon "
-            f"{lon} lies outside it) and holds {' and '.join(work)}.",
-            hint="Choose another folder, or --fresh to forget that work.",
         )
 
 

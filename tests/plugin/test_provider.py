@@ -74,7 +74,7 @@ def test_algorithms_have_all_that_a_dialogue_shows(known):
         assert len(algorithm["help"]) > 100, name
     parameters = known["algorithms"]["geofield:plan"]["parameters"]
     usual = [name for name, (_, advanced, _) in parameters.items() if not advanced]
-    assert usual[:4] == ["IMAGERY", "POINT", "OUTPUT", "SIZE_M"]
+    assert usual[:4] == ["IMAGERY", "POINT", "OUTPUT", "NAME"]
     assert parameters["EDGE_METHOD"][1]  # the study's own settings are advanced
     assert parameters["START_LONLAT"][0] == "point"
     assert parameters["SPACING_M"][2] == "Distance between tracks, metres."

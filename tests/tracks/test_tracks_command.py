@@ -129,3 +129,28 @@ def test_ever_more_edges_do_not_make_ever_more_directions() -> None:
     reach = 400.0 + np.where(np.arange(4000) % 2, 5.0, -5.0)
     saw = shapely.Polygon(np.column_stack((reach * np.cos(angle), reach * np.sin(angle))))
     assert len(candidate_angles(saw)) <= 600
+
+
+def test_a_machine_of_the_settings_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("geofield.toml").write_text(
+        "[machines.drill]\nwidth_m = 6\noverlap_m = 0.5\nturning_radius_m = 4\n"
+    )
+    outlines(1).to_file("parcel.shp")
+    gpd.GeoDataFrame(
+        {"radius_m": [2.0]}, geometry=gpd.points_from_xy([500100], [5600040]), crs=CRS
+    ).to_file("tree.shp")
+    report = run(
+        "parcel.shp", "--obstacles", "tree.shp", "--machine", "drill", "--headland-passes", "2",
+        "--route", "skip", "-o", "plan.gpkg",
+    )  # fmt: skip
+    (row,) = report["fields"]  # type: ignore[misc]
+    assert row["spacing_m"] == 5.5
+    headland = pyogrio.read_dataframe("plan.gpkg", layer="headland")
+    assert headland["width_m"].tolist() == [11.0]
+    assert len(pyogrio.read_dataframe("plan.gpkg", layer="headland_tracks")) == 2
+    # Half the width is kept from the tree, metre for metre on the ground.
+    segments = pyogrio.read_dataframe("plan.gpkg", layer="segments")
+    tree = shapely.Point(500100, 5600040)
+    nearest_m = segments.distance(tree).min() / 0.9996
+    assert nearest_m >= 5.0 - 1e-3

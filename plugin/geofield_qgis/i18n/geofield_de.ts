@@ -755,6 +755,36 @@
     </message>
     <message>
       <location filename="description.py" />
+      <source>Machine</source>
+      <translation>Maschine</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Machine of the settings file, [machines.NAME]: its width, turning radius, overhang and offset.</source>
+      <translation>Maschine aus der Einstellungsdatei, [machines.NAME]: ihre Breite, ihr Wenderadius, Überhang und Versatz.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Width (m)</source>
+      <translation>Breite (m)</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Working width, metres; without a spacing, that is this less the overlap.</source>
+      <translation>Arbeitsbreite, Meter; ohne Abstand ist dieser sie weniger der Überlappung.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Overlap (m)</source>
+      <translation>Überlappung (m)</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>How far neighbouring passes overlap, metres; below 0 a gap between them.</source>
+      <translation>Wie weit benachbarte Überfahrten einander überlappen, Meter; unter 0 eine Lücke dazwischen.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
       <source>Spacing (m)</source>
       <translation>Spurabstand (m)</translation>
     </message>
@@ -810,8 +840,8 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Of the first track from its edge, metres; half the spacing by default.</source>
-      <translation>Abstand der ersten Spur vom Rand, Meter; sonst der halbe Spurabstand.</translation>
+      <source>Of the first track from its edge, metres; half the working width, or half the spacing, by default.</source>
+      <translation>Abstand der ersten Spur vom Rand, Meter; sonst die halbe Arbeitsbreite oder der halbe Spurabstand.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -832,6 +862,16 @@
       <location filename="description.json" />
       <source>Width of the headland along the border, metres.</source>
       <translation>Breite des Vorgewendes, Meter.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Headland passes</source>
+      <translation>Überfahrten im Vorgewende</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Width of the headland in passes of one spacing, instead of metres.</source>
+      <translation>Breite des Vorgewendes in Überfahrten von einem Spurabstand, statt in Metern.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1087,6 +1127,16 @@
       <location filename="description.json" />
       <source>You have permission to derive geodata, though the source's terms forbid it.</source>
       <translation>Sie haben die Erlaubnis, Geodaten abzuleiten, obwohl die Bedingungen der Quelle es verbieten.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Name</source>
+      <translation>Name</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The field's name; its place when not given.</source>
+      <translation>Name des Schlags; ohne Angabe sein Ort.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1487,11 +1537,6 @@
       <location filename="description.json" />
       <source>GeoPackage to write.</source>
       <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.py" />
-      <source>Name</source>
-      <translation>Name</translation>
     </message>
     <message>
       <location filename="description.json" />

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.command(
     epilog="""\b
 Example (on the project's own sample):
-  geofield evaluate detected.gpkg truth.gpkg --distance 6 --picture hits.png --scene scene.tif
+  geofield evaluate detected.gpkg truth.gpkg --distance 6 --draw hits.png --scene scene.tif
 """
 )
 @click.argument("detected", type=click.Path(exists=True, dir_okay=False, path_type=Path))
@@ -39,7 +39,8 @@ Example (on the project's own sample):
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
 @click.option(
-    "--picture",
+    "--draw",
+    "picture",
     type=click.Path(dir_okay=False, path_type=Path),
     help="PNG to write: hits, misses and false detections.",
 )

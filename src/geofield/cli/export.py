@@ -32,7 +32,7 @@ Examples:
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the products.",
 )
-@click.option("--name", "stem", default="field", show_default=True, help="Name of single files.")
+@click.option("--stem", default="field", show_default=True, help="Name of single files.")
 @click.option("--crs", help="CRS of PLAN where the file does not say it, e.g. EPSG:32633.")
 @click.option("--customer", help="Customer's name, for terminals.")
 @click.option("--farm", help="Farm's name, for terminals.")

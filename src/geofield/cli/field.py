@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
-from geofield.cli.options import point_options, section_options, section_values, settings_option
+from geofield.cli.grouped import GroupedCommand
+from geofield.cli.options import (
+    name_option,
+    point_options,
+    section_options,
+    section_values,
+    settings_option,
+)
 from geofield.cli.parcels import boundary_options, own_parcel
 
 if TYPE_CHECKING:
@@ -17,6 +24,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=GroupedCommand,
     epilog="""\b
 Examples (on the project's own sample):
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 -o field.gpkg
@@ -26,7 +34,7 @@ Examples (on the project's own sample):
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
       --include-lonlat 33.5305,35.0753 --exclude-lonlat 33.5325,35.0743 \\
       --alternatives -o field.gpkg --overwrite
-"""
+""",
 )
 @click.argument("imagery", type=click.Path(path_type=str))
 @point_options
@@ -66,6 +74,7 @@ Examples (on the project's own sample):
     type=click.IntRange(1, 3),
     help="Take this outline of the alternatives: your word, kept on every later run.",
 )
+@name_option
 @boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @settings_option
@@ -84,6 +93,7 @@ def field(
     pictures: Path | None,
     alternatives: bool,
     choose: int | None,
+    name: str | None,
     boundary: Path | None,
     boundary_layer: str | None,
     boundary_name: str | None,
@@ -130,6 +140,7 @@ def field(
                 fresh=fresh,
                 regions=regions,
                 choose=choose,
+                name=name,
                 tell=alternatives,
                 parcel=None
                 if boundary is None
@@ -149,6 +160,7 @@ def _extract(
     fresh: bool,
     regions: tuple[int, ...],
     choose: int | None,
+    name: str | None,
     tell: bool,
     parcel: Field | None,
     as_json: bool,
@@ -174,6 +186,7 @@ def _extract(
         regions=regions,
         boundary=parcel,
         choose=choose,
+        name=name,
     )
     save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
     found = plan.field

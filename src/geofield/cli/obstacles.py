@@ -8,15 +8,17 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import section_options, section_values, settings_option
 
 
 @click.command(
+    cls=GroupedCommand,
     epilog="""\b
 Examples (on the project's own sample):
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 -o field.gpkg
   geofield obstacles sample_data/field_1.tif field.gpkg -o field.gpkg
-"""
+""",
 )
 @click.argument("imagery", type=click.Path(path_type=str))
 @click.argument(

@@ -63,6 +63,11 @@ def point_options(command: Command) -> Command:
     )(command)
 
 
+def name_option(command: Command) -> Command:
+    """Add ``--name``."""
+    return click.option("--name", help="The field's name; its place when not given.")(command)
+
+
 def settings_option(command: Command) -> Command:
     """Add ``--settings FILE``."""
     return click.option(

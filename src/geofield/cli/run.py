@@ -8,14 +8,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
-from geofield.cli.options import point_options, section_options, section_values, settings_option
+from geofield.cli.grouped import GroupedCommand
+from geofield.cli.options import (
+    name_option,
+    point_options,
+    section_options,
+    section_values,
+    settings_option,
+)
 from geofield.cli.parcels import boundary_options, own_parcel
 
 if TYPE_CHECKING:
+    from geofield.model import Tracks
     from geofield.plan import Plan
 
 
 @click.command(
+    cls=GroupedCommand,
     epilog="""\b
 Examples (on the project's own sample):
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
@@ -23,7 +32,7 @@ Examples (on the project's own sample):
       --buffer 2 --format gpkg --format geojson --overwrite
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out own/ \\
       --boundary sample_data/field_1.gpkg --boundary-layer field
-"""
+""",
 )
 @click.argument("imagery", type=click.Path(path_type=str))
 @point_options
@@ -44,6 +53,7 @@ Examples (on the project's own sample):
     is_flag=True,
     help="You have permission to derive geodata, though the source's terms forbid it.",
 )
+@name_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
 @boundary_options
 @settings_option
@@ -70,6 +80,7 @@ def run(
     overwrite: bool,
     fresh: bool,
     acknowledge_terms: bool,
+    name: str | None,
     boundary: Path | None,
     boundary_layer: str | None,
     boundary_name: str | None,
@@ -117,6 +128,7 @@ def run(
             else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
             progress=progress,
             timings_s=timings,
+            name=name,
         )
         files = plan.write(
             out,
@@ -163,16 +175,7 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
         parts = ", ".join(f"{count} {status}" for status, count in counts.items())
         say(f"Obstacles  {len(plan.obstacles)}" + (f" ({parts})" if parts else ""))
     if plan.tracks is not None:
-        segments = plan.tracks.segments
-        say(
-            f"Tracks     {len(plan.tracks.lines)} in {len(segments)} segments, "
-            f"{segments['length_m'].sum() / 1000:.2f} km, "
-            f"heading {plan.tracks.heading_deg:.1f} degrees"
-        )
-        if plan.tracks.turns is not None:
-            _say_turns(plan.tracks.turns)
-        for note in plan.tracks.notes:
-            say(f"           {note}")
+        _say_tracks(plan.tracks)
     if plan.changes:
         say(f"Changes    {'; '.join(plan.changes)}")
         say(
@@ -186,6 +189,21 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
     for name, text in (("map.png", "look at this first"), ("field.gpkg", "open this in QGIS")):
         if folder / name in files:
             say(f"           {folder / name}  ({text})")
+
+
+def _say_tracks(tracks: Tracks) -> None:
+    segments = tracks.segments
+    say(
+        f"Tracks     {len(tracks.lines)} in {len(segments)} segments, "
+        f"{segments['length_m'].sum() / 1000:.2f} km, "
+        f"heading {tracks.heading_deg:.1f} degrees"
+    )
+    if tracks.turns is not None:
+        _say_turns(tracks.turns)
+    if tracks.direction_why:
+        say(f"           {tracks.direction_why}")
+    for note in tracks.notes:
+        say(f"           {note}")
 
 
 def _say_turns(turns: Any) -> None:

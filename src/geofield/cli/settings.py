@@ -31,6 +31,10 @@ def settings(context: click.Context, as_json: bool) -> None:
     for row in rows:
         default = "" if row["default"] in (None, [], {}) else f"  [default: {row['default']}]"
         click.echo(f"{row['section']}.{row['name']}: {row['description']}{default}")
+    from geofield.settings import Machine
+
+    for name, field in Machine.model_fields.items():
+        click.echo(f"machines.NAME.{name}: {field.description}")
 
 
 def all_settings() -> list[dict[str, Any]]:

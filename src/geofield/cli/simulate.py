@@ -16,7 +16,7 @@ from geofield.simulate import CLIMATES, SimulatedField
     epilog="""\b
 Examples:
   geofield simulate --fields 51 --seed 7 --out sim/
-  geofield simulate --fields 1 --seed 3 --climate dry --obstacles 12 --out one/
+  geofield simulate --fields 1 --seed 3 --climate dry --trees 12 --out one/
 """
 )
 @click.option(
@@ -42,7 +42,8 @@ Examples:
     help="Metres per pixel.",
 )
 @click.option(
-    "--obstacles",
+    "--trees",
+    "obstacles",
     type=click.IntRange(0, 5000),
     help="Trees per field; drawn by lot when not given.",
 )

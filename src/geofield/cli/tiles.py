@@ -94,7 +94,7 @@ Examples (the first one on the project's own sample):
 )
 @click.option(
     "-o",
-    "--out",
+    "--output",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
     help="The GeoTIFF (COG) to write.",
@@ -108,7 +108,7 @@ def tiles(
     lat: float | None,
     lon: float | None,
     area: Path | None,
-    out: Path,
+    output: Path,
     layer: str,
     missing: Any,
     offline: bool,
@@ -153,8 +153,8 @@ def tiles(
         missing=missing,
         acknowledged=acknowledge_terms,
     )
-    if out.parent.is_dir():  # else it is told below
-        claim_file(out)
+    if output.parent.is_dir():  # else it is told below
+        claim_file(output)
     middle_lat, middle_lon = where.point
     found = resolve(
         source,
@@ -165,7 +165,9 @@ def tiles(
         options=options,
     )
     with progress_bar(quiet=as_json) as progress:
-        done = acquire(found, where, out, options=options, overwrite=overwrite, progress=progress)
+        done = acquire(
+            found, where, output, options=options, overwrite=overwrite, progress=progress
+        )
     if as_json:
         echo_json(where_json(done))
     else:

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
-from geofield.cli.options import section_options, section_values, settings_option
+from geofield.cli.grouped import GroupedCommand
+from geofield.cli.options import name_option, section_options, section_values, settings_option
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
 
 
 @click.command(
+    cls=GroupedCommand,
     epilog="""\b
 Examples (the first two on the project's own sample):
   geofield tracks sample_data/field_1.gpkg --spacing 4 -o tracks.gpkg
   geofield tracks sample_data/field_1.gpkg --direction 45 --headland 8 --route shortest \\
       --turning-radius 4 -o route.gpkg
   geofield tracks parcels.shp --obstacles trees.shp --clearance 1 --spacing 3 -o plans/
-"""
+""",
 )
 @click.argument("file", metavar="FILE", type=click.Path(exists=True, path_type=Path))
 @click.option(
@@ -38,6 +41,7 @@ Examples (the first two on the project's own sample):
     help="File of what to avoid: polygons, points with a radius_m, lines.",
 )
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
+@name_option
 @click.option("--overwrite", is_flag=True, help="Replace files that are there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 @settings_option
@@ -47,6 +51,7 @@ def tracks(
     output: Path,
     obstacle_file: Path | None,
     crs: str | None,
+    name: str | None,
     overwrite: bool,
     as_json: bool,
     settings_file: str | None,
@@ -72,6 +77,10 @@ def tracks(
     plans, is_plan = plans_of(file, crs=crs)
     standing = None if obstacle_file is None else obstacles_of(obstacle_file, crs=crs)
     several = len(plans) > 1
+    if name:
+        if several:
+            raise click.UsageError("--name is one field's name: the file has several.")
+        plans = [(stem, replace(one, field=replace(one.field, name=name))) for stem, one in plans]
     if several and output.suffix:
         raise TrackError(
             f"{file} holds {len(plans)} fields, and {output} is one file.",

@@ -23,6 +23,7 @@ from geofield.crs import (
 from geofield.errors import CRSError, FieldError
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, words
+from geofield.model.place import place_id
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,7 @@ class Field:
             )
         object.__setattr__(self, "polygon", shapely.force_2d(shapely.orient_polygons(self.polygon)))
         if not self.field_id:
-            object.__setattr__(self, "field_id", _place_id(self.polygon, crs))
+            object.__setattr__(self, "field_id", place_id(self.polygon, crs))
         if not self.name:
             object.__setattr__(self, "name", self.field_id)
 
@@ -212,11 +213,3 @@ class Field:
         if not holes:
             polygon = Polygon(polygon.exterior)
         return np.asarray(rasterize([(polygon, 1)], out_shape=grid.shape, dtype="uint8"), bool)
-
-
-def _place_id(polygon: Polygon, crs: CRS) -> str:
-    """An id that is the same whenever the same field is found again: its place to ~10 m."""
-    point = polygon.representative_point()
-    lon, lat = transformer(crs, LONLAT).transform(point.x, point.y)
-    north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
-    return f"{abs(lat):.4f}{north}{abs(lon):.4f}{east}"

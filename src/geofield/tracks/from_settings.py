@@ -44,14 +44,17 @@ def plan_with_settings(
     if settings.ab_lonlat is not None:
         a_b = settings.ab_lonlat
         direction = [_place(end, metric_crs, polygon, "A-B line") for end in (a_b[:2], a_b[2:])]
-    through = settings.through_lonlat
+    through, offset_m = settings.through_lonlat, settings.offset_m
+    if offset_m is None and settings.width_m and through is None and settings.ab_lonlat is None:
+        # The machine's edge runs along the border, however far passes overlap.
+        offset_m = settings.width_m / 2.0
     tracks = plan_tracks(
         polygon,
         obstacles,
         crs=metric_crs,
         spacing_m=settings.spacing_m,
         direction=direction,
-        offset_m=settings.offset_m,
+        offset_m=offset_m,
         through=None
         if through is None
         else _place(through, metric_crs, polygon, "place to pass through"),

@@ -1,0 +1,81 @@
+"""The id of a field: a position inside it, the roundest there is.
+
+Two outlines of one field share nearly all of their ground, and so nearly always the roundest
+position in it: whichever picture, year or map zone it was found in, the id is the same. Two fields
+that do not overlap share no position: they never have the same id.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pyproj import CRS
+from shapely import Polygon
+
+from geofield.crs import LONLAT, transformer
+
+#: Degrees between round positions, from the roundest on; 5e-7 is five centimetres.
+_STEPS = tuple(
+    (digits, tenths) for digits in range(8) for tenths in ((1,) if digits == 0 else (5, 2, 1))
+)
+
+
+def place_id(polygon: Polygon, crs: CRS) -> str:
+    """The roundest position inside an outline, such as ``35.075N33.531E``.
+
+    Latitude and longitude are multiples of 1 degree, else of 0.5, 0.2, 0.1, 0.05 and so on. Of
+    several positions that are equally round, the one with the roundest latitude counts, then the
+    one with the roundest longitude. Holes belong to the field here.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+    crs : CRS
+        Of the polygon.
+    """
+    whole = Polygon(polygon.exterior)
+    shapely.prepare(whole)
+    x0, y0, x1, y1 = whole.bounds
+    middle = whole.representative_point()
+    lon_0, lat_0 = transformer(crs, LONLAT).transform(middle.x, middle.y)
+    edge = np.linspace(0.0, 1.0, 9)
+    x = np.concatenate([x0 + edge * (x1 - x0)] * 2 + [np.full(9, x0), np.full(9, x1)])
+    y = np.concatenate([np.full(9, y0), np.full(9, y1)] + [y0 + edge * (y1 - y0)] * 2)
+    lons, lats = (np.asarray(each) for each in transformer(crs, LONLAT).transform(x, y))
+    # Around the field's own longitude, for those that 180 degrees runs through.
+    lons = lon_0 + (lons - lon_0 + 180.0) % 360.0 - 180.0
+    box = (lats.min(), lats.max(), lons.min(), lons.max())
+    for digits, tenths in _STEPS:
+        per_degree = 10**digits / tenths
+        found = _inside(whole, crs, per_degree, box)
+        if len(found):
+            lat, lon = min(found.tolist(), key=lambda one: (_rank(one[0]), _rank(one[1]), one))
+            return _written(lat / per_degree, lon / per_degree, digits)
+    return _written(lat_0, lon_0, 7)
+
+
+def _inside(
+    whole: Polygon, crs: CRS, per_degree: float, box: tuple[float, float, float, float]
+) -> NDArray[np.int64]:
+    """Positions of a lattice inside an outline: whole numbers of steps, latitude first."""
+    lat = np.arange(math.ceil(box[0] * per_degree), math.floor(box[1] * per_degree) + 1)
+    lon = np.arange(math.ceil(box[2] * per_degree), math.floor(box[3] * per_degree) + 1)
+    if not len(lat) or not len(lon):
+        return np.empty((0, 2), np.int64)
+    pairs = np.stack(np.meshgrid(lat, lon, indexing="ij"), axis=-1).reshape(-1, 2)
+    x, y = transformer(LONLAT, crs).transform(pairs[:, 1] / per_degree, pairs[:, 0] / per_degree)
+    return np.asarray(pairs[shapely.contains_xy(whole, x, y)], np.int64)
+
+
+def _rank(steps: int) -> int:
+    """How far from round a number of steps is: multiples of a high power of two come first."""
+    return -(steps & -steps) if steps else -(1 << 62)
+
+
+def _written(lat: float, lon: float, digits: int) -> str:
+    lon = (lon + 180.0) % 360.0 - 180.0
+    north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
+    return f"{abs(lat):.{digits}f}{north}{abs(lon):.{digits}f}{east}"

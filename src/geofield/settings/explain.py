@@ -1,0 +1,44 @@
+"""Settings that are not right, in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import get_args
+
+from pydantic import ValidationError
+
+from geofield.settings.machines import Machine
+from geofield.settings.section import nearest
+from geofield.settings.tracks import DirectionName
+from geofield.settings.whole import SECTIONS, names_of
+
+
+def explained(error: ValidationError) -> str:
+    """What is wrong with settings: each by its name, with its value and what would be right."""
+    lines = []
+    for problem in error.errors():
+        name = ".".join(str(part) for part in problem["loc"])
+        # Sources hold keys; a message must not.
+        secret = {"sources", "keys"} & set(problem["loc"])
+        whole = isinstance(problem.get("input"), Mapping)
+        given = [] if secret or whole else [f"given: {problem.get('input')!r}"]
+        message = problem["msg"].removeprefix("Value error, ")
+        near = ""
+        if problem["type"] == "extra_forbidden":
+            message = "there is no such setting"
+            section = str(problem["loc"][0])
+            within: Iterable[str] = ()
+            if section in SECTIONS and len(problem["loc"]) == 2:
+                within = names_of(section)
+            elif section == "machines":
+                within = Machine.model_fields
+            near = nearest(str(problem["loc"][-1]), within)
+        elif not whole and problem["type"] in ("literal_error", "value_error"):
+            choices = re.findall(r"'([^']+)'", message) or get_args(DirectionName)
+            near = nearest(str(problem.get("input")), choices)
+        words = "; ".join([*given, *([near.strip()] if near else [])])
+        lines.append(
+            f"{name}: {message[:1].lower()}{message[1:]}" + (f" ({words})" if words else "")
+        )
+    return "Settings are not valid: " + "; ".join(lines) + "."

@@ -1,0 +1,45 @@
+"""What is written."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from geofield.settings.section import Section
+
+#: The formats that can be written; held against the registry of formats by a test.
+FormatName = Literal[
+    "gpkg",
+    "geojson",
+    "shapefile",
+    "geoparquet",
+    "flatgeobuf",
+    "kml",
+    "gpx",
+    "csv",
+    "fiboa",
+    "dxf",
+    "isoxml",
+    "isoxml-v3",
+    "agopengps",
+    "rdf",
+    "turtle",
+    "jsonld",
+    "ntriples",
+    "rdf-study",
+    "study-xml",
+    "scene",
+    "map",
+    "report",
+    "html",
+]
+
+
+class ExportSettings(Section):
+    """What is written."""
+
+    formats: tuple[FormatName, ...] = Field(
+        ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
+    )
+    points: bool = Field(False, description="Track points in linked data, too: most of its bytes.")

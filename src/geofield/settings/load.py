@@ -1,0 +1,173 @@
+"""Where settings come from: a file, the environment, the caller; the last one wins."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError, create_model
+
+from geofield.errors import SettingsError
+from geofield.settings.explain import explained
+from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
+from geofield.settings.section import nearest
+from geofield.settings.tracks import said_over
+from geofield.settings.whole import SECTIONS, Settings, names_of
+
+
+def load_settings(
+    path: str | Path | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+) -> Settings:
+    """Settings from a TOML file, the environment and explicit values, the last one winning.
+
+    Parameters
+    ----------
+    path : path, optional
+        A TOML file with a table per section. ``geofield.toml`` in the working folder is read
+        when it exists and no path is given.
+    overrides : mapping of section to mapping, optional
+        Values that win over everything else; None values are passed over.
+
+    Raises
+    ------
+    SettingsError
+        Naming the setting, its value and what would be right.
+    """
+    known = (*SECTIONS, "machines")
+    merged: dict[str, dict[str, Any]] = {section: {} for section in known}
+    try:
+        for source in (_read_toml(path), _from_environment(), overrides or {}):
+            for section, settings in source.items():
+                if section not in known:
+                    raise SettingsError(
+                        f"Unknown section [{section}] in the settings." + nearest(section, known),
+                        hint=f"Sections: {', '.join(known)}.",
+                    )
+                if not isinstance(settings, Mapping):
+                    raise SettingsError(
+                        f"{section} is a section of the settings, not a value.",
+                        hint=f"Write [{section}] and its settings below.",
+                    )
+                said = {k: v for k, v in settings.items() if v is not None}
+                merged[section] = (
+                    _tracks_said(merged[section], said, _machines(merged, source))
+                    if section == "tracks"
+                    else merged[section] | said
+                )
+        return Settings(**merged)
+    except ValidationError as error:
+        raise SettingsError(explained(error)) from None
+
+
+def _machines(*sources: Mapping[str, Any]) -> dict[str, Machine]:
+    """The machines that sources describe, the last one winning."""
+    described: dict[str, Any] = {}
+    for source in sources:
+        described |= source.get("machines", {})
+    return Settings(machines=described).machines
+
+
+def _tracks_said(
+    earlier: Mapping[str, Any], said: Mapping[str, Any], machines: Mapping[str, Machine]
+) -> dict[str, Any]:
+    """Settings of the tracks, with what a machine that is named brings along."""
+    machine = said.get("machine")
+    if machine is None:
+        return said_over(earlier, said)
+    if isinstance(machine, str):
+        machine = machine_named(machine, machines)
+    elif isinstance(machine, Mapping):
+        machine = Machine(**machine)
+    if isinstance(machine, Machine):
+        named = said["machine"] if isinstance(said["machine"], str) else None
+        said = {**machine.track_values(), **said, "machine": named}
+    # Nothing of another machine stays.
+    earlier = {name: value for name, value in earlier.items() if name not in MACHINE_VALUES}
+    return said_over(earlier, said)
+
+
+def with_values(settings: Settings | None, **values: Any) -> Settings:
+    """Settings with some of them changed, each by its own name.
+
+    Parameters
+    ----------
+    settings : Settings or None
+        The defaults when None.
+    **values
+        Such as ``spacing_m=6, route="shortest"``. A ``machine`` is the name of one of the
+        settings, a `Machine`, or a mapping such as ``{"width_m": 12}``.
+
+    Raises
+    ------
+    SettingsError
+        Naming the setting, its value and the nearest name.
+    """
+    settings = settings or Settings()
+    changed: dict[str, dict[str, Any]] = {}
+    home = {name: section for section in SECTIONS for name in names_of(section)}
+    for name, value in values.items():
+        if name not in home:
+            raise SettingsError(f"There is no setting {name!r}.{nearest(name, home)}")
+        changed.setdefault(home[name], {})[name] = value
+    try:
+        sections = {}
+        for section, given in changed.items():
+            old = getattr(settings, section)
+            said = (
+                _tracks_said(dict(old), given, settings.machines)
+                if section == "tracks"
+                else {**dict(old), **given}
+            )
+            sections[section] = type(old)(**said)
+    except ValidationError as error:
+        raise SettingsError(explained(error)) from None
+    return settings.model_copy(update=sections)
+
+
+def from_mapping(values: Mapping[str, Any]) -> Settings:
+    """Settings as a product recorded them; names that are gone since are passed over."""
+    known: dict[str, Any] = {}
+    for section in SECTIONS[:-1]:  # what may be reached, a product does not say
+        recorded = values.get(section, {})
+        if not isinstance(recorded, Mapping):
+            raise SettingsError(f"The recorded settings are damaged: {section} is no section.")
+        fields = names_of(section)
+        known[section] = {name: recorded[name] for name in recorded if name in fields}
+    try:
+        return Settings(**known)
+    except ValidationError as error:
+        raise SettingsError(explained(error)) from None
+
+
+def _from_environment() -> dict[str, Any]:
+    """What variables such as ``GEOFIELD_TRACKS__SPACING_M`` say, by section."""
+    if not any(name.upper().startswith("GEOFIELD_") for name in os.environ):
+        return {}
+    from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
+
+    class Variables(BaseSettings):
+        """How the variables are named."""
+
+        model_config = SettingsConfigDict(env_prefix="GEOFIELD_", env_nested_delimiter="__")
+
+    sections: dict[str, Any] = {
+        name: (field.annotation, field.default) for name, field in Settings.model_fields.items()
+    }
+    # Only its parsing is used.
+    Environment = create_model("Environment", __base__=Variables, **sections)
+    return EnvSettingsSource(Environment)()
+
+
+def _read_toml(path: str | Path | None) -> dict[str, Any]:
+    file = Path(path) if path is not None else Path("geofield.toml")
+    if path is None and not file.is_file():
+        return {}
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"The settings file {file} cannot be read: {error.strerror}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SettingsError(f"The settings file {file} is not valid TOML: {error}.") from None

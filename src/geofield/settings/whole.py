@@ -1,0 +1,45 @@
+"""All settings of a run, one section per stage."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from geofield.settings.export import ExportSettings
+from geofield.settings.field import FieldSettings
+from geofield.settings.imagery import FetchSettings, ImagerySettings
+from geofield.settings.machines import Machine
+from geofield.settings.obstacles import ObstacleSettings
+from geofield.settings.section import Section
+from geofield.settings.tracks import TrackSettings
+
+
+class Settings(Section):
+    """All settings of a run. A plain value: :func:`load_settings` reads file and environment.
+
+    Examples
+    --------
+    >>> Settings(tracks={"spacing_m": 3}).tracks.spacing_m
+    3.0
+    """
+
+    imagery: ImagerySettings = ImagerySettings()
+    field: FieldSettings = FieldSettings()
+    obstacles: ObstacleSettings = ObstacleSettings()
+    tracks: TrackSettings = TrackSettings()
+    export: ExportSettings = ExportSettings()
+    # What follows from a machine stands in `tracks`, under its name.
+    machines: dict[str, Machine] = Field({}, exclude=True, repr=False)
+    # Keys live here: never written into a product.
+    fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
+
+
+SECTIONS = ("imagery", "field", "obstacles", "tracks", "export", "fetch")
+Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
+
+
+def names_of(section: str) -> tuple[str, ...]:
+    """The names of a section's settings."""
+    model: type[Section] = Settings.model_fields[section].annotation  # type: ignore[assignment]
+    return tuple(model.model_fields)
