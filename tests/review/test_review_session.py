@@ -169,8 +169,9 @@ def test_edits_come_back_after_a_kill(plan_path: Path) -> None:
     assert again.brought_back == "4 edits of a session that ended without saving were brought back."
     assert again.session.plan == desk.session.plan
     again.save()
-    assert not journal_path(plan_path).exists()
+    # Killed after saving: nothing is left to be brought back.
     assert Desk(plan_path).brought_back is None
+    assert not journal_path(plan_path).exists()
     saved = read_plan(plan_path)
     assert row(saved, 3)["status"] == "rejected"
     assert row(saved, 4)["status"] == "detected"
@@ -243,18 +244,57 @@ def test_another_outline_is_chosen(plan_path: Path) -> None:
         desk.edit({"do": "choose", "no": 9})
 
 
-def test_an_undo_after_saving_cannot_be_lost_by_a_kill(plan_path: Path) -> None:
-    """What can be undone is what the journal beside the saved file can do again."""
+def test_what_was_saved_can_be_undone_also_after_a_kill(plan_path: Path) -> None:
     desk = Desk(plan_path)
     desk.edit({"do": "status", "no": 3, "status": "rejected"})
     desk.save()
     desk.edit({"do": "status", "no": 4, "status": "confirmed"})
-    for _ in range(2):
+    desk.save()
+    desk.edit({"do": "status", "no": 5, "status": "confirmed"})
+    for _ in range(3):
         desk.edit({"do": "undo"})
+    assert row(desk.session.plan, 3)["status"] == "detected"
+    assert desk.session.edited
     again = Desk(plan_path)
+    assert str(again.brought_back).startswith("4 edits")
     assert again.session.plan == desk.session.plan
-    assert row(again.session.plan, 3)["status"] == "rejected"
-    assert row(again.session.plan, 4)["status"] == "detected"
+    assert again.session.edited
+    for _ in range(2):
+        again.edit({"do": "redo"})
+    assert not again.session.edited
+    assert again.session.plan == read_plan(plan_path)
+    again.edit({"do": "undo"})
+    again.save()
+    saved = read_plan(plan_path)
+    assert (row(saved, 3)["status"], row(saved, 4)["status"]) == ("rejected", "detected")
+    again.end()
+    assert sorted(path.name for path in plan_path.parent.iterdir()) == [
+        "field.gpkg",
+        "field.gpkg.bak",
+        "scene.tif",
+    ]
+
+
+def test_an_edit_that_the_disk_does_not_take_is_kept_and_noted_later(plan_path: Path) -> None:
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    noted = journal_path(plan_path).read_bytes()
+    journal_path(plan_path).unlink()
+    journal_path(plan_path).mkdir()
+    state = desk.edit({"do": "status", "no": 4, "status": "confirmed"})
+    assert "directory" in state["unnoted"].lower()
+    statuses = {each["no"]: each["status"] for each in state["obstacles"]}
+    assert (statuses[3], statuses[4]) == ("rejected", "confirmed")
+    with pytest.raises(GeofieldError, match="would be lost"):
+        desk.reload()
+    journal_path(plan_path).rmdir()
+    journal_path(plan_path).write_bytes(
+        noted + b'{"do": "st'
+    )  # half of a line, as a full disk leaves
+    assert desk.edit({"do": "status", "no": 5, "status": "confirmed"})["unnoted"] is None
+    again = Desk(plan_path)
+    assert str(again.brought_back).startswith("3 edits")
+    assert again.session.plan == desk.session.plan
 
 
 def test_edits_are_saved_elsewhere_while_another_program_holds_the_file(plan_path: Path) -> None:

@@ -79,8 +79,8 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
         say("Ended.")
     finally:
         server.server_close()
-    for journal in shelf.unsaved():
-        say(f"Edits that were not saved lie in {journal}; the next session has them.")
+    for words in shelf.end():
+        say(words)
 
 
 def _shelf(plan_file: Path, picture: Path | None) -> Shelf:

@@ -7,7 +7,8 @@ in words why something was refused, and nothing has changed then.
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +48,10 @@ class Desk:
 
     def _read(self) -> None:
         self.seen = fingerprint(self.path)
-        plan = read_plan(self.path)
+        self.journal = Journal(self.path)
+        plan = read_plan(self.journal.begins_at)
         ground = None if self._picture_path is None else Ground(self._scene_of)
         self.session = Session(plan, ground)
-        self.journal = Journal(self.path)
         self.brought_back = self.journal.replay(self.session)
         self.picture = (
             None
@@ -66,7 +67,7 @@ class Desk:
             plan = self.session.plan
             bounds = self._bounds(plan)
             return {
-                **state_of(self.session),
+                **self._state(),
                 "file": self.path.name,
                 "brought_back": self.brought_back,
                 "bounds": bounds,
@@ -83,14 +84,8 @@ class Desk:
             before = self.session.step
             play(self.session, command)
             if self.session.step is not before:
-                try:
-                    self.journal.write(command)
-                except OSError as error:
-                    raise FormatError(
-                        f"The edit is made, but could not be noted on the disk: {error.strerror}.",
-                        hint="Save to another place before you go on.",
-                    ) from error
-            return state_of(self.session)
+                self.journal.write(command)
+            return self._state()
 
     def preview(self, command: Command) -> dict[str, Any]:
         """The tracks that an edit would lead to."""
@@ -113,8 +108,9 @@ class Desk:
             if target is not None:
                 # Whatever other programs do to the plan's own file, this one comes into being.
                 place = self._beside(target)
-                save_plan(step.plan, place, picture=self._picture_path)
-                return {**state_of(self.session), "saved_as": place.name}
+                with _in_words(place):
+                    save_plan(step.plan, place, picture=self._picture_path)
+                return {**self._state(), "saved_as": place.name}
             if fingerprint(self.path) != self.seen:
                 raise ChangedError(
                     f"Another program changed {self.path.name} since it was opened here.",
@@ -122,15 +118,27 @@ class Desk:
                     "edits under another name.",
                 )
             refuse_locked(self.path)
-            save_plan(step.plan, self.path, read_from=self.path)
-            self.journal.clear()
+            with _in_words(self.path):
+                self.journal.before_saving()
+                save_plan(step.plan, self.path, read_from=self.path)
             self.seen = fingerprint(self.path)
             self.session.mark_saved(step)
-            return {**state_of(self.session), "saved_as": self.path.name}
+            self.journal.saved()
+            if self.journal.refused:
+                # What led here is noted nowhere: a kill must not bring back half of it.
+                self.journal.clear()
+                self.session.forget()
+            return {**self._state(), "saved_as": self.path.name}
 
     def reload(self) -> dict[str, Any]:
         """Read the file again; edits that were not saved are kept beside it."""
         with self.lock:
+            if self.journal.refused:
+                raise FormatError(
+                    f"Edits could not be noted on the disk ({self.journal.refused}) and would be "
+                    "lost.",
+                    hint="Save them, here or under another name.",
+                )
             self._read()
             return self.opening()
 
@@ -150,7 +158,20 @@ class Desk:
         """The picture around the field, as the plan's own run read it."""
         return scene_of_plan(str(self._picture_path), plan, plan.settings or Settings())
 
+    def end(self) -> str | None:
+        """Leave nothing behind but edits that were not saved; where those are, in words."""
+        if not self.session.edited:
+            self.journal.clear()
+            return None
+        self.journal.flush()
+        if self.journal.refused:
+            return f"Edits of {self.path} are lost: {self.journal.refused}."
+        return f"Edits that were not saved lie in {self.journal.path}; the next session has them."
+
     # -- inner -------------------------------------------------------------------------------
+
+    def _state(self) -> dict[str, Any]:
+        return {**state_of(self.session), "unnoted": self.journal.refused}
 
     def _beside(self, name: str) -> Path:
         """A new file in the plan's folder: the page names no other folder."""
@@ -176,6 +197,18 @@ class Desk:
                 text for text in (source.attribution, source.licence, source.date) if text
             ),
         }
+
+
+@contextmanager
+def _in_words(path: Path) -> Iterator[None]:
+    """What the disk has against writing a file, in words."""
+    try:
+        yield
+    except OSError as error:
+        raise FormatError(
+            f"{path.name} could not be written: {error.strerror or error}.",
+            hint="The edits are kept; make room, or save under another name.",
+        ) from error
 
 
 def _formats() -> list[tuple[str, str]]:

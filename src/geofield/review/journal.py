@@ -1,8 +1,8 @@
 """The journal: every edit is on the disk before the page hears of it.
 
 A text file beside the plan, a JSON value per line: first which file it belongs to, then what was
-done. When the program is killed, the next session makes the same edits again; when the
-plan is saved, the journal goes.
+done, and when that was saved. When the program is killed, the next session does the same again. A
+session that saved can still undo what came before: the plan as it was opened is kept until the end.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ SUFFIX = ".review.jsonl"
 
 
 def journal_path(plan_path: Path) -> Path:
-    """Where the edits of a plan are kept until they are saved."""
+    """Where the edits of a plan are kept until the session ends with all saved."""
     return plan_path.with_name(plan_path.name + SUFFIX)
 
 
@@ -42,60 +43,132 @@ class Journal:
     def __init__(self, plan_path: Path) -> None:
         self.plan_path = plan_path
         self.path = journal_path(plan_path)
-        self._started = False
+        #: The plan as it was when the journal began; there only where that was saved over.
+        self.opened = plan_path.with_name(f".{plan_path.stem}.review-opened.gpkg")
+        self.refused: str | None = None
+        self._size = 0
+        self._waiting: list[Mapping[str, Any]] = []
+        self._plan = fingerprint(plan_path)
+        self._lost: str | None = None
+        self._entries = self._read()
+
+    @property
+    def begins_at(self) -> Path:
+        """The file that the journal's first edit was made on."""
+        saved = any("saved" in entry for entry, _ in self._entries)
+        return self.opened if saved else self.plan_path
 
     def replay(self, session: Session) -> str | None:
         """Make the edits of a session that ended without saving again.
+
+        Parameters
+        ----------
+        session : Session
+            On the plan in :attr:`begins_at`.
 
         Returns
         -------
         str or None
             What was brought back, or why it was not, in words.
         """
-        if not self.path.exists():
-            return None
-        lines = self.path.read_text(encoding="utf-8").splitlines()
-        entries = [entry for line in lines if (entry := _parsed(line)) is not None]
-        if not entries or entries[0].get("sha256") != fingerprint(self.plan_path):
-            kept = self._set_aside()
-            return (
-                "Edits of an earlier session belong to another version of this file and were "
-                f"not made again; they are kept in {kept.name}."
-            )
-        done = 0
-        for entry in entries[1:]:
+        told, self._lost = self._lost, None
+        unsaved = done = 0
+        for entry, end in self._entries[1:]:
+            if "saved" in entry:
+                session.mark_saved(session.step)
+                unsaved = 0
+                continue
             try:
                 play(session, entry)
             except GeofieldError as error:
-                kept = self._set_aside()
+                kept = self._copy()
                 return f"{done} edits were brought back; then: {error} All are in {kept.name}."
-            done += 1
-        self._started = True
-        return f"{done} edits of a session that ended without saving were brought back."
+            self._size = end
+            done, unsaved = done + 1, unsaved + 1
+        if unsaved:
+            return f"{unsaved} edits of a session that ended without saving were brought back."
+        return told
 
     def write(self, entry: Mapping[str, Any]) -> None:
-        """Append what was done, and wait until the disk has it."""
-        new = not self._started
-        with self.path.open("w" if new else "a", encoding="utf-8") as file:
-            if new:
-                json.dump({"sha256": fingerprint(self.plan_path)}, file)
-                file.write("\n")
-            json.dump(dict(entry), file)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        self._started = True
+        """Append what was done, and wait until the disk has it.
+
+        What the disk does not take waits for the next time, and :attr:`refused` says why.
+        """
+        if not self._size and not self._waiting:
+            self._waiting = [{"sha256": self._plan}]
+        self._waiting.append(dict(entry))
+        self.flush()
+
+    def flush(self) -> None:
+        """Write what waits, if anything does."""
+        if not self._waiting:
+            return
+        lines = "".join(json.dumps(each) + "\n" for each in self._waiting)
+        try:
+            with self.path.open("r+b" if self._size else "wb") as file:
+                # A line that was written by half, now or before a kill, is written anew.
+                file.truncate(self._size)
+                file.seek(self._size)
+                file.write(lines.encode())
+                file.flush()
+                os.fsync(file.fileno())
+                size = file.tell()
+        except OSError as error:
+            self.refused = error.strerror or str(error)
+            return
+        self._size, self._waiting, self.refused = size, [], None
+
+    def before_saving(self) -> None:
+        """Keep the plan as it was opened, so that what was done on it can be undone."""
+        if self._size and not self.opened.exists():
+            shutil.copyfile(self.plan_path, self.opened)
+
+    def saved(self) -> None:
+        """The edits so far lie in the plan now."""
+        self._plan = fingerprint(self.plan_path)
+        if self._size or self._waiting:
+            self.write({"saved": self._plan})
 
     def clear(self) -> None:
-        """The edits lie in the plan now."""
-        self.path.unlink(missing_ok=True)
-        self._started = False
+        """Nothing is left that another session would need."""
+        for path in (self.path, self.opened):
+            if path.is_file():  # a folder that takes no notes may refuse to forget any, too
+                path.unlink()
+        self._size, self._waiting, self._entries, self.refused = 0, [], [], None
 
-    def _set_aside(self) -> Path:
+    def _read(self) -> list[tuple[dict[str, Any], int]]:
+        """The entries of an earlier session; none where they are not of this file, or all saved."""
+        if not self.path.exists():
+            self.clear()
+            return []
+        entries: list[tuple[dict[str, Any], int]] = []
+        for line in self.path.read_bytes().splitlines(keepends=True):
+            entry = _parsed(line)
+            if entry is None:
+                break
+            self._size += len(line)
+            entries.append((entry, self._size))
+        if not entries or "saved" in entries[-1][0]:
+            self.clear()
+            return []
+        first = entries[0][0].get("sha256")
+        marks = [entry["saved"] for entry, _ in entries if "saved" in entry]
+        whole = not marks or (self.opened.exists() and fingerprint(self.opened) == first)
+        if whole and [first, *marks][-1] == self._plan:
+            return entries
+        kept = self._copy()
+        self.clear()
+        self._lost = (
+            "Edits of an earlier session belong to another version of this file and were "
+            f"not made again; they are kept in {kept.name}."
+        )
+        return []
+
+    def _copy(self) -> Path:
         number = 1
         while (kept := self.path.with_name(f"{self.path.name}.{number}")).exists():
             number += 1
-        self.path.rename(kept)
+        shutil.copyfile(self.path, kept)
         return kept
 
 
@@ -109,10 +182,10 @@ def play(session: Session, entry: Mapping[str, Any]) -> None:
         session.do(entry)
 
 
-def _parsed(line: str) -> dict[str, Any] | None:
+def _parsed(line: bytes) -> dict[str, Any] | None:
     """A line's value; None for a last line that was cut off by the kill."""
     try:
-        value = json.loads(line)
-    except json.JSONDecodeError:
+        value = json.loads(line) if line.endswith(b"\n") else None
+    except ValueError:
         return None
     return value if isinstance(value, dict) else None

@@ -129,11 +129,12 @@ class Session:
         return self.step
 
     def mark_saved(self, step: Step) -> None:
-        """Begin anew from the state that lies in the file now.
+        """Know that this state lies in the file now; what led to it can still be undone."""
+        self._saved = step
 
-        What can be undone must be what a journal beside that file can do again.
-        """
-        self._steps, self._at, self._saved = [step], 0, step
+    def forget(self) -> None:
+        """Begin anew from the state that is shown: what led to it cannot be undone any more."""
+        self._steps, self._at = [self.step], 0
 
 
 def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:

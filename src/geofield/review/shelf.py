@@ -62,9 +62,10 @@ class Shelf:
             self.desk_of(number)
             self.current = number
 
-    def unsaved(self) -> list[Path]:
-        """Journals of plans that were edited and not saved."""
-        return [desk.journal.path for desk in self._desks.values() if desk.session.edited]
+    def end(self) -> list[str]:
+        """What there is to say of plans that were edited and not saved."""
+        ended = [desk.end() for desk in self._desks.values()]
+        return [words for words in ended if words is not None]
 
     def take(self, tab: str, *, force: bool = False) -> bool:
         """Whether a tab of the browser may edit: the first one, or one that takes over."""
@@ -80,7 +81,8 @@ class Shelf:
 
 def plans_in(folder: Path) -> list[Path]:
     """The plans of geofield in a folder and the folders in it, by name."""
-    found = [path for pattern in _DEPTH for path in sorted(folder.glob(pattern)) if _is_plan(path)]
+    places = [path for pattern in _DEPTH for path in sorted(folder.glob(pattern))]
+    found = [path for path in places if not path.name.startswith(".") and _is_plan(path)]
     if not found:
         raise FormatError(
             f"{folder} holds no plan of geofield.",

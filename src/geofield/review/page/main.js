@@ -65,6 +65,7 @@ function show(answer) {
   $("redo").disabled = !state.can_redo;
   $("save").disabled = !state.edited;
   $("title").textContent = state.name + (state.edited ? ` · ${t("unsaved")}` : "");
+  if (state.unnoted && state.edited) say(t("unnoted", {why: state.unnoted}), true);
   document.title = `${state.edited ? "* " : ""}${state.name} – geofield`;
 }
 
@@ -158,7 +159,7 @@ async function commit(command) {
   const done = await act(() => api.edit(command), show);
   document.body.classList.remove("busy");
   if (!done) return show({});
-  if ($("message").classList.contains("bad")) say("");
+  if ($("message").classList.contains("bad") && !state.unnoted) say("");
   const fresh = state.obstacles.find(each => !before.has(each.no));
   if (fresh) choose(fresh.no, false);
 }
