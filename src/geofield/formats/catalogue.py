@@ -41,6 +41,7 @@ CATALOGUE: tuple[Format, ...] = (
         asks_crs=True,
         validator="geofield.formats.checks.geojson:check",
         reads_folders=True,
+        fields="joined",
     ),
     Format(
         "shapefile",
@@ -56,6 +57,7 @@ CATALOGUE: tuple[Format, ...] = (
         asks_crs=True,
         validator="geofield.formats.checks.shapefile:check",
         reads_folders=True,
+        fields="many",
     ),
     Format(
         "geoparquet",
@@ -68,6 +70,7 @@ CATALOGUE: tuple[Format, ...] = (
         precision_m=0.0,
         crs="metric",
         reads_folders=True,
+        fields="joined",
     ),
     Format(
         "flatgeobuf",
@@ -81,6 +84,7 @@ CATALOGUE: tuple[Format, ...] = (
         precision_m=0.0,
         crs="metric",
         reads_folders=True,
+        fields="joined",
     ),
     Format(
         "kml",
@@ -92,6 +96,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".kml", ".kmz"),
         drops=(Drop("settings and evidence", "provenance"),),
         precision_m=0.0002,
+        fields="many",
     ),
     Format(
         "gpx",
@@ -121,6 +126,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("field",),
         "geofield.formats.fiboa:write",
         drops=(Drop("settings and evidence", "provenance"),),
+        fields="many",
     ),
     Format(
         "dxf",
@@ -148,6 +154,7 @@ CATALOGUE: tuple[Format, ...] = (
         options=("customer", "farm", "zip", "headland"),
         validator="geofield.formats.checks.isoxml:check",
         reads_folders=True,
+        fields="many",
     ),
     Format(
         "isoxml-v3",
@@ -161,6 +168,7 @@ CATALOGUE: tuple[Format, ...] = (
         options=("customer", "farm", "zip"),
         validator="geofield.formats.checks.isoxml:check",
         reads_folders=True,
+        fields="many",
     ),
     Format(
         "agopengps",
@@ -192,6 +200,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".rdf", ".owl"),
         precision_m=0.0,
         options=_RDF_OPTIONS,
+        fields="many",
     ),
     Format(
         "turtle",
@@ -204,6 +213,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".ttl",),
         precision_m=0.0,
         options=_RDF_OPTIONS,
+        fields="many",
     ),
     Format(
         "jsonld",
@@ -216,6 +226,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".jsonld",),
         precision_m=0.0,
         options=_RDF_OPTIONS,
+        fields="many",
     ),
     Format(
         "ntriples",
@@ -228,6 +239,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".nt",),
         precision_m=0.0,
         options=_RDF_OPTIONS,
+        fields="many",
     ),
     Format(
         "rdf-study",
@@ -239,6 +251,7 @@ CATALOGUE: tuple[Format, ...] = (
         validator="geofield.formats.rdf.validate:check",
         precision_m=0.0,
         options=("base_iri", "plan_name", "points"),
+        fields="many",
     ),
     Format(
         "study-xml",

@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import difflib
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import shapely
 
 from geofield.errors import FormatError, FormatWarning
+from geofield.formats.many import distinct, field_ids, joined
+from geofield.formats.names import safe_name
 from geofield.formats.registry import FORMATS, Format, format_named
 from geofield.model import Dataset
 from geofield.staging import staged_folder
 
 
 def write_dataset(
-    dataset: Dataset,
+    dataset: Dataset, folder: Path | str, formats: Iterable[str], **how: Any
+) -> list[Path]:
+    """Write one dataset: :func:`write_datasets` of it alone.
+
+    Further arguments, warnings and errors are those of :func:`write_datasets`.
+    """
+    return write_datasets([dataset], folder, formats, **how)
+
+
+def write_datasets(
+    datasets: Sequence[Dataset],
     folder: Path | str,
     formats: Iterable[str],
     *,
@@ -27,13 +39,16 @@ def write_dataset(
     inputs: Iterable[Path | str] = (),
     tell_drops: bool = True,
 ) -> list[Path]:
-    """Write a dataset in one or more formats.
+    """Write the datasets of one or more fields in one or more formats.
 
     Either all products come into place or none; previous ones stay as they were until then.
+    Formats that hold several fields get all of them; of the others each field has its own
+    products, in a folder named after it.
 
     Parameters
     ----------
-    dataset : Dataset
+    datasets : sequence of Dataset
+        At least one.
     folder : Path
         Where the products go; made when it is missing.
     formats : iterable of str
@@ -71,14 +86,16 @@ def write_dataset(
     if unknown is not None:
         raise FormatError(f"No chosen format knows the option {unknown[0]!r}.", hint=unknown[1])
     _check_stem(stem)
+    if len(datasets) > 1:
+        datasets = distinct(datasets)
+        field_ids(datasets)
     target = Path(folder)
     written: list[Path] = []
     with staged_folder(target, overwrite=overwrite, inputs=inputs) as staging:
         for each in chosen:
-            write = each.load_writer()
             own = {key: value for key, value in given.items() if key in each.options}
             own |= given.get(each.name, {})
-            for path in write(dataset, staging, stem=stem, options=own):
+            for path in _written(each, datasets, staging, stem, own):
                 place = target / path.relative_to(staging)
                 if place in written:
                     raise FormatError(
@@ -88,9 +105,28 @@ def write_dataset(
                 written.append(place)
     for each in chosen if tell_drops else ():
         # Nobody takes the picture, map and report for a plan's whole content.
-        words = [] if each.automatic else dropped(dataset, each)
+        told = [] if each.automatic else [dropped(dataset, each) for dataset in datasets]
+        words = list(dict.fromkeys(word for one in told for word in one))
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
+    return written
+
+
+def _written(
+    into: Format, datasets: Sequence[Dataset], folder: Path, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    write = into.load_writer()
+    if into.fields == "many":
+        return write(datasets, folder, stem=stem, options=options)
+    if len(datasets) == 1:
+        return write(datasets[0], folder, stem=stem, options=options)
+    if into.fields == "joined":
+        return write(joined(datasets), folder, stem=stem, options=options)
+    written: list[Path] = []
+    for each in datasets:
+        below = folder / "fields" / safe_name(each.name)
+        below.mkdir(parents=True, exist_ok=True)
+        written += write(each, below, stem=stem, options=options)
     return written
 
 

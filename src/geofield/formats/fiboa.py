@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -32,14 +32,20 @@ _DRAWN = {"drawn": "manual", "boundary": "unknown", "given": "unknown"}
 DECIMALS = 7
 
 
-def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write ``fiboa/{stem}.geojson`` and ``fiboa/{stem}.parquet``."""
-    table = dataset.table(schema.FIELD.name)
-    shapes = split(to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs))
-    rows = [
-        _properties(row, shape, dataset)
-        for row, shape in zip(table.to_dict("records"), table.geometry, strict=True)
-    ]
+def write(
+    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``fiboa/{stem}.geojson`` and ``fiboa/{stem}.parquet``: one collection of all fields."""
+    rows: list[dict[str, Any]] = []
+    placed: list[Any] = []
+    for dataset in datasets:
+        table = dataset.table(schema.FIELD.name)
+        placed += list(split(to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs)))
+        rows += [
+            _properties(row, shape, dataset)
+            for row, shape in zip(table.to_dict("records"), table.geometry, strict=True)
+        ]
+    shapes = np.array(placed, dtype=object)
     out = folder / "fiboa"
     out.mkdir()
     geojson, parquet = out / f"{stem}.geojson", out / f"{stem}.parquet"
@@ -62,6 +68,11 @@ def _properties(row: Mapping[str, Any], shape: Any, dataset: Dataset) -> dict[st
     }
     if not pd.isna(date):
         properties["determination:datetime"] = f"{str(date)[:10]}T00:00:00Z"
+    for name in schema.own_columns(schema.FIELD, dataset.table(schema.FIELD.name)):
+        value = row[name]
+        if not pd.isna(value):
+            # Plain numbers and texts: numpy's own types are not JSON.
+            properties[str(name)] = getattr(value, "item", lambda v=value: v)()
     return properties
 
 
@@ -100,11 +111,18 @@ def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
             pa.field(GEOMETRY, pa.binary(), nullable=False),
         ]
     )
+    own = list(dict.fromkeys(name for row in rows for name in row if name not in fields.names))
     data: dict[str, Any] = {
         name: [row.get(name) for row in rows]
-        for name in fields.names
+        for name in (*fields.names, *own)
         if name not in (GEOMETRY, "determination:datetime")
     }
+    for name in own:
+        kinds = {type(value) for value in data[name] if value is not None}
+        if len(kinds) > 1:
+            data[name] = [None if value is None else str(value) for value in data[name]]
+        values = pa.array(data[name])
+        fields = fields.append(pa.field(name, values.type))
     dates = [row.get("determination:datetime") for row in rows]
     data["determination:datetime"] = [
         None if date is None else datetime.fromisoformat(date) for date in dates

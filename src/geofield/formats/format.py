@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from geofield.errors import FormatError
 from geofield.model import Dataset
@@ -78,6 +78,9 @@ class Format:
         Whether its reader takes a folder of files; else a folder must hold just one.
     automatic : bool
         Whether every run writes it, asked or not.
+    fields : {"one", "many", "joined"}
+        How several fields get into it: one product each; all in one by its writer, which then
+        takes a sequence of datasets; or all in one as a dataset with ``field_id`` in every row.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -98,6 +101,7 @@ class Format:
     validator: str | None = None
     reads_folders: bool = False
     automatic: bool = False
+    fields: Literal["one", "many", "joined"] = "one"
 
     def load_writer(self) -> Writer:
         """The writer, imported."""

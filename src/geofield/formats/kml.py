@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
@@ -54,24 +54,30 @@ _DRIVER_COLUMNS = [
 ]
 
 
-def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write ``{stem}.kml``."""
+def write(
+    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write ``{stem}.kml``; of several fields each has a folder of its own."""
     root = ET.Element("kml", xmlns=KML)
     document = ET.SubElement(root, "Document")
-    ET.SubElement(document, "name").text = dataset.name
-    ET.SubElement(document, "description").text = lineage(dataset)
+    alone = len(datasets) == 1
+    ET.SubElement(document, "name").text = datasets[0].name if alone else stem
+    told = list(dict.fromkeys(map(lineage, datasets)))
+    ET.SubElement(document, "description").text = "\n".join(told)
     for name, (colour, width, fill) in _STYLES.items():
         _add_style(document, name, colour, width, fill)
     for layer in LAYERS:
         columns = ET.SubElement(document, "Schema", name=layer.name, id=f"schema_{layer.name}")
-        for column in layer.columns:
-            field = ET.SubElement(
-                columns, "SimpleField", type=_TYPES[column.type], name=column.name
-            )
-            ET.SubElement(field, "displayName").text = column.title
-    for layer in LAYERS:
-        if dataset.has(layer.name):
-            _add_layer(document, layer, dataset)
+        for name, (kind, title) in _columns(layer, datasets).items():
+            field = ET.SubElement(columns, "SimpleField", type=kind, name=name)
+            ET.SubElement(field, "displayName").text = title
+    for dataset in datasets:
+        place = document if alone else ET.SubElement(document, "Folder")
+        if not alone:
+            ET.SubElement(place, "name").text = dataset.name
+        for layer in LAYERS:
+            if dataset.has(layer.name):
+                _add_layer(place, layer, dataset)
     path = folder / f"{stem}.kml"
     write_xml(root, path)
     return [path]
@@ -88,6 +94,18 @@ def read(path: Path) -> Dataset:
             frame = frame.rename(columns={named: "name"})
         layers.append(RawLayer(name, frame.drop(columns=_DRIVER_COLUMNS, errors="ignore")))
     return read_foreign(layers, path)
+
+
+def _columns(layer: Layer, datasets: Sequence[Dataset]) -> dict[str, tuple[str, str]]:
+    """Type and title of a layer's columns, the user's own behind the schema's."""
+    found = {column.name: (_TYPES[column.type], column.title) for column in layer.columns}
+    for each in datasets:
+        table = each.table(layer.name)
+        for name in schema.own_columns(layer, table):
+            kind = {"i": "int", "u": "int", "f": "double"}.get(table[name].dtype.kind, "string")
+            if found.setdefault(str(name), (kind, str(name)))[0] != kind:
+                found[str(name)] = ("string", str(name))
+    return found
 
 
 def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
@@ -114,10 +132,10 @@ def _add_style(
         ET.SubElement(polygon, "color").text = fill
 
 
-def _add_layer(document: ET.Element, layer: Layer, dataset: Dataset) -> None:
+def _add_layer(place: ET.Element, layer: Layer, dataset: Dataset) -> None:
     table = dataset.table(layer.name)
     shapes = to_lonlat(exact_geometry(layer, table), dataset.crs)
-    folder = ET.SubElement(document, "Folder")
+    folder = ET.SubElement(place, "Folder")
     ET.SubElement(folder, "name").text = layer.name
     for row, shape in zip(table.to_dict("records"), shapes, strict=True):
         placemark = ET.SubElement(folder, "Placemark")
@@ -128,11 +146,11 @@ def _add_layer(document: ET.Element, layer: Layer, dataset: Dataset) -> None:
             "SchemaData",
             schemaUrl=f"#schema_{layer.name}",
         )
-        for column in layer.columns:
-            value = row[column.name]
+        for name in (*layer.column_names, *schema.own_columns(layer, table)):
+            value = row[name]
             if not pd.isna(value):
-                text = repr(float(value)) if column.type == "float" else str(value)
-                ET.SubElement(data, "SimpleData", name=column.name).text = text
+                text = repr(float(value)) if isinstance(value, float) else str(value)
+                ET.SubElement(data, "SimpleData", name=str(name)).text = text
         _add_geometry(placemark, shape)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,24 @@ from pyproj import CRS
 
 from geofield.errors import FormatError
 from geofield.formats.foreign import RawLayer, read_foreign, read_vector
-from geofield.formats.origin import imagery_day
-from geofield.formats.shapefile_layer import check_limits, short_names, write_shapefile
+from geofield.formats.many import last_imagery_day, owner_of
+from geofield.formats.shapefile_layer import (
+    ShapefileLayer,
+    check_limits,
+    identified,
+    merged,
+    short_names,
+    write_shapefile,
+)
 from geofield.formats.shapefile_profiles import GENERIC, PROFILES
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
 
-def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write Shapefiles.
+def write(
+    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Write Shapefiles; those of several fields hold the rows of all where the profile's names do.
 
     Options: ``profile`` (``generic``, ``tracklead`` or ``aggps``), ``customer`` and ``farm``
     (names for terminals), ``zip`` (true: one archive without sub-folders).
@@ -28,11 +37,15 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         raise FormatError(
             f"There is no Shapefile profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
         )
-    customer, farm = str(options.get("customer", "")), str(options.get("farm", ""))
-    layers = list(PROFILES[profile](dataset, customer, farm))
+    layers: list[ShapefileLayer] = []
+    for dataset in datasets:
+        customer, farm = owner_of(dataset, options)
+        own = list(PROFILES[profile](dataset, customer, farm))
+        layers += [identified(each, dataset) for each in own] if len(datasets) > 1 else own
+    layers = merged(layers)
     for layer in layers:
         check_limits(layer)
-    day = imagery_day(dataset)
+    day = last_imagery_day(datasets)
     written: list[Path] = []
     for layer in layers:
         written += write_shapefile(layer, folder / layer.path, day)

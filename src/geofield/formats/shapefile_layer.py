@@ -8,11 +8,12 @@ is a row to guess them from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import shapely
 from shapely.geometry import mapping
@@ -77,12 +78,70 @@ def schema_layer(dataset: Dataset, path: Path, of: schema.Layer, table: Any) -> 
             for name in _SENTENCES & set(table.columns)
         }
     )
-    return ShapefileLayer(
-        path,
-        of.geometry,
-        {column.shapefile: (column.type, list(table[column.name])) for column in of.columns},
-        split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes,
-    )
+    columns: dict[str, Column] = {
+        column.shapefile: (column.type, list(table[column.name])) for column in of.columns
+    }
+    for name in schema.own_columns(of, table):
+        columns[_short(str(name), columns)] = _own(table[name])
+    placed = split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes
+    return ShapefileLayer(path, of.geometry, columns, placed)
+
+
+def _short(name: str, taken: Iterable[str]) -> str:
+    """A user's column name cut to what fits, unlike the others."""
+    lower = {str(each).lower() for each in taken}
+    kept = name.encode()[:NAME_CHARACTERS].decode(errors="ignore")
+    number = 1
+    while kept.lower() in lower:
+        number += 1
+        end = f"_{number}"
+        kept = name.encode()[: NAME_CHARACTERS - len(end)].decode(errors="ignore") + end
+    return kept
+
+
+def _own(series: Any) -> Column:
+    """A user's own column: whole numbers, numbers, or what can be read as text."""
+    kinds: dict[str, schema.ColumnType] = {"i": "int", "u": "int", "f": "float"}
+    kind = kinds.get(series.dtype.kind, "str")
+    if kind != "str":
+        return kind, list(series)
+    return kind, [None if pd.isna(value) else _cut(str(value)) for value in series]
+
+
+def identified(layer: ShapefileLayer, dataset: Dataset) -> ShapefileLayer:
+    """A layer that says in each row of which field it is."""
+    column = schema.FIELD.column("field_id")
+    if column.shapefile in layer.columns:
+        return layer
+    field_id = str(dataset.table(schema.FIELD.name)[column.name].iloc[0])
+    count = len(layer.shapes)
+    own: dict[str, Column] = {column.shapefile: (column.type, [field_id] * count)}
+    return replace(layer, columns={**own, **layer.columns})
+
+
+def merged(layers: Sequence[ShapefileLayer]) -> list[ShapefileLayer]:
+    """Layers of one path as one; columns that only some of them have are empty in the others."""
+    by_path: dict[Path, list[ShapefileLayer]] = {}
+    for each in layers:
+        by_path.setdefault(each.path, []).append(each)
+    return [_one_of(same) if len(same) > 1 else same[0] for same in by_path.values()]
+
+
+def _one_of(layers: Sequence[ShapefileLayer]) -> ShapefileLayer:
+    kinds: dict[str, set[schema.ColumnType]] = {}
+    for each in layers:
+        for name, (kind, _) in each.columns.items():
+            kinds.setdefault(name, set()).add(kind)
+    columns: dict[str, Column] = {}
+    for name, found in kinds.items():
+        joint: schema.ColumnType = found.pop() if len(found) == 1 else "str"
+        rows: list[Any] = []
+        for each in layers:
+            values = each.columns[name][1] if name in each.columns else [None] * len(each.shapes)
+            rows += [v if joint != "str" or pd.isna(v) else str(v) for v in values]
+        columns[name] = (joint, rows)
+    shapes = np.concatenate([np.asarray(each.shapes, dtype=object) for each in layers])
+    return ShapefileLayer(layers[0].path, layers[0].geometry, columns, shapes)
 
 
 def _cut(text: str) -> str:

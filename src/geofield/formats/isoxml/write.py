@@ -1,4 +1,4 @@
-"""Writing ISOXML: one customer, farm and field with boundary, obstacles and guidance.
+"""Writing ISOXML: customers, farms and fields with boundary, obstacles and guidance.
 
 Version 4 has guidance groups; version 3 knows guidance only as lines of the field. None has
 been tried on a physical terminal.
@@ -6,7 +6,8 @@ been tried on a physical terminal.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -31,8 +32,8 @@ from geofield.formats.isoxml.codes import (
     PointType,
     PolygonType,
 )
+from geofield.formats.many import last_imagery_day, owner_of
 from geofield.formats.names import cut_name, line_names
-from geofield.formats.origin import imagery_day
 from geofield.formats.terminal import main_field, terminal_obstacles
 from geofield.formats.xml import write_xml
 from geofield.formats.zipped import archived
@@ -44,41 +45,42 @@ _DOUBTED = " (check)"
 
 
 def write_v4(
-    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
-    """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3.
+    """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3: one task file for all fields.
 
-    Options: ``customer`` and ``farm``, names for the terminal; ``zip`` (true: the folder
-    TASKDATA in one archive); ``headland`` (``line``: its inner edge as AgOpenGPS reads it, or
-    ``strip``: the area).
+    Options: ``customer`` and ``farm``, names for the terminal where the field has no columns of
+    these names; ``zip`` (true: the folder TASKDATA in one archive); ``headland`` (``line``: its
+    inner edge as AgOpenGPS reads it, or ``strip``: the area).
     """
-    return _written(dataset, folder, f"{stem}_isoxml", 4, options)
+    return _written(datasets, folder, f"{stem}_isoxml", 4, options)
 
 
 def write_v3(
-    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
     """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
-    return _written(dataset, folder, f"{stem}_isoxml-v3", 3, options)
+    return _written(datasets, folder, f"{stem}_isoxml-v3", 3, options)
 
 
 def _written(
-    dataset: Dataset, folder: Path, archive: str, version: int, options: Mapping[str, Any]
+    datasets: Sequence[Dataset],
+    folder: Path,
+    archive: str,
+    version: int,
+    options: Mapping[str, Any],
 ) -> list[Path]:
     below = folder / ("isoxml" if version == 4 else "isoxml-v3")
     path = below / "TASKDATA" / "TASKDATA.XML"
-    write_xml(_task_data(dataset, version, options), path)
+    write_xml(_task_data(datasets, version, options), path)
     if not options.get("zip"):
         return [path]
-    day = imagery_day(dataset)
+    day = last_imagery_day(datasets)
     return [archived([path], folder / f"{archive}.zip", day=day, below=below)]
 
 
-def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET.Element:
-    field = dataset.table(schema.FIELD.name)
-    if len(field) != 1:
-        raise FormatError(f"ISOXML needs one field; there are {len(field)}.")
-    software = dataset.provenance.software or "geofield"
+def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, Any]) -> ET.Element:
+    software = datasets[0].provenance.software or "geofield"
     maker, _, number = software.partition(" ")
     root = ET.Element(
         "ISO11783_TaskData",
@@ -88,25 +90,40 @@ def _task_data(dataset: Dataset, version: int, options: Mapping[str, Any]) -> ET
         ManagementSoftwareVersion=(number or "0")[:DESIGNATOR],
         DataTransferOrigin="1",
     )
-    customer = str(options.get("customer") or "Customer")
-    farm = str(options.get("farm") or "Farm")
-    ET.SubElement(root, "CTR", A="CTR1", B=cut_name(customer, DESIGNATOR))
-    ET.SubElement(root, "FRM", A="FRM1", B=cut_name(farm, DESIGNATOR), I="CTR1")
-    polygon = exact_geometry(schema.FIELD, field)[0]
-    part = ET.SubElement(
-        root,
-        "PFD",
-        A="PFD1",
-        C=cut_name(dataset.name, DESIGNATOR),
-        D=str(round(float(ground_areas_m2([polygon], dataset.crs)[0]))),
-        E="CTR1",
-        F="FRM1",
-    )
-    _add_polygons(part, dataset, polygon, version, options)
-    if version == 4:
-        _add_guidance_groups(part, dataset)
-    else:
-        _add_guidance_lines(part, dataset)
+    named = [owner_of(each, options) for each in datasets]
+    owners = [(customer or "Customer", farm or "Farm") for customer, farm in named]
+    customers = list(dict.fromkeys(customer for customer, _ in owners))
+    farms = list(dict.fromkeys(owners))
+    for place, customer in enumerate(customers, start=1):
+        ET.SubElement(root, "CTR", A=f"CTR{place}", B=cut_name(customer, DESIGNATOR))
+    for place, (customer, farm) in enumerate(farms, start=1):
+        ET.SubElement(
+            root,
+            "FRM",
+            A=f"FRM{place}",
+            B=cut_name(farm, DESIGNATOR),
+            I=f"CTR{customers.index(customer) + 1}",
+        )
+    groups = itertools.count(1)
+    for place, (dataset, owner) in enumerate(zip(datasets, owners, strict=True), start=1):
+        field = dataset.table(schema.FIELD.name)
+        if len(field) != 1:
+            raise FormatError(f"ISOXML needs one field; there are {len(field)}.")
+        polygon = exact_geometry(schema.FIELD, field)[0]
+        part = ET.SubElement(
+            root,
+            "PFD",
+            A=f"PFD{place}",
+            C=cut_name(dataset.name, DESIGNATOR),
+            D=str(round(float(ground_areas_m2([polygon], dataset.crs)[0]))),
+            E=f"CTR{customers.index(owner[0]) + 1}",
+            F=f"FRM{farms.index(owner) + 1}",
+        )
+        _add_polygons(part, dataset, polygon, version, options)
+        if version == 4:
+            _add_guidance_groups(part, dataset, groups)
+        else:
+            _add_guidance_lines(part, dataset)
     return root
 
 
@@ -167,19 +184,17 @@ def _add_polygon(
             _add_point(line, PointType.OTHER, lon, lat)
 
 
-def _add_guidance_groups(part: ET.Element, dataset: Dataset) -> None:
+def _add_guidance_groups(part: ET.Element, dataset: Dataset, numbers: Iterator[int]) -> None:
     """One group per line: some readers look at the first pattern of a group only."""
     segments = dataset.table(schema.SEGMENTS.name)
     width_mm = _width_mm(dataset)
-    number = 0
     reference = _reference(dataset)
     if reference is not None:
-        number += 1
         line, left, right = reference
         lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
         _add_group(
             part,
-            number,
+            next(numbers),
             "Reference AB",
             lonlat,
             width_mm,
@@ -191,8 +206,7 @@ def _add_guidance_groups(part: ET.Element, dataset: Dataset) -> None:
     placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
     explicit = {"E": REPEAT_NONE, "F": EXTEND_NONE}
     for name, lonlat in zip(line_names(segments), placed, strict=True):
-        number += 1
-        _add_group(part, number, name, lonlat, width_mm, explicit)
+        _add_group(part, next(numbers), name, lonlat, width_mm, explicit)
 
 
 def _add_group(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,16 +22,18 @@ if TYPE_CHECKING:
     import rdflib
 
 PROFILES = ("geosparql", "study")
+Fields = Dataset | Sequence[Dataset]
 
 
 def write_rdfxml(
-    dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
+    fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
 ) -> list[Path]:
     """RDF/XML in three files: ``field.rdf``, ``obstacles.rdf``, ``tracks.rdf``.
 
     Parameters
     ----------
-    dataset : Dataset
+    fields : Dataset or sequence of Dataset
+        One or more fields, each under its own names.
     folder : Path
         There already.
     stem : str
@@ -45,27 +48,30 @@ def write_rdfxml(
     list of Path
         The files written.
     """
-    description, before = describe(dataset, options), "" if stem == "field" else f"{stem}_"
+    told = [describe(each, options) for each in _each(fields)]
+    before = "" if stem == "field" else f"{stem}_"
     paths = [folder / f"{before}{product}.rdf" for product in PRODUCTS]
     for path, product in zip(paths, PRODUCTS, strict=True):
-        _write(path, ox.RdfFormat.RDF_XML, description.product(product), options)
+        groups = chain.from_iterable(each.product(product) for each in told)
+        _write(path, ox.RdfFormat.RDF_XML, groups, options)
     return paths
 
 
 def write_study(
-    dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
+    fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
 ) -> list[Path]:
     """RDF/XML in the study's vocabulary: :func:`write_rdfxml` with that profile."""
-    return write_rdfxml(dataset, folder, stem=stem, options={**options, "rdf_profile": "study"})
+    return write_rdfxml(fields, folder, stem=stem, options={**options, "rdf_profile": "study"})
 
 
 def _one_file(suffix: str, syntax: ox.RdfFormat) -> Callable[..., list[Path]]:
     def write(
-        dataset: Dataset, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
+        fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
     ) -> list[Path]:
         """One file; options as in :func:`write_rdfxml`."""
         path = folder / f"{stem}{suffix}"
-        _write(path, syntax, describe(dataset, options).everything(), options)
+        told = [describe(each, options) for each in _each(fields)]
+        _write(path, syntax, chain.from_iterable(each.everything() for each in told), options)
         return [path]
 
     return write
@@ -111,6 +117,10 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     # --option points=no arrives as a text.
     wanted = str(options.get("points", points)).lower() not in ("no", "false", "0", "none", "")
     return kind(dataset, names, wanted)
+
+
+def _each(fields: Fields) -> Sequence[Dataset]:
+    return [fields] if isinstance(fields, Dataset) else fields
 
 
 def _is_study(options: Mapping[str, Any]) -> bool:
