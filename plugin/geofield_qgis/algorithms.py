@@ -238,7 +238,7 @@ class ExportAlgorithm(GeofieldAlgorithm):
     """A plan in the formats of terminals and other programs."""
 
     identifier, title, section, command = "export", "Export for terminals", FILES, "export"
-    own = GeofieldAlgorithm.own | {"plan_file", "folder", "crs"}
+    own = GeofieldAlgorithm.own | {"plan_files", "folder", "crs"}
 
     def add_inputs(self) -> None:
         """Plan and folder."""

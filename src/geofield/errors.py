@@ -92,6 +92,10 @@ class ChangedError(FormatError):
     """Another program changed a file since it was read."""
 
 
+class SeveralFieldsError(FormatError):
+    """A file holds several fields where one is wanted."""
+
+
 class UnknownFormatError(FormatError):
     """A format was named that is not there: wrong usage, not work that failed."""
 

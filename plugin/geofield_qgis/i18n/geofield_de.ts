@@ -1439,6 +1439,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Plan files</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Format; may be repeated.</source>
       <translation>Formate.</translation>

@@ -1,4 +1,4 @@
-"""``geofield export``: a plan in other formats."""
+"""``geofield export``: one or more plans in other formats."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ Examples:
   geofield export out/field.gpkg --format isoxml --format kml --out export/
   geofield export out/field.gpkg -f map -f html --out pictures/
   geofield export out/field.gpkg -f shapefile --profile tracklead --out stick/
+  geofield export out/*.gpkg --format isoxml --customer "Ann" --out one_stick/
 `geofield formats` lists the formats and what each can carry.
 """
 )
-@click.argument("plan_file", metavar="PLAN", type=click.Path(path_type=Path))
+@click.argument(
+    "plan_files", metavar="PLAN...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
 @click.option(
     "-f", "--format", "formats", multiple=True, required=True, help="Format; may be repeated."
 )
@@ -53,7 +56,7 @@ Examples:
 @click.option("--overwrite", is_flag=True, help="Replace products that are there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the files as JSON on stdout.")
 def export(
-    plan_file: Path,
+    plan_files: tuple[Path, ...],
     formats: tuple[str, ...],
     folder: Path,
     stem: str,
@@ -63,13 +66,16 @@ def export(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """Write other formats from a plan.
+    """Write other formats from one or more plans.
 
-    PLAN is a GeoPackage of geofield, or any file it can import. All products come into
-    place together or not at all; what a format cannot carry is said once.
+    PLAN is a GeoPackage of geofield, or any file it can import. Of several plans, formats
+    that can hold several fields get them in one file (one ISOXML task file, one set of
+    Shapefiles, one KML with folders, one linked dataset); the others have a folder per field.
+    Columns "customer" and "farm" of the field say whose it is. All products come into place
+    together or not at all; what a format cannot carry is said once.
     """
     from geofield.cli.claiming import claim_folder
-    from geofield.formats import format_named, read_dataset, write_dataset
+    from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.gpkg_read import scene_beside
 
@@ -84,20 +90,23 @@ def export(
         raise click.UsageError(f"No chosen format knows {flag}. {unknown[1]}")
     products = [product.replace("{stem}", stem) for each in chosen for product in each.files]
     claim_folder(folder, {product.partition("/")[0] for product in products})
-    dataset = read_dataset(plan_file, crs=crs)
-    for note in dataset.notes:
-        say(note)
-    if plan_file.suffix.lower() == ".gpkg" and ("gpkg" not in names or "scene" in names):
-        # A project written without the picture must not look for it.
-        dataset = replace(dataset, scene_path=scene_beside(plan_file))
-    written = write_dataset(
-        dataset,
+    datasets = []
+    for plan_file in plan_files:
+        dataset = read_dataset(plan_file, crs=crs)
+        for note in dataset.notes:
+            say(note)
+        if plan_file.suffix.lower() == ".gpkg" and ("gpkg" not in names or "scene" in names):
+            # A project written without the picture must not look for it.
+            dataset = replace(dataset, scene_path=scene_beside(plan_file))
+        datasets.append(dataset)
+    written = write_datasets(
+        datasets,
         folder,
         names,
         stem=stem,
         overwrite=overwrite,
         options=options,
-        inputs=[plan_file],
+        inputs=plan_files,
     )
     if as_json:
         echo_json({"files": [str(path) for path in written]})

@@ -27,6 +27,7 @@ CATALOGUE: tuple[Format, ...] = (
         crs="metric",
         options=("points", "project"),
         validator="geofield.formats.checks.gpkg:check",
+        fields="joined",
     ),
     Format(
         "geojson",
@@ -188,6 +189,7 @@ CATALOGUE: tuple[Format, ...] = (
         precision_m=0.005,
         validator="geofield.formats.checks.agopengps:check",
         reads_folders=True,
+        fields="apart",
     ),
     Format(
         "rdf",

@@ -10,6 +10,7 @@ from typing import Any
 
 import shapely
 
+from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.many import distinct, field_ids, joined
 from geofield.formats.names import safe_name
@@ -43,7 +44,7 @@ def write_datasets(
 
     Either all products come into place or none; previous ones stay as they were until then.
     Formats that hold several fields get all of them; of the others each field has its own
-    products, in a folder named after it.
+    products, named after it or in a folder that is.
 
     Parameters
     ----------
@@ -105,7 +106,11 @@ def write_datasets(
                 written.append(place)
     for each in chosen if tell_drops else ():
         # Nobody takes the picture, map and report for a plan's whole content.
-        told = [] if each.automatic else [dropped(dataset, each) for dataset in datasets]
+        told = (
+            []
+            if each.automatic
+            else [dropped(one, each, together=len(datasets) > 1) for one in datasets]
+        )
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
@@ -123,15 +128,18 @@ def _written(
     if into.fields == "joined":
         return write(joined(datasets), folder, stem=stem, options=options)
     written: list[Path] = []
+    single = all("{stem}" in file for file in into.files)
     for each in datasets:
-        below = folder / "fields" / safe_name(each.name)
-        below.mkdir(parents=True, exist_ok=True)
-        written += write(each, below, stem=stem, options=options)
+        name, place = safe_name(each.name), folder
+        if into.fields == "one" and not single:
+            place = folder / "fields" / name
+            place.mkdir(parents=True, exist_ok=True)
+        written += write(each, place, stem=name if single else stem, options=options)
     return written
 
 
-def dropped(dataset: Dataset, into: Format) -> list[str]:
-    """What a format leaves out of a dataset, in plain words."""
+def dropped(dataset: Dataset, into: Format, *, together: bool = False) -> list[str]:
+    """What a format leaves out of a dataset, alone or together with others, in plain words."""
     layers = [
         each.title.lower()
         for each in dataset.layers()
@@ -144,6 +152,8 @@ def dropped(dataset: Dataset, into: Format) -> list[str]:
     # And the tracks of a format with gaps are broken where they lie.
     if {"tracks", "gaps"} <= carried:
         layers = [title for title in layers if title != "segments"]
+    if together and into.fields == "joined" and dataset.has(schema.TRACK_POINTS.name):
+        layers.append(schema.TRACK_POINTS.title.lower())
     return layers + [drop.words for drop in into.drops if _present(dataset, drop.when)]
 
 

@@ -14,7 +14,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import LONLAT, grid_north_deg, ground_lengths_m, transformer
-from geofield.errors import FormatError, FormatWarning
+from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
 
@@ -63,7 +63,7 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     names = column_like(frame, _NAME)
     if len(frame) > 1:
         shown = "" if names is None else f" ({', '.join(map(str, names[:5]))}, ...)"
-        raise FormatError(
+        raise SeveralFieldsError(
             f"{path.name} holds {len(frame)} outlines{shown}; a dataset is one field.",
             hint="Save the one you want as a file of its own.",
         )

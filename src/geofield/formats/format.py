@@ -78,9 +78,11 @@ class Format:
         Whether its reader takes a folder of files; else a folder must hold just one.
     automatic : bool
         Whether every run writes it, asked or not.
-    fields : {"one", "many", "joined"}
-        How several fields get into it: one product each; all in one by its writer, which then
-        takes a sequence of datasets; or all in one as a dataset with ``field_id`` in every row.
+    fields : {"one", "apart", "many", "joined"}
+        How several fields get into it: one product each, the writer being told one name for all
+        (``one``) or writing each under its own (``apart``); all in one by the writer, which
+        then takes a sequence of datasets (``many``); all in one as a dataset with ``field_id``
+        in every row (``joined``).
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -101,7 +103,7 @@ class Format:
     validator: str | None = None
     reads_folders: bool = False
     automatic: bool = False
-    fields: Literal["one", "many", "joined"] = "one"
+    fields: Literal["one", "apart", "many", "joined"] = "one"
 
     def load_writer(self) -> Writer:
         """The writer, imported."""

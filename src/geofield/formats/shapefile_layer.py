@@ -66,8 +66,14 @@ def short_names(of: schema.Layer) -> dict[str, str]:
     return {column.name: column.shapefile for column in of.columns}
 
 
-def schema_layer(dataset: Dataset, path: Path, of: schema.Layer, table: Any) -> ShapefileLayer:
-    """A table of the schema as a Shapefile with all its columns.
+def schema_layer(
+    dataset: Dataset,
+    path: Path,
+    of: schema.Layer,
+    table: Any,
+    before: Mapping[str, Column] | None = None,
+) -> ShapefileLayer:
+    """A table of the schema as a Shapefile with all its columns, further ones before them.
 
     Only sentences of our own are cut to what fits: names and ids are refused instead.
     """
@@ -78,9 +84,8 @@ def schema_layer(dataset: Dataset, path: Path, of: schema.Layer, table: Any) -> 
             for name in _SENTENCES & set(table.columns)
         }
     )
-    columns: dict[str, Column] = {
-        column.shapefile: (column.type, list(table[column.name])) for column in of.columns
-    }
+    columns: dict[str, Column] = {**(before or {})}
+    columns |= {column.shapefile: (column.type, list(table[column.name])) for column in of.columns}
     for name in schema.own_columns(of, table):
         columns[_short(str(name), columns)] = _own(table[name])
     placed = split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes

@@ -39,13 +39,13 @@ GENERIC = {
 
 def generic(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
     """All columns under short names; a file more per status that is not driven around."""
-    field = schema_layer(dataset, _FLAT / "boundary", schema.FIELD, dataset.table("field"))
-    rows = len(field.shapes)
+    table = dataset.table("field")
     # The boundary import of several farm platforms asks for these three.
     named = {"CLIENT": customer, "FARM": farm, "FIELD": dataset.name}
-    named_columns: dict[str, Column] = {key: ("str", [text] * rows) for key, text in named.items()}
-    columns = {**named_columns, **field.columns}
-    yield ShapefileLayer(field.path, field.geometry, columns, field.shapes)
+    before: dict[str, Column] = {key: ("str", [text] * len(table)) for key, text in named.items()}
+    told = [name for name in table.columns if str(name).lower() in ("customer", "farm")]
+    field = table.drop(columns=told)
+    yield schema_layer(dataset, _FLAT / "boundary", schema.FIELD, field, before)
     yield schema_layer(dataset, _FLAT / "obstacles", schema.OBSTACLES, avoided(dataset))
     for status, table in passed_through(dataset).items():
         yield schema_layer(dataset, _FLAT / f"obstacles_{status}", schema.OBSTACLES, table)

@@ -13,7 +13,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import ground_lengths_m
-from geofield.errors import FormatWarning, GeofieldError
+from geofield.errors import FormatWarning, GeofieldError, SeveralFieldsError
 from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
@@ -69,7 +69,10 @@ def validate_file(path: Path | str) -> list[Finding]:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FormatWarning)
-            dataset = read_dataset(place)
+            dataset = _one_field(read_dataset(place), place)
+    except SeveralFieldsError as error:
+        words = f"{error} Each field's own rules were not checked."
+        return [*findings, Finding("warning", place.name, words)]
     except GeofieldError as error:
         # Where the format's own rules are broken already, that is why it cannot be read.
         if any(each.level == "error" for each in findings):
@@ -81,6 +84,13 @@ def validate_file(path: Path | str) -> list[Finding]:
         if issubclass(each.category, FormatWarning)
     ]
     return findings + list(check_dataset(dataset, with_segments="segments" in found.layers))
+
+
+def _one_field(dataset: Dataset, place: Path) -> Dataset:
+    count = len(dataset.table(schema.FIELD.name))
+    if count > 1:
+        raise SeveralFieldsError(f"{place.name} holds {count} fields.")
+    return dataset
 
 
 def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from geofield.crs import LONLAT
-from geofield.errors import FormatError
+from geofield.errors import FormatError, SeveralFieldsError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
 from geofield.formats.isoxml.guidance import guidance_lines, position
@@ -47,7 +47,8 @@ def read(path: Path) -> Dataset:
     fields = [*root.iter("PFD"), *_external(root, file.parent)]
     if len(fields) != 1:
         names = ", ".join(str(field.get("C")) for field in fields[:5])
-        raise FormatError(
+        kind = SeveralFieldsError if fields else FormatError
+        raise kind(
             f"{file} holds {len(fields)} fields ({names}); a dataset is one field.",
             hint="Export the one you want from the terminal or farm program alone.",
         )

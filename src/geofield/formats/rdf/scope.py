@@ -6,7 +6,7 @@ import re
 import warnings
 from dataclasses import dataclass
 
-from geofield.errors import FormatError, FormatWarning
+from geofield.errors import FormatError, FormatWarning, SeveralFieldsError
 from geofield.formats.rdf.layers import LayerMap
 from geofield.formats.rdf.parse import Graph
 
@@ -77,7 +77,7 @@ def choose(graph: Graph, plan: str | None = None) -> Scope:
     """
     fields = sorted(fields_of(graph))
     if len(fields) > 1:
-        raise FormatError(
+        raise SeveralFieldsError(
             f"There are {len(fields)} fields: {', '.join(f'<{iri}>' for iri in fields[:5])}.",
             hint="geofield reads one field at a time: split the file by gf:inField.",
         )
