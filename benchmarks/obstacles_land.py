@@ -156,10 +156,11 @@ def driven(case: Case, **options: object) -> tuple[Driving, int, int]:
     found = gf.detect_obstacles(case.scene, field, **options)
     tracks = gf.plan_tracks(polygon, found, crs=grid.metric_crs, spacing_m=SPACING_M)
     true = trees_of(case)
-    points = shapely.points(np.column_stack(grid.to_crs(*true.T, grid.metric_crs)))
+    points = shapely.points(np.column_stack(grid.to_crs(*case.trees.T, grid.metric_crs)))
     truth = gpd.GeoDataFrame(geometry=points, crs=grid.metric_crs)
     lost = driving(tracks.segments, found, truth, polygon)
     xy = found.loc[found["kind"] == "tree", ["x_px", "y_px"]].to_numpy(float)
+    xy = xy[shapely.contains_xy(case.area, *xy.T)]
     match = match_points(xy, true, 10)
     return lost, len(match.truth_index), len(xy) - len(match.truth_index)
 

@@ -65,6 +65,14 @@ def test_ground_is_lost_only_where_nothing_stands():
     assert both.share_lost == pytest.approx(lost.share_lost)
 
 
+def test_ground_under_a_crown_from_outside_is_not_lost_for_nothing():
+    table = around("detected", 0.9, (-3, 20), (-3, 60))
+    lost = driving(lines(50), table, points((-3, 20)), FIELD)
+    assert lost.things == 0
+    segment = 25 * np.arccos(3 / 5) - 3 * 4
+    assert lost.lost_m2 == pytest.approx(segment, rel=0.01)
+
+
 def test_a_field_without_anything_costs_nothing():
     lost = driving(lines(50), around("detected", 0.9), points(), FIELD)
     assert np.isnan(lost.share_driven_through)

@@ -1,4 +1,4 @@
-"""Training samples: crops of the pictures, turned, scaled, spoiled, and what is to be seen.
+"""Training samples: crops of the pictures, turned, scaled, spoiled, and their labels.
 
 Coordinates are pixels from the corner of the top-left pixel.
 """
@@ -10,12 +10,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from crown_targets import targets
 from standing_things import place_things
 
 INPUTS = ("red", "green", "blue", "nir", "has_nir")
 OUTPUTS = ("centre", "dx", "dy", "log_radius", "cover", "other")
 CROP_PX = 192
-CELL_PX = 2
 SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
 BORDER_PX = 2.0
@@ -53,7 +53,7 @@ class Pictures:
     def weights(self) -> np.ndarray:
         """Return how often each picture is drawn: open and green land more often."""
         count = np.array([len(t) for t in self.trees])
-        weight = np.where(count < 40, 1.6, 1.0)
+        weight = np.where(count < 40, 1.8, 1.0)
         green = zip(self.bands, self.trees, strict=True)
         weight += 2 * np.array([green_ground(bands, trees) for bands, trees in green])
         weight[self.simulated] = 0.5
@@ -202,7 +202,7 @@ def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
         noise = rng.standard_normal(image.shape, dtype=np.float32)
         image = image + noise * np.float32(rng.uniform(0.5, 7))
     image = np.clip(image, 0, 255)
-    if rng.random() < 0.35:
+    if rng.random() < 0.5:
         image = jpeg(rng, image)
     return np.ascontiguousarray(np.rint(image), dtype=np.float32)
 
@@ -225,59 +225,3 @@ def shade(rng: np.random.Generator, side: int) -> np.ndarray:
     along = (x - side / 2) * np.cos(angle) + (y - side / 2) * np.sin(angle)
     edge = np.clip((along - rng.uniform(-60, 60)) / rng.uniform(4, 40) + 0.5, 0, 1)
     return (1 - edge * rng.uniform(0.2, 0.55)).astype(np.float32)
-
-
-def targets(
-    trees: np.ndarray, valid: np.ndarray, other: np.ndarray, known: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Return what the network should say, and where it counts, per cell."""
-    side = CROP_PX // CELL_PX
-    heat = np.zeros((side, side), np.float32)
-    around = np.zeros((3, side, side), np.float32)
-    counts = np.zeros((2, side, side), np.float32)
-    cover = np.zeros((side, side), np.float32)
-    unknown = np.zeros((side, side), np.uint8)
-    yy, xx = np.mgrid[:side, :side].astype(np.float32)
-    best = np.full((side, side), np.inf, np.float32)
-    for x, y, radius in trees:
-        u, v = x / CELL_PX, y / CELL_PX
-        col, row = int(np.floor(u)), int(np.floor(v))
-        measured = np.isfinite(radius)
-        r = (radius if measured else 5.0) / CELL_PX
-        reach = int(max(r, 4)) + 2
-        c0, c1 = max(col - reach, 0), min(col + reach + 1, side)
-        r0, r1 = max(row - reach, 0), min(row + reach + 1, side)
-        if c0 >= c1 or r0 >= r1:
-            continue
-        where = np.s_[r0:r1, c0:c1]
-        du, dv = u - (xx[where] + 0.5), v - (yy[where] + 0.5)
-        d2 = du**2 + dv**2
-        np.maximum(heat[where], np.exp(-d2 / (2 * 1.1**2)), out=heat[where])
-        inside = d2 <= r * r
-        if measured:
-            cover[where][inside] = 1
-        else:
-            unknown[where][inside] = 1
-        near = (d2 <= 1.6**2) & (d2 < best[where])
-        best[where][near] = d2[near]
-        for k, value in enumerate((du, dv)):
-            around[k][where][near] = value[near]
-        counts[0][where][near] = 1
-        around[2][where][near] = np.log(max(r * CELL_PX, 1.0))
-        counts[1][where][near] = float(measured)
-        if 0 <= col < side and 0 <= row < side:
-            heat[row, col] = 1
-    seen = valid.reshape(side, CELL_PX, side, CELL_PX).min(axis=(1, 3)).astype(np.float32)
-    standing = other.reshape(side, CELL_PX, side, CELL_PX).max(axis=(1, 3))
-    # Real land holds unlabelled things: only where it is calm, or painted on, all is known.
-    other_counts = seen * known[CELL_PX // 2 :: CELL_PX, CELL_PX // 2 :: CELL_PX]
-    return {
-        "heat": heat,
-        "around": around,
-        "around_counts": counts * seen,
-        "cover": cover,
-        "cover_counts": seen * (1 - unknown * (1 - cover)),
-        "other": standing,
-        "other_counts": other_counts,
-        "seen": seen,
-    }

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 CLEAR_PX = 9.0
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 def place_things(
@@ -49,26 +50,41 @@ def drawn(side: int, polygons: list[np.ndarray], blur: float) -> np.ndarray:
     return cv2.GaussianBlur(soft, (0, 0), blur) if blur > 0.2 else soft
 
 
-def outline(rng: np.random.Generator, at: np.ndarray) -> tuple[np.ndarray, float, str]:
-    """Return a thing's outline, its height in pixels and its kind."""
-    kind = str(rng.choice(["post", "wall", "hut", "truck", "heap", "pond", "bush"]))
+def outline(rng: np.random.Generator, at: np.ndarray) -> tuple[list[np.ndarray], float, str]:
+    """Return a thing's outline, in one part or several, its height in pixels and its kind."""
+    kind = str(rng.choice(["post", "wall", "yard", "hut", "truck", "heap", "pond", "bush"]))
     turn = rng.uniform(0, np.pi)
     if kind == "post":
         half, height = (rng.uniform(0.5, 1.3),) * 2, rng.uniform(4, 16)
     elif kind == "wall":
         half, height = (rng.uniform(8, 35), rng.uniform(0.5, 1.4)), rng.uniform(1.2, 4)
+    elif kind == "yard":
+        half, height = (rng.uniform(4, 14), rng.uniform(4, 10)), rng.uniform(1.5, 5)
     elif kind == "hut":
         half, height = (rng.uniform(3, 11), rng.uniform(3, 8)), rng.uniform(3, 8)
     elif kind == "truck":
         half, height = (rng.uniform(3.5, 9), rng.uniform(1.6, 2.4)), rng.uniform(3, 6)
     else:
         half, height = (rng.uniform(1.5, 8), rng.uniform(1.5, 6)), rng.uniform(1, 4)
+    parts = [blob(rng) * half]
     if kind in ("post", "wall", "hut", "truck"):
-        shape = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-    else:
-        shape = blob(rng) * half
+        parts = [SQUARE * half]
+    elif kind == "yard":
+        parts = walls(half, rng.uniform(0.5, 1.2), int(rng.integers(2, 5)))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    return shape @ rotation.T + at, 0.0 if kind == "pond" else height, kind
+    return [p @ rotation.T + at for p in parts], 0.0 if kind == "pond" else height, kind
+
+
+def walls(half: tuple[float, ...], thick: float, count: int) -> list[np.ndarray]:
+    """Return some of the four walls around a yard or of a ruin."""
+    a, b = half
+    sides = [
+        ((a, thick), (0, b)),
+        ((thick, b), (a, 0)),
+        ((a, thick), (0, -b)),
+        ((thick, b), (-a, 0)),
+    ]
+    return [SQUARE * size + np.array(place) for size, place in sides[:count]]
 
 
 def blob(rng: np.random.Generator) -> np.ndarray:
@@ -90,15 +106,16 @@ def stand(
 ) -> None:
     """Draw a thing that stands, its shadow first."""
     side = image.shape[0]
-    shape, height, kind = outline(rng, at)
+    shapes, height, kind = outline(rng, at)
     blur = rng.uniform(0.3, 0.9)
     if height > 0 and rng.random() < 0.9:
         length = height * rng.uniform(0.4, 1.3)
         step = np.array([np.cos(sun), np.sin(sun)])
-        parts = [shape + step * d for d in np.linspace(0, length, max(int(length * 2), 2))]
+        along = np.linspace(0, length, max(int(length * 2), 2))
+        parts = [shape + step * d for shape in shapes for d in along]
         dark = drawn(side, parts, blur)
         image *= (1 - dark * rng.uniform(0.35, 0.7))[..., None]
-    body = drawn(side, [shape], blur)
+    body = drawn(side, shapes, blur)
     colour = colours(rng, ground, kind)
     relief = np.ones((side, side), np.float32)
     if kind in ("heap", "bush"):
@@ -107,14 +124,13 @@ def stand(
         relief -= np.clip(slope * rng.uniform(0.02, 0.08), -0.35, 0.35)
         rough = cv2.GaussianBlur(rng.standard_normal((side, side), dtype=np.float32), (0, 0), 0.8)
         relief += rough * rng.uniform(0.05, 0.3)
-    elif kind == "hut" and rng.random() < 0.6:
-        roof = np.clip(shape, at - 40, at + 40)
-        half = drawn(
-            side,
-            [np.vstack([(roof[0] + roof[3]) / 2, (roof[1] + roof[2]) / 2, roof[2], roof[3]])],
-            0.3,
-        )
-        relief -= half * rng.uniform(0.1, 0.35)
+    elif kind in ("hut", "truck") and rng.random() < 0.6:
+        # Half a roof lies in shade; a truck's cab has a colour of its own.
+        a, b, c, d = np.clip(shapes[0], at - 40, at + 40)
+        cut = 0.5 if kind == "hut" else rng.uniform(0.2, 0.4)
+        ends = [b + (a - b) * cut, b, c, c + (d - c) * cut]
+        half = drawn(side, [np.vstack(ends)], 0.3)
+        relief -= half * rng.uniform(0.1, 0.35) * (1 if kind == "hut" else rng.choice([-2, 1]))
     image += (colour * relief[..., None] - image) * body[..., None]
     np.clip(image, 0, 255, out=image)
     np.maximum(cover, (body > 0.35).astype(np.float32), out=cover)

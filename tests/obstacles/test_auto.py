@@ -65,6 +65,28 @@ def test_a_hole_in_the_outline_is_searched_too(simulated):
     assert found.geometry.intersects(tree.centroid).any()
 
 
+def test_a_crown_that_leans_in_from_outside_is_driven_around(simulated):
+    field = simulated.field
+    tree = simulated.obstacles.sort_values("radius_m").iloc[-1]
+    x, y = (float(v) for v in tree.geometry.centroid.coords[0])
+    # The field ends half a radius before the trunk.
+    _, low, right, high = field.polygon.bounds
+    border = x + 0.5 * tree["radius_m"]
+    cut = gf.Field(field.polygon.intersection(shapely.box(border, low, right, high)), field.crs)
+    assert not cut.polygon.contains(shapely.Point(x, y))
+    found = gf.detect_obstacles(simulated.scene, cut)
+    leaning = active(found)[active(found).geometry.contains(shapely.Point(x, y))]
+    assert len(leaning) == 1
+    # Whatever counts reaches over the outline without its margin.
+    trees = found[found["kind"] == "tree"]
+    away = shapely.distance(cut.polygon, shapely.centroid(trees.geometry.to_numpy()))
+    assert (away <= trees["radius_m"].to_numpy(float) + 0.01).all()
+    tracks = gf.plan_tracks(cut.polygon, found, crs=field.crs, spacing_m=1.0)
+    crown = shapely.Point(x, y).buffer(0.9 * tree["radius_m"])
+    assert not tracks.segments.geometry.intersects(crown).any()
+    assert tracks.segments.geometry.length.sum() > 0
+
+
 @pytest.mark.parametrize("core_px", [96, 160])
 def test_results_do_not_depend_on_the_window(simulated, monkeypatch, core_px):
     whole = gf.detect_obstacles(simulated.scene, simulated.field)

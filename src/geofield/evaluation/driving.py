@@ -96,26 +96,27 @@ def driving(
     truth : GeoDataFrame
         Points or polygons of what stands there.
     field : Polygon or MultiPolygon
-        In the CRS of the segments; truth outside does not count.
+        In the CRS of the segments. Truth outside is not counted, yet ground inside that is
+        kept free of its crown is not lost for nothing.
     reach_m : float
         How near to a true centre a track may not come.
     """
     crs = segments.crs
     lines = _shapes(segments)
     centres = shapely.centroid(_shapes(truth.to_crs(crs)))
-    centres = centres[shapely.covers(field, centres)]
-    discs = shapely.buffer(centres, reach_m * float(ground_scale_of(field, crs)))
+    all_discs = shapely.buffer(centres, reach_m * float(ground_scale_of(field, crs)))
+    discs = all_discs[shapely.covers(field, centres)]
     met = np.unique(shapely.STRtree(lines).query(discs, predicate="intersects")[0])
     inside = shapely.intersection(shapely.union_all(lines), shapely.union_all(discs[met]))
     table = obstacles.to_crs(crs)
     avoided = active(table)
     return Driving(
-        len(centres),
+        len(discs),
         len(met),
         float(ground_lengths_m(inside, crs)),
         float(ground_lengths_m(lines, crs).sum()),
         float(ground_areas_m2(field, crs)),
-        float(ground_areas_m2(_given_up(_shapes(avoided), discs, field), crs)),
+        float(ground_areas_m2(_given_up(_shapes(avoided), all_discs, field), crs)),
         unseen(table, field),
     )
 

@@ -1,19 +1,22 @@
 """Crowns by a network: where their centres are, how large they are, how sure that is.
 
 The network looks at the normalised bands on the working grid and answers for cells of two by
-two pixels: is a crown's centre here, where in the cell, how large is the crown, is the cell
-under a crown, does something else stand here. One crown is one answer: weaker ones within
-reach of a stronger one are the same crown seen twice.
+two pixels: is a crown's centre here, which way from here is it, how large is the crown, is the
+cell under a crown, does something else stand here. Where exactly a centre is, is often in doubt,
+and then several cells share one answer: each votes for the place it points to, and a crown is
+where most votes fall. One crown is one answer: weaker ones within reach of a stronger one are
+the same crown seen twice.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geofield.learned import network
 from geofield.model.circles import Circles
-from geofield.raster import Image, is_peak
+from geofield.raster import Image, is_peak, smoothed
 
 NETWORK = "crowns"
 CELL_PX = 2
@@ -21,8 +24,15 @@ ALIGN_PX = 16
 """The network halves the picture four times."""
 OVERLAP_PX = 112
 """No answer depends on a pixel farther away than this."""
-LEAST = 0.1
-"""Weaker answers of the network are no candidates."""
+LEAST = 0.01
+"""Cells that answer less do not vote."""
+LEAST_VOTES = 0.3
+"""Places with fewer votes are no candidates."""
+SPREAD_CELLS = 1.3
+"""How near to each other votes fall that mean one crown."""
+REACH_CELLS = 3.0
+"""No cell votes for a place farther from it."""
+RIM_CELLS = 8
 
 
 def answers(bands: dict[str, Image | float]) -> dict[str, Image]:
@@ -50,16 +60,47 @@ def answers(bands: dict[str, Image | float]) -> dict[str, Image]:
 
 
 def centres(named: dict[str, Image]) -> Circles:
-    """Return the peaks of the answers, pixels of the working grid; the strength is the answer."""
+    """Return where most votes fall, pixels of the working grid; the strength is their number."""
     p = named["centre"]
-    at = np.nonzero(is_peak(p) & (p >= LEAST))
-    row, col, dx, dy, radius, strength = (
-        np.asarray(v, dtype=np.float64)
-        for v in (*at, named["dx"][at], named["dy"][at], named["radius"][at], p[at])
+    row, col = np.nonzero(p >= LEAST)
+    voters = p[row, col]
+    way = (np.clip(named[d][row, col], -REACH_CELLS, REACH_CELLS) for d in ("dx", "dy"))
+    # Crowns beyond the picture's border take their votes with them.
+    x, y = (here + there + RIM_CELLS for here, there in zip((col, row), way, strict=True))
+    shape = tuple(n + 2 * RIM_CELLS for n in p.shape)
+    votes = _fallen(x, y, voters, shape)
+    at = np.nonzero(is_peak(votes) & (votes >= LEAST_VOTES))
+    size = _fallen(x, y, voters * np.log(named["radius"][row, col]), shape)
+    strength = votes[at].astype(np.float64)
+    y_px, x_px = (
+        (at[axis] + 0.5 + _between(votes, at, axis) - RIM_CELLS) * CELL_PX for axis in (0, 1)
     )
-    x = (col + 0.5 + np.clip(dx, -1, 1)) * CELL_PX
-    y = (row + 0.5 + np.clip(dy, -1, 1)) * CELL_PX
-    return Circles(x, y, radius, strength)
+    return Circles(x_px, y_px, np.exp(size[at] / strength), strength)
+
+
+def _fallen(x: Image, y: Image, weight: Image, shape: tuple[int, ...]) -> Image:
+    """Return the sum of the votes around each cell (rows, cols); x and y in cells."""
+    left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+    count = np.zeros(shape[0] * shape[1])
+    for right in (0, 1):
+        for below in (0, 1):
+            # A place between four cells is shared among them.
+            share = np.abs(1 - right - (x - left)) * np.abs(1 - below - (y - top))
+            where = (top + below) * shape[1] + left + right
+            count += np.bincount(where, weight * share, count.size)
+    around = smoothed(count.reshape(shape).astype(np.float32), SPREAD_CELLS)
+    return np.asarray(around * np.float32(2 * np.pi * SPREAD_CELLS**2), dtype=np.float32)
+
+
+def _between(votes: Image, at: tuple[NDArray[np.intp], ...], axis: int) -> NDArray[np.float64]:
+    """Return how far beside its cell each maximum lies along an axis, by a parabola."""
+    padded = np.pad(votes, 1, mode="edge").astype(np.float64)
+    row, col = at[0] + 1, at[1] + 1
+    step = np.array([axis == 0, axis == 1], dtype=np.intp)
+    before, here, after = (padded[row + k * step[0], col + k * step[1]] for k in (-1, 0, 1))
+    curve = before - 2 * here + after
+    offset = 0.5 * (before - after) / np.where(curve < 0, curve, -1.0)
+    return np.asarray(np.clip(np.where(curve < 0, offset, 0.0), -0.5, 0.5), dtype=np.float64)
 
 
 def once_each(crowns: Circles, share: float, least_px: float) -> Circles:

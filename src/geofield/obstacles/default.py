@@ -86,7 +86,7 @@ def detect_by_default(
     ----------
     picture : Scene or PictureReader
     area : Field or None
-        Only centres inside its outer ring count.
+        Only crowns that reach over its outer ring count, wherever their centres are.
     radius_m : (low, high)
     polarity : {"dark", "bright", "both"}
         Of crowns, against the ring around each.
@@ -108,28 +108,34 @@ def detect_by_default(
     tone = tone_of(picture)
     notes = _doubts(tone, resolution, factor, radius_m)
     facts = network(NETWORK).facts
+    ring = None if area is None else shapely.Polygon(area.polygon_px(picture.grid).exterior)
     standing = outline = None
-    if others and area is not None:
-        outline = shapely.transform(area.polygon_px(picture.grid), lambda c: c / factor)
+    if others and ring is not None:
+        outline = shapely.transform(ring, lambda c: c / factor)
         standing = StandingMap.over(*np.clip(outline.bounds, 0, None).tolist())
         if standing is None:
             notes.append("The field is too large to search it for what is no tree.")
-    crowns = _look(picture, area, tone, factor, polarity, standing, progress)
+    reach = None if ring is None else ring.buffer(radius_m[1] / resolution)
+    crowns = _look(picture, area, reach, tone, factor, polarity, standing, progress)
     crowns = once_each(crowns, **facts["suppression"])
+    p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     shapes: list[shapely.Polygon] = []
     shape_confidence = np.empty(0)
     if standing is not None and outline is not None:
-        sure = crowns.take(crowns.strength >= facts["explains"])
+        sure = crowns.take(p >= facts["explains"])
         shapes, answers_there = standing.things(outline, sure, facts["standing"]["least"])
         shape_confidence = calibrated(np.array(answers_there), facts["standing"]["calibration"])
         likely = np.flatnonzero(shape_confidence >= least)
         shapes = [shapely.transform(shapes[i], lambda c: c * factor) for i in likely]
         shape_confidence = shape_confidence[likely]
-    p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     measured_m = crowns.radius_px * factor * resolution
     radius = np.clip(measured_m, *radius_m) / resolution
     trees = Circles(crowns.x_px * factor, crowns.y_px * factor, radius, p)
     keep = (measured_m >= _BELOW * radius_m[0]) & (measured_m <= _ABOVE * radius_m[1])
+    if ring is not None:
+        shapely.prepare(ring)
+        away = shapely.distance(ring, shapely.points(trees.x_px, trees.y_px))
+        keep &= np.asarray(away <= trees.radius_px)
     return Found(
         trees.take(keep & (p >= least)),
         shapes,
@@ -146,30 +152,32 @@ def calibrated(answer: FloatArray, curve: dict[str, list[float]]) -> FloatArray:
 def _look(
     picture: Picture,
     area: Field | None,
+    reach: shapely.Polygon | None,
     tone: Tone,
     factor: float,
     polarity: Polarity,
     standing: StandingMap | None,
     progress: Progress | None,
 ) -> Circles:
-    """Return all candidates, working pixels, and fill the map of what else stands there."""
-    grid = picture.grid
-    todo = list(windows(grid.shape, CORE_PX, OVERLAP_PX, ALIGN_PX, factor))
-    if area is not None:
-        outline = shapely.Polygon(area.polygon_px(grid).exterior)
-        todo = [w for w in todo if outline.intersects(shapely.box(*w.core))]
+    """Return the candidates of all windows that are within reach, and fill the map.
+
+    The reach is in pixels of the picture, candidates are in working pixels.
+    """
+    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, ALIGN_PX, factor))
+    if reach is not None:
+        todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns = Circles()
     for done, window in enumerate(todo):
         scene = part_of(picture, (window.col, window.row, window.width, window.height), tone)
-        region = search_region(scene, area)
-        if region.any():
+        if scene.valid.any():
             bands = working_bands(scene, tone, factor)
             named = answers(bands)
-            here = _candidates(named, bands, region, factor, polarity)
+            here = _candidates(named, bands, scene.valid, factor, polarity)
             start = round(window.col / factor), round(window.row / factor)
             here = here.scaled(1.0, *start)
             crowns = crowns.joined(here.take(_in_core(here, window, factor)))
             if standing is not None:
+                region = search_region(scene, area)
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
                 standing.fill(named["other"], cells, start[0] // CELL_PX, start[1] // CELL_PX)
         if progress is not None:
@@ -184,13 +192,13 @@ def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_
 def _candidates(
     named: dict[str, Any],
     bands: dict[str, Any],
-    region: NDArray[np.bool_],
+    valid: NDArray[np.bool_],
     factor: float,
     polarity: Polarity,
 ) -> Circles:
-    """Return the candidates of one window that lie in its region, working pixels."""
+    """Return the candidates of one window that lie on the picture, working pixels."""
     crowns = centres(named)
-    crowns = crowns.take(inside(crowns.scaled(factor), region))
+    crowns = crowns.take(inside(crowns.scaled(factor), valid))
     if polarity == "both" or not len(crowns):
         return crowns
     luma = (bands["red"] + bands["green"] + bands["blue"]) / 3

@@ -74,8 +74,9 @@ def detect_obstacles(
         A reader (`geofield.imagery.SceneReader`) is read window by window by ``auto``, so that
         pictures of any size fit into memory; the study's strategies read all of it.
     field : Field, optional
-        Only obstacles with their centre inside its outer ring are returned; holes do not
-        count, since a tree that the outline was cut around still stands in the way. The
+        Only obstacles that reach over its outer ring are returned, a crown that leans in
+        from outside too; holes do not count, since a tree that the outline was cut around
+        still stands in the way. The study's strategies ask for the centre inside. The
         whole scene when not given.
     strategy : str
         One of :data:`STRATEGIES`.

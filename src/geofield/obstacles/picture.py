@@ -103,7 +103,7 @@ def part_of(picture: Picture, window: tuple[int, int, int, int], tone: Tone) -> 
 
 
 def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
-    """Return the pixels (rows, cols) on which an obstacle's centre may lie."""
+    """Return the pixels (rows, cols) of the field, its holes filled, or of the picture."""
     if field is None:
         return scene.valid
     return field.mask(scene.grid, holes=False) & scene.valid
