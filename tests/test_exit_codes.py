@@ -96,6 +96,11 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("undo text.gpkg",),
         ("undo", "undo missing.gpkg"),
     ),
+    "refresh": (
+        ("refresh out/field.gpkg", "refresh out/field.gpkg --json"),
+        ("refresh text.gpkg",),
+        ("refresh", "refresh missing.gpkg"),
+    ),
     "export": (
         ("export out/field.gpkg -f kml --out export",),
         ("export text.gpkg -f kml --out new", "export missing.gpkg -f kml --out new"),

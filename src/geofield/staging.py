@@ -14,6 +14,7 @@ import signal
 import sqlite3
 import tempfile
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -132,6 +133,10 @@ def _publish(
                 hint="Remove the link, or write to another folder.",
             )
         _refuse(place, overwrite, inputs)
+    now_ns = time.time_ns()
+    for path in files:
+        # What came into place together has one time: none of it is older than the rest.
+        os.utime(path, ns=(now_ns, now_ns))
     _move(pairs, target, staging)
     before |= seen(target, places)  # a claim may write more than once
 

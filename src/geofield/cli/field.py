@@ -17,6 +17,7 @@ from geofield.cli.options import (
     settings_option,
 )
 from geofield.cli.parcels import boundary_options, own_parcel
+from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.model import Field, Scene
@@ -223,6 +224,7 @@ def _extract(
     for number, (area_ha, certain) in enumerate(_alternatives(found) if tell else (), 1):
         say(f"Outline {number}  {area_ha:.2f} ha, certainty {certain:.0%}")
     say(f"File       {output}")
+    say_outdated(output)
 
 
 def _alternatives(field: Field) -> list[tuple[float, float]]:

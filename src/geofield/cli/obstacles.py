@@ -10,6 +10,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import section_options, section_values, settings_option
+from geofield.cli.refresh import say_outdated
 
 
 @click.command(
@@ -81,3 +82,4 @@ def obstacles(
     say(f"{len(table)} obstacles ({parts}) in {output}")
     for change in plan.changes:
         say(f"Changes: {change}")
+    say_outdated(output)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from geofield.cli.console import say
+from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.review.shelf import Shelf
@@ -81,6 +82,8 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
         server.server_close()
     for words in shelf.end():
         say(words)
+    if plan_file.is_file():
+        say_outdated(plan_file)
 
 
 def _shelf(plan_file: Path, picture: Path | None) -> Shelf:

@@ -17,6 +17,7 @@ from geofield.cli.options import (
     settings_option,
 )
 from geofield.cli.parcels import boundary_options, own_parcel
+from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.model import Tracks
@@ -142,6 +143,7 @@ def run(
         echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
     else:
         summarise(plan, files, timings)
+        say_outdated(out / "field.gpkg")
 
 
 def _refuse_occupied(out: Path, *, overwrite: bool) -> None:

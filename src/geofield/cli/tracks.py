@@ -11,6 +11,7 @@ import click
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import name_option, section_options, section_values, settings_option
+from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -105,6 +106,7 @@ def tracks(
             rows.append(_row(plan, target))
             if not as_json:
                 say(_line(rows[-1]))
+                say_outdated(target)
     if as_json:
         echo_json({"fields": rows, "failed": failed})
     if failed:

@@ -24,9 +24,12 @@ def undo(plan_file: Path) -> None:
     """Bring back the plan that the last run or stage replaced, edits and all.
 
     It lies beside PLAN.gpkg as PLAN.gpkg.bak; the two change places, so that a second undo
-    takes the first one back. Other products stay as they are: `geofield export` renews them.
+    takes the first one back. Other products stay as they are: `geofield refresh` renews them.
     """
     from geofield.generations import earlier_of, undo
 
     undo(plan_file)
+    from geofield.cli.refresh import say_outdated
+
+    say_outdated(plan_file)
     say(f"{plan_file} is the earlier plan again; the later one is {earlier_of(plan_file)}.")

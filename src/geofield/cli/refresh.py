@@ -1,0 +1,53 @@
+"""``geofield refresh``: all products beside a plan, written anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from geofield.cli.console import echo_json, say
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield tracks out/field.gpkg --spacing 6 -o out/field.gpkg
+  geofield refresh out/field.gpkg
+"""
+)
+@click.argument(
+    "plan_file", metavar="PLAN.gpkg", type=click.Path(exists=True, dir_okay=False, path_type=Path)
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the files as JSON on stdout.")
+def refresh(plan_file: Path, as_json: bool) -> None:
+    """Write all products anew that lie beside PLAN.gpkg: map, report, files of every format.
+
+    After a stage, a review or an edit in QGIS they show the plan as it was before. The
+    GeoPackage itself and the picture stay as they are.
+    """
+    from geofield.cli.claiming import claim_folder
+    from geofield.renewal import outdated, renew
+
+    claim_folder(plan_file.parent)
+    written = renew(plan_file)
+    old = outdated(plan_file)
+    if as_json:
+        echo_json({"files": [str(path) for path in written], "outdated": old})
+        return
+    for path in written:
+        say(str(path))
+    if not written:
+        say(f"There are no products beside {plan_file}: geofield export writes some.")
+    if old:
+        say(f"Still of an earlier plan, with nothing in this one: {', '.join(old)}")
+
+
+def say_outdated(plan_file: Path) -> None:
+    """Tell which products beside a plan are older than it, and how they are renewed."""
+    from geofield.renewal import outdated
+
+    old = outdated(plan_file)
+    if old:
+        say(f"Older than the plan: {', '.join(old)} (renew them: geofield refresh {plan_file})")

@@ -1,0 +1,79 @@
+"""Products beside a plan: told when they are older than it, and renewed by one command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import geopandas as gpd
+import pytest
+
+from geofield.simulate import SimulatedField
+
+GEOFIELD = Path(sys.executable).with_name("geofield")
+PRODUCTS = ["field.rdf", "geojson/", "map.png", "obstacles.rdf", "report.json", "shapefile/"]
+PRODUCTS += ["tracks.rdf"]
+
+
+def geofield(*words: object) -> subprocess.CompletedProcess[str]:
+    line = [str(each) for each in (GEOFIELD, *words)]
+    return subprocess.run(line, capture_output=True, text=True, check=True)
+
+
+@pytest.fixture(scope="module")
+def out(
+    simulated: SimulatedField, simulated_tif: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("renewal") / "out"
+    point = ("--lat", simulated.lat, "--lon", simulated.lon)
+    told = geofield("run", simulated_tif, *point, "--spacing", 8, "--out", folder)
+    assert "Older than the plan" not in told.stderr
+    return folder
+
+
+def test_a_stage_says_what_is_older_and_one_command_renews_it(out: Path) -> None:
+    plan = out / "field.gpkg"
+    before = {name: (out / name).read_bytes() for name in ("map.png", "tracks.rdf")}
+    told = geofield("tracks", plan, "--spacing", 12, "-o", plan).stderr
+    assert f"Older than the plan: {', '.join(PRODUCTS)} (" in told
+    assert f"geofield refresh {plan}" in told
+
+    renewed = json.loads(geofield("refresh", plan, "--json").stdout)
+    assert renewed["outdated"] == []
+    assert {Path(file).relative_to(out).parts[0].rstrip("/") for file in renewed["files"]} == {
+        name.rstrip("/") for name in PRODUCTS
+    }
+    for name, old in before.items():
+        assert (out / name).read_bytes() != old
+    tracks = gpd.read_file(plan, layer="tracks")
+    assert len(gpd.read_file(out / "geojson" / "tracks.geojson")) == len(tracks)
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert report["tracks"]["tracks"] == len(tracks)
+    assert set(report["formats"]) == {"gpkg", "geojson", "shapefile", "rdf"}
+    assert "Older" not in geofield("export", plan, "-f", "kml", "--out", out).stderr
+
+
+def test_what_a_run_did_not_write_again_is_told(
+    out: Path, simulated: SimulatedField, simulated_tif: Path
+) -> None:
+    point = ("--lat", simulated.lat, "--lon", simulated.lon)
+    told = geofield(
+        "run", simulated_tif, *point, "--out", out, "--format", "gpkg", "--overwrite"
+    ).stderr
+    line = next(line for line in told.splitlines() if line.startswith("Older than the plan"))
+    assert "geojson/" in line
+    assert "map.png" not in line
+    # Taking a run back makes all products older: they are of the other plan.
+    assert "map.png" in geofield("undo", out / "field.gpkg").stderr
+
+
+def test_the_study_files_are_renewed_as_such(out: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "field.gpkg"
+    plan.write_bytes((out / "field.gpkg").read_bytes())
+    geofield("export", plan, "-f", "rdf-study", "--out", tmp_path)
+    geofield("tracks", plan, "--spacing", 16, "-o", plan)
+    geofield("refresh", plan)
+    assert b"www.DLC.org/Obstacle#" in (tmp_path / "obstacles.rdf").read_bytes()[:4096]
+    assert not (tmp_path / "map.png").exists()
