@@ -87,6 +87,21 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("tracks text.gpkg -o new.gpkg", "tracks out/field.gpkg --spacing 5000 -o new.gpkg"),
         ("tracks out/field.gpkg", "tracks out/field.gpkg --spacing wide -o new.gpkg"),
     ),
+    "batch": (
+        ("batch out/field.gpkg --spacing 9 --workers 1 --out farm",),
+        (
+            "batch text.gpkg --out new",
+            "batch missing.csv --out new",
+            "batch out/field.gpkg --spacing 5 --out farm",
+            "batch out/field.gpkg missing.tif --out new",
+        ),
+        ("batch out/field.gpkg", "batch out/field.gpkg --out new --workers no"),
+    ),
+    "farm": (
+        (),
+        ("farm get out F -o new.gpkg", "farm put out/field.gpkg out"),
+        ("farm get farm", "farm put missing.gpkg farm", "farm nothing"),
+    ),
     "undo": (
         (
             "tracks out/field.gpkg --spacing 9 -o undone.gpkg",

@@ -24,7 +24,7 @@ def keep_earlier(plan_file: Path, staging: Path) -> None:
     It comes into place together with what replaces it.
     """
     if plan_file.is_file():
-        _copy(plan_file, staging / earlier_of(plan_file).name)
+        copy_whole(plan_file, staging / earlier_of(plan_file).name)
 
 
 def undo(plan_file: Path) -> None:
@@ -42,11 +42,11 @@ def undo(plan_file: Path) -> None:
             hint=f"A run that replaces a plan keeps it as {earlier.name}.",
         )
     with staged_folder(plan_file.parent, overwrite=True) as staging:
-        _copy(earlier, staging / plan_file.name)
+        copy_whole(earlier, staging / plan_file.name)
         keep_earlier(plan_file, staging)
 
 
-def _copy(source: Path, target: Path) -> None:
+def copy_whole(source: Path, target: Path) -> None:
     """A GeoPackage with all that was written to it, also where a program left a log beside it."""
     try:
         uri = f"{source.absolute().as_uri()}?mode=ro"

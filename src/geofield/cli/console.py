@@ -19,8 +19,8 @@ from typing import Any
 
 import click
 
-#: Called with (done, total, what).
-Progress = Callable[[int, int, str], None]
+#: Called with (done, total, what), and facts for programs by name.
+Progress = Callable[..., None]
 
 _PROGRAM_WATCHES = False
 
@@ -108,12 +108,12 @@ def _tell(value: Mapping[str, Any]) -> None:
 def progress_bar(*, quiet: bool = False) -> Iterator[Progress]:
     """A callback that draws a progress bar on stderr, or tells a program how far the work is."""
     if _PROGRAM_WATCHES:
-        yield lambda done, total, what: _tell(
-            {"progress": {"done": done, "total": total, "what": what}}
+        yield lambda done, total, what, **facts: _tell(
+            {"progress": {"done": done, "total": total, "what": what, **facts}}
         )
         return
     if quiet or not sys.stderr.isatty():
-        yield lambda done, total, what: None
+        yield lambda done, total, what, **facts: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -127,7 +127,7 @@ def progress_bar(*, quiet: bool = False) -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
 
-        def show(done: int, total: int, what: str) -> None:
+        def show(done: int, total: int, what: str, **_: Any) -> None:
             bar.update(task, completed=done, total=total or None, description=what)
 
         yield show

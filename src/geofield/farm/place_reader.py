@@ -240,6 +240,9 @@ def _names(
     import pyarrow.compute as pc
 
     ids: list[str | None] = [None] * len(kept)
+    names: list[str | None] = [None] * len(kept)
+    if name_name is not None:
+        names = _texts(raw.table[name_name]).take(kept).to_pylist()
     if id_name is not None:
         column = _texts(raw.table[id_name])
         counts = pc.value_counts(column.drop_null())
@@ -253,11 +256,8 @@ def _names(
                 hint="Give each place an id of its own, or name another column: --id-column.",
             )
         ids = column.take(kept).to_pylist()
-    names = (
-        [None] * len(kept)
-        if name_name is None
-        else _texts(raw.table[name_name]).take(kept).to_pylist()
-    )
+    elif None not in names and len(set(names)) == len(names) and not part.any():
+        ids = list(names)  # names that are all different do as well
     taken = {one for one in ids if one}
     for at, one in enumerate(ids):
         if one:

@@ -97,3 +97,10 @@ def status_table(outcomes: Sequence[Outcome]) -> pa.Table:
     places = np.array([[one.lon, one.lat] for one in outcomes]).reshape(-1, 2)
     columns["geometry"] = pa.array(shapely.to_wkb(shapely.points(places)), pa.binary())
     return pa.table({name: columns[name] for name in (*order, "geometry")})
+
+
+def outcomes_of(table: pa.Table) -> list[dict[str, Any]]:
+    """The rows of a status table as arguments of :class:`Outcome`."""
+    rows = table.drop_columns("geometry").to_pylist()
+    may_miss = ("certainty",)
+    return [{k: v for k, v in row.items() if v is not None or k in may_miss} for row in rows]

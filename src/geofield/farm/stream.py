@@ -97,7 +97,7 @@ def _here(places: Iterator[Place], job: Job) -> Iterator[tuple[Plan | None, str]
 
 def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Plan | None, str]]:
     """On a cluster, never more than a few places per worker in the scheduler."""
-    from distributed import FIRST_COMPLETED, wait
+    from distributed import wait
 
     ahead = max(_AHEAD, _AHEAD * sum(client.nthreads().values()))
     running: set[Any] = set()
@@ -109,7 +109,8 @@ def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Pla
             if place is not None:
                 running.add(client.submit(_one, place, job, pure=False))
         if running:
-            done = wait(running, return_when=FIRST_COMPLETED).done
+            with client.as_current():
+                done = wait(list(running), return_when="FIRST_COMPLETED").done
             running -= done
             for future in done:
                 yield future.result()

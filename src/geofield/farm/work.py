@@ -106,7 +106,11 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     settings = as_settings(job.settings, place.settings)
     if not (np.isfinite(place.lat) and np.isfinite(place.lon)):
         raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
-    boundary = None if place.outline is None else parcel_of(place)
+    if previous is not None and _same_stages(previous.settings, settings):
+        # As the person left it, their names and columns too.
+        field = replace(previous.field, field_id=place.field_id)
+        return replace(previous, field=field, scene=None)
+    boundary = None if place.outline is None or previous is not None else parcel_of(place)
     if job.imagery is not None:
         plan = _on_picture(place, boundary, settings, job, previous)
     elif previous is not None:
@@ -118,9 +122,20 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
             "A point alone has no outline, and there is no picture to find it in.",
             hint="Name the IMAGERY, or give parcels.",
         )
-    plan = run_tracks(plan, settings=settings)
+    return _named(run_tracks(plan, settings=settings), place)
+
+
+def _named(plan: Plan, place: Place) -> Plan:
+    """A plan with the names and columns of its place, without its picture."""
     field = replace(plan.field, field_id=place.field_id, name=place.name, own=place.own)
     return replace(plan, field=field, scene=None)
+
+
+def _same_stages(one: Settings | None, other: Settings) -> bool:
+    """Whether both would have the stages do the same."""
+    return one is not None and (one.field, one.obstacles, one.tracks) == (
+        other.field, other.obstacles, other.tracks
+    )  # fmt: skip
 
 
 def _on_picture(

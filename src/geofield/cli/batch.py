@@ -1,0 +1,267 @@
+"""``geofield batch``: many fields."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from geofield.cli.console import echo_json, progress_bar, say, say_note
+from geofield.cli.interrupts import two_interrupts
+from geofield.cli.options import section_options, section_values, settings_option
+from geofield.cli.place_options import place_options, places_of
+
+if TYPE_CHECKING:
+    from geofield.farm.engine import Engine
+    from geofield.farm.places import Places
+    from geofield.farm.run import Count
+    from geofield.farm.store import Store
+    from geofield.farm.work import Imagery
+    from geofield.settings import Settings
+
+
+@click.command(
+    epilog="""\b
+Examples (on the project's own sample):
+  geofield batch sample_data/seeds.csv sample_data/field_1.tif --spacing 4 --out farm/
+  geofield batch parcels.gpkg --obstacles trees.gpkg --workers 8 --out farm/
+  geofield batch places.parquet ortho/ --scheduler tcp://10.0.0.5:8786 --out s3://bucket/farm
+"""
+)
+@click.argument("places", metavar="PLACES", type=click.Path(path_type=Path))
+@click.argument("imagery", required=False)
+@click.option(
+    "--out",
+    required=True,
+    metavar="FARM",
+    help="Folder of the farm, or s3://BUCKET/FOLDER; where it is begun already, only what is "
+    "missing is done.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(1, 1024),
+    help="Worker processes on this machine; one per core by default.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster: tcp://HOST:8786.")
+@click.option(
+    "--obstacles",
+    "obstacle_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="File of what to avoid: polygons, points with a radius_m, lines.",
+)
+@click.option(
+    "--fresh",
+    is_flag=True,
+    help="Plan all anew where the farm is of other work; what a person reviewed stays.",
+)
+@click.option("--retry", is_flag=True, help="Try places again that failed or were lost.")
+@click.option(
+    "--time-limit",
+    "time_limit_s",
+    type=click.FloatRange(0, min_open=True),
+    default=600.0,
+    show_default=True,
+    help="Of one field, seconds.",
+)
+@click.option(
+    "--memory-limit",
+    "memory_limit_mb",
+    type=click.FloatRange(0, min_open=True),
+    default=4000.0,
+    show_default=True,
+    help="Of a worker, megabytes.",
+)
+@click.option(
+    "--acknowledge-terms",
+    is_flag=True,
+    help="You have permission to derive geodata, though the source's terms forbid it.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
+@place_options
+@settings_option
+@section_options("fetch", only=("allow",))
+@section_options("imagery")
+@section_options("field")
+@section_options("obstacles")
+@section_options("tracks")
+def batch(
+    places: Path,
+    imagery: str | None,
+    out: str,
+    workers: int | None,
+    scheduler: str | None,
+    obstacle_file: Path | None,
+    fresh: bool,
+    retry: bool,
+    time_limit_s: float,
+    memory_limit_mb: float,
+    acknowledge_terms: bool,
+    as_json: bool,
+    settings_file: str | None,
+    **options: Any,
+) -> None:
+    """Plan many fields into one farm.
+
+    PLACES is a file with a row per field: points (CSV or Parquet with columns lat and lon, or
+    any vector file) or parcels (polygons), whose outlines are taken as they are. Columns named
+    like settings (spacing_m, heading_deg, name, ...) hold for their field; all others come along.
+    IMAGERY is whatever `geofield run` takes; parcels need none.
+
+    Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.
+    """
+    # Before the large imports: a typo is told at once.
+    from geofield.settings import load_settings
+
+    settings = load_settings(settings_file, section_values(options))
+    from geofield.errors import FieldError, GeofieldError
+    from geofield.farm.finish import finish
+    from geofield.farm.limits import Limits
+    from geofield.farm.run import run_farm
+    from geofield.farm.store import Store
+    from geofield.farm.work import Job
+
+    found = places_of(places, settings, options)
+    if imagery is None and not found.parcels:
+        raise FieldError(
+            f"{places.name} holds points, and a point alone has no outline.",
+            hint="Name the IMAGERY behind PLACES, or give parcels (polygons).",
+        )
+    pictures, about = (
+        (None, {})
+        if imagery is None
+        else _imagery(imagery, settings, found, acknowledged=acknowledge_terms)
+    )
+    job = Job(settings, pictures, None if obstacle_file is None else obstacle_file.absolute(),
+              options.get("places_crs"))  # fmt: skip
+    store = Store.of(out)
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("Name --workers or --scheduler, not both.")
+    say(f"Places     {len(found)} of {places.name}")
+    with progress_bar(quiet=as_json) as progress, two_interrupts() as control:
+        count = run_farm(
+            found, job, store, lambda: _engine(workers, scheduler, store),
+            limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
+            imagery=about, control=control, tell=lambda at: _show(progress, at),
+        )  # fmt: skip
+    files = finish(store, found)
+    if as_json:
+        echo_json({"farm": store.place, "places": count.total, **count.statuses, "files": files})
+    else:
+        _summarise(count, store.place, files)
+    if count.done < count.total:
+        raise GeofieldError(
+            f"Stopped: {count.done} of {count.total} places are done.",
+            hint="The same command does what is missing.",
+        )
+    if count.failed == count.total:
+        raise GeofieldError("No place could be planned.", hint="The reasons are in failed.csv.")
+
+
+def _imagery(
+    what: str, settings: Settings, places: Places, *, acknowledged: bool
+) -> tuple[Imagery, dict[str, Any]]:
+    """Where pictures come from, and what the record says of it; terms are checked here, once."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from geofield.cli.imagery_tools import cache_dir_of, fetch_options, resolve
+    from geofield.farm.pictures import refuse_elsewhere
+    from geofield.farm.work import Imagery
+    from geofield.imagery import is_own_picture
+    from geofield.imagery.sources import PictureSource
+    from geofield.imagery.terms import check_terms
+
+    if is_own_picture(what):
+        refuse_elsewhere(Path(what), places, settings)
+        return Imagery(str(Path(what).absolute())), {"imagery": Path(what).name}
+    options = fetch_options(settings, cache_dir_of(settings))
+    first = int(np.flatnonzero(np.isfinite(places.lat))[0])
+    point = (float(places.lon[first]), float(places.lat[first]))
+    source = resolve(what, settings, point=point, options=options)
+    terms = source.terms
+    check_terms(source.name, terms, acknowledged=acknowledged)
+    about = {
+        "imagery": source.name,
+        "attribution": terms.attribution,
+        "licence": terms.licence,
+        "terms_url": terms.url,
+        "identity": source.path if isinstance(source, PictureSource) else "",
+    }
+    options = replace(options, acknowledged=acknowledged)
+    return Imagery(source=source, options=options), about
+
+
+def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
+    """Who does the work; said, with the address of a dashboard."""
+    import os
+
+    from geofield.errors import GeofieldError
+
+    engine: Engine
+    if scheduler is not None:
+        if not _has_dask():
+            raise GeofieldError(
+                "A Dask cluster needs the extra: pip install geofield[batch]",
+                hint="Without it, --workers N uses this machine.",
+            )
+        from geofield.farm.cluster import Cluster
+
+        engine = Cluster.at(scheduler, store)
+    else:
+        cores = getattr(os, "sched_getaffinity", None)
+        count = workers or (len(cores(0)) if cores else os.cpu_count() or 1)
+        if _has_dask():
+            from geofield.farm.cluster import Cluster
+
+            engine = Cluster.here(count)
+        else:
+            from geofield.farm.pool import Pool
+
+            engine = Pool(count)
+    say(f"Workers    {engine.where}")
+    return engine
+
+
+def _has_dask() -> bool:
+    """Whether the extra is there."""
+    from importlib.util import find_spec
+
+    try:
+        return find_spec("distributed") is not None
+    except ValueError:
+        return False
+
+
+def _show(progress: Any, count: Count) -> None:
+    """How far the run is: fields per minute, failed, time left."""
+    left = count.left_s
+    words = f"{count.per_minute:.0f} fields per minute, {count.failed} failed"
+    if left is not None and count.done < count.total:
+        words += f", {_span(left)} left"
+    progress(
+        count.done,
+        count.total,
+        words,
+        failed=count.failed,
+        per_minute=round(count.per_minute, 1),
+        left_s=None if left is None else round(left),
+    )
+
+
+def _span(seconds: float) -> str:
+    """A time in words."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def _summarise(count: Count, place: str, files: list[str]) -> None:
+    parts = ", ".join(f"{n} {status}" for status, n in sorted(count.statuses.items()))
+    say(f"Fields     {count.done} of {count.total}: {parts or 'none'}")
+    if count.done > count.before:
+        say(f"Pace       {count.per_minute:.0f} per minute")
+    if count.failed:
+        say_note(f"{count.failed} places have no plan: the reasons are in {place}/failed.csv.")
+    say(f"Farm       {place}" + (f" ({', '.join(files)})" if files else ""))

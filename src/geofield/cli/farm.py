@@ -1,0 +1,71 @@
+"""``geofield farm``: put reviewed plans back into a farm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from geofield.cli.console import say
+
+
+@click.group(
+    epilog="""\b
+Example (the farm is that of `geofield batch --help`):
+  geofield batch sample_data/seeds.csv sample_data/field_1.tif --spacing 4 --out farm/
+  geofield farm get farm/ field_1 -o field_1.gpkg
+  geofield farm put field_1.gpkg farm/
+"""
+)
+def farm() -> None:
+    """Take single plans out of a farm, and put them back when they are reviewed."""
+
+
+@farm.command(
+    epilog="""\b
+Example:
+  geofield farm get farm/ field_1 -o field_1.gpkg
+"""
+)
+@click.argument("folder", metavar="FARM")
+@click.argument("field_id", metavar="ID")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="GeoPackage.")
+@click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
+def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
+    """Write the plan of one field of FARM as a GeoPackage, for QGIS and `geofield review`."""
+    from geofield.errors import FormatError
+    from geofield.farm import read_farm
+    from geofield.plan_files import save_plan
+
+    whole = read_farm(folder)
+    if field_id not in whole:
+        import difflib
+
+        close = difflib.get_close_matches(field_id, whole.ids, n=1)
+        raise FormatError(
+            f"{folder} has no plan of a field {field_id!r}."
+            + (f" Did you mean {close[0]!r}?" if close else ""),
+            hint="Its status table tells what became of each place.",
+        )
+    save_plan(whole[field_id], output, overwrite=overwrite)
+    say(f"Plan       {output}")
+
+
+@farm.command(
+    epilog="""\b
+Example:
+  geofield farm put field_1.gpkg farm/
+"""
+)
+@click.argument("plan_file", metavar="PLAN", type=click.Path(exists=True, path_type=Path))
+@click.argument("folder", metavar="FARM")
+def put(plan_file: Path, folder: str) -> None:
+    """Put the reviewed PLAN of one field back into FARM.
+
+    It takes the place of the plan that is there, and no later run of `geofield batch` changes
+    what a person said.
+    """
+    from geofield.farm.reviewed import put_back
+
+    field_id = put_back(plan_file, folder)
+    say(f"Field      {field_id} of {folder} is now as you left it")

@@ -1,0 +1,36 @@
+"""Interrupts of a long run: the first lets what is begun end, the second stops at once."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from geofield.cli.console import say_note
+
+if TYPE_CHECKING:
+    from geofield.farm.engine import Control
+
+
+@contextmanager
+def two_interrupts() -> Iterator[Control]:
+    """A control that the first Ctrl+C sets; the second, and SIGTERM, end the block."""
+    from geofield.farm.engine import Control
+
+    control = Control()
+    if threading.current_thread() is not threading.main_thread():
+        yield control
+        return
+
+    def first(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        control.stop.set()
+        say_note("What is begun is finished; again Ctrl+C stops at once.")
+
+    before = signal.signal(signal.SIGINT, first)
+    try:
+        yield control
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,191 @@
+"""A Dask cluster as engine: one of this machine, or any that exists (extra `batch`).
+
+Workers write into the farm's folder themselves; through the scheduler go only the places of a
+chunk, and back how many of them went well.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from geofield import __version__
+from geofield.errors import GeofieldError, NetworkError
+from geofield.farm.chunk import Done, Orders, Task, plan_chunk
+from geofield.farm.engine import ONE_THREAD, Control, Patience, one_thread
+from geofield.farm.store import Store
+
+#: Chunks per worker thread in the scheduler: one is worked on, one is there when it is done.
+_AHEAD = 2
+_CONNECT_S = 15
+
+
+class Cluster:
+    """A Dask cluster.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    own : list
+        What is closed with the engine: nothing of a cluster that was given.
+    """
+
+    def __init__(self, client: Any, own: list[Any] | None = None) -> None:
+        self._client = client
+        self._own = own or []
+
+    @classmethod
+    def here(cls, workers: int) -> Cluster:
+        """A cluster of processes on this machine."""
+        import dask
+        from distributed import Client, LocalCluster
+
+        # A chunk that ends a worker is handed back at once; which place it was, its marks tell.
+        dask.config.set({"distributed.scheduler.allowed-failures": 0})
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            env=ONE_THREAD,
+            memory_limit=0,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+        )
+        client = Client(cluster, set_as_default=False)
+        return cls(client, [client, cluster])
+
+    @classmethod
+    def at(cls, address: str, store: Store) -> Cluster:
+        """A cluster that exists, whose workers can do the work on a farm.
+
+        Raises
+        ------
+        NetworkError
+            When its scheduler does not answer.
+        GeofieldError
+            When its workers cannot do the work.
+        """
+        from distributed import Client
+
+        try:
+            client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise NetworkError(
+                f"The scheduler {address} does not answer ({type(error).__name__}).",
+                hint="Start one with `dask scheduler`, and name its address: tcp://HOST:8786.",
+            ) from None
+        cluster = cls(client, [client])
+        try:
+            cluster.check(store)
+        except BaseException:
+            cluster.close()
+            raise
+        return cluster
+
+    @property
+    def where(self) -> str:
+        """In words, with the dashboard's address."""
+        threads = sum(self._client.nthreads().values())
+        link = self._client.dashboard_link
+        return f"{threads} Dask worker threads" + (f", dashboard at {link}" if link else "")
+
+    def check(self, store: Store) -> None:
+        """Refuse workers that cannot do the work, before they have it.
+
+        Raises
+        ------
+        GeofieldError
+            When there are none, they have another version of geofield or none, or do not see the
+            farm's folder.
+        """
+        until = time.monotonic() + _CONNECT_S
+        while not self._client.nthreads():
+            if time.monotonic() > until:
+                raise GeofieldError(
+                    "The scheduler has no workers.", hint="Start some with `dask worker ADDRESS`."
+                )
+            time.sleep(0.2)
+        probe = f".work/probe-{time.time_ns()}"
+        store.put(probe, b"here")
+        try:
+            answers = self._client.run(_facts, store, probe, on_error="return")
+        finally:
+            store.remove(probe)
+        for worker, facts in sorted(answers.items()):
+            if isinstance(facts, ImportError):
+                raise GeofieldError(
+                    f"The worker {worker} has no geofield that fits: {facts}.",
+                    hint="Install the same version of geofield[batch] where workers run.",
+                )
+            if isinstance(facts, BaseException):
+                raise GeofieldError(f"The worker {worker} cannot be used: {facts}.")
+            version, sees = facts
+            if version != __version__:
+                raise GeofieldError(
+                    f"The worker {worker} has geofield {version}; here it is {__version__}.",
+                    hint="Install the same version everywhere: results could differ.",
+                )
+            if not sees:
+                raise GeofieldError(
+                    f"The worker {worker} does not see {store.place}.",
+                    hint="Write to a folder that all machines share, or to an object store.",
+                )
+
+    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+        """Plan chunks; see `geofield.farm.engine.Engine`."""
+        from distributed import KilledWorker, wait
+
+        patience = Patience()
+        running: dict[Any, Task] = {}
+        again: list[Task] = []
+        try:
+            while True:
+                ahead = _AHEAD * max(1, sum(self._client.nthreads().values()))
+                while len(running) < ahead and not control.stop.is_set():
+                    task = again.pop() if again else next(tasks, None)
+                    if task is None:
+                        break
+                    running[self._client.submit(_work, task, orders, pure=False)] = task
+                if not running:
+                    return
+                try:
+                    with self._client.as_current():
+                        ready = wait(list(running), 0.5, return_when="FIRST_COMPLETED").done
+                except TimeoutError:
+                    continue
+                for future in ready:
+                    task = running.pop(future)
+                    try:
+                        yield future.result()
+                    except KilledWorker:
+                        patience.again(task)
+                        again.append(task)
+        finally:
+            for future in running:
+                future.cancel()
+
+    def close(self) -> None:
+        """Leave the cluster; end it where it is our own."""
+        for each in self._own:
+            for nanny in getattr(each, "workers", {}).values():
+                # Native code does not listen: it is not asked.
+                nanny.auto_restart = False
+                with contextlib.suppress(OSError, AttributeError, TypeError):
+                    os.kill(nanny.pid, signal.SIGKILL)
+        for each in self._own:
+            with contextlib.suppress(TimeoutError, OSError):
+                each.close(timeout=10)
+
+
+def _facts(store: Store, probe: str) -> tuple[str, bool]:
+    """What a worker is: its version, and whether it sees the farm."""
+    return __version__, store.get(probe) is not None
+
+
+def _work(task: Task, orders: Orders) -> Done:
+    one_thread()
+    return plan_chunk(task, orders)

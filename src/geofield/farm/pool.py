@@ -1,0 +1,163 @@
+"""A pool of worker processes on this machine, each of which may die without harm."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import IO, Any
+
+from geofield.errors import GeofieldError
+from geofield.farm.chunk import Done, Orders, Task
+from geofield.farm.engine import ONE_THREAD, Control, Patience
+from geofield.farm.worker import receive, send
+
+#: Workers that end before they are ready: more of them are no accident.
+_FALSE_STARTS = 3
+_GONE = object()
+
+
+class Pool:
+    """Processes of this machine.
+
+    Parameters
+    ----------
+    workers : int
+        How many; one for each core is best.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._count = workers
+        self._workers: list[_Worker] = []
+        self._events: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
+
+    @property
+    def where(self) -> str:
+        """In words."""
+        return f"{self._count} worker{'s' if self._count > 1 else ''} on this machine"
+
+    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+        """Plan chunks; see `geofield.farm.engine.Engine`."""
+        patience, false_starts = Patience(), 0
+        again: deque[Task] = deque()
+        try:
+            while True:
+                self._employ(tasks, again, orders, control)
+                if not any(worker.task for worker in self._workers):
+                    return
+                # Not forever: an interrupt must come through on every system.
+                with contextlib.suppress(queue.Empty):
+                    worker, message = self._events.get(timeout=0.5)
+                    if message is _GONE:
+                        if worker in self._workers:
+                            self._workers.remove(worker)
+                        false_starts = 0 if worker.ready else false_starts + 1
+                        if false_starts >= _FALSE_STARTS:
+                            raise GeofieldError(
+                                "Workers end before they are ready: " + worker.last_words()
+                            )
+                        if worker.task is not None:
+                            if worker.ready:
+                                patience.again(worker.task)
+                            again.append(worker.task)
+                        worker.close()
+                    elif message == "ready":
+                        worker.ready = True
+                    elif isinstance(message, BaseException):
+                        raise message
+                    else:
+                        worker.task = None
+                        yield message
+        finally:
+            self.close()
+
+    def _employ(
+        self, tasks: Iterator[Task], again: deque[Task], orders: Orders, control: Control
+    ) -> None:
+        """Give every free worker a chunk, and start workers that are missing."""
+        free = [worker for worker in self._workers if worker.task is None]
+        while free or len(self._workers) < self._count:
+            if control.stop.is_set():
+                return
+            task = again.popleft() if again else next(tasks, None)
+            if task is None:
+                return
+            if free:
+                worker = free.pop()
+            else:
+                worker = _Worker.start(orders, self._events)
+                self._workers.append(worker)
+            worker.take(task)
+
+    def close(self) -> None:
+        """End all workers now."""
+        for worker in self._workers:
+            worker.close()
+        self._workers.clear()
+
+
+@dataclass(eq=False)
+class _Worker:
+    """One process."""
+
+    process: subprocess.Popen[bytes]
+    errors: IO[bytes]
+    task: Task | None = None
+    ready: bool = False
+    _stdin: Any = field(default=None)
+
+    @classmethod
+    def start(cls, orders: Orders, events: queue.Queue[tuple[_Worker, Any]]) -> _Worker:
+        errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the worker
+        path = os.pathsep.join(part for part in sys.path if part)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "geofield.farm.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": path},
+            # Ctrl+C of a terminal goes to all processes of its group.
+            start_new_session=True,
+        )
+        worker = cls(process, errors)
+
+        def listen() -> None:
+            with contextlib.suppress(EOFError, OSError, ValueError):
+                while process.stdout is not None:
+                    events.put((worker, receive(process.stdout)))  # type: ignore[arg-type]
+            events.put((worker, _GONE))
+
+        threading.Thread(target=listen, name="answers", daemon=True).start()
+        worker._say(orders)
+        return worker
+
+    def take(self, task: Task) -> None:
+        """Give it a chunk; where it has died meanwhile, that is heard of soon."""
+        self.task = task
+        self._say(task)
+
+    def _say(self, message: Any) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            send(self.process.stdin, message)  # type: ignore[arg-type]
+
+    def last_words(self) -> str:
+        """The end of what it wrote on its standard error."""
+        self.errors.seek(0)
+        lines = self.errors.read().decode(errors="replace").strip().splitlines()
+        return lines[-1][:300] if lines else f"exit status {self.process.wait()}"
+
+    def close(self) -> None:
+        """End it now."""
+        self.process.kill()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout, self.errors):
+            with contextlib.suppress(OSError):
+                if stream is not None:
+                    stream.close()

@@ -1,0 +1,127 @@
+"""Plans that a person reviewed and put back into a farm: no run changes their word."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, unquote
+
+from geofield.errors import FormatError
+from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
+from geofield.farm.folder import file_of as file_in
+from geofield.farm.layers import LAYERS, PLAN, tables_of
+from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
+from geofield.farm.store import Store
+from geofield.generations import copy_whole
+from geofield.plan import Plan, read_plan
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_SUFFIX = ".gpkg"
+LAYER_NAMES = tuple(each.name for each in LAYERS)
+#: Of a status row that a person's plan took the place of.
+_SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
+
+
+def file_of(field_id: str) -> str:
+    """Where the reviewed plan of a field lies."""
+    return f"{REVIEWED}/{quote(field_id, safe=' ')}{_SUFFIX}"
+
+
+def reviewed_ids(store: Store) -> frozenset[str]:
+    """The fields that a person put back."""
+    names = store.names(REVIEWED)
+    return frozenset(unquote(n.removesuffix(_SUFFIX)) for n in names if n.endswith(_SUFFIX))
+
+
+def reviewed_plan(store: Store, field_id: str) -> Plan:
+    """The plan of a field as a person left it."""
+    if store.folder is not None:
+        return read_plan(store.folder / file_of(field_id))
+    data = store.get(file_of(field_id))
+    if data is None:
+        raise FormatError(f"The reviewed plan of {field_id} is gone from {store.place}.")
+    with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
+        path = Path(folder) / "field.gpkg"
+        path.write_bytes(data)
+        return read_plan(path)
+
+
+def put_back(plan_file: Path, folder: str | Path) -> str:
+    """Put a reviewed plan back into a farm, in the place of the one that is there.
+
+    The plan itself is kept in the farm, so that no later run changes what a person said.
+
+    Returns
+    -------
+    str
+        The field's id.
+
+    Raises
+    ------
+    FormatError
+        When there is no such field in the farm.
+    """
+    store = Store.of(folder)
+    if Record.read(store) is None:
+        raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
+    plan = read_plan(plan_file)
+    field_id = plan.field.field_id
+    with store.alone():
+        for chunk in committed(store):
+            status = read_part(store, STATUS, chunk)
+            if status is not None and field_id in status["field_id"].to_pylist():
+                break
+        else:
+            raise FormatError(
+                f"{folder} has no field {field_id!r}.",
+                hint="The field's id must be that of the farm: see its status table.",
+            )
+        # First what must not be lost; the tables follow from it.
+        store.put(file_of(field_id), _file_bytes(plan_file))
+        _replace(store, chunk, plan, status)
+    return field_id
+
+
+def _file_bytes(path: Path) -> bytes:
+    """A GeoPackage with all that was written to it, also where a program has it open."""
+    with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
+        copy = Path(folder) / path.name
+        copy_whole(path, copy)
+        return copy.read_bytes()
+
+
+def _replace(store: Store, chunk: int, plan: Plan, status: pa.Table) -> None:
+    """Write a chunk again with one plan in the place of another."""
+    parts = {name: read_part(store, name, chunk) for name in (*LAYER_NAMES, PLAN)}
+    tables = {name: table for name, table in parts.items() if table is not None}
+    ids = status["field_id"].to_pylist()
+    fresh = tables_of([plan])
+    merged = {}
+    for name in (*LAYER_NAMES, PLAN):
+        if name in tables or name in fresh:
+            merged[name] = _spliced(tables.get(name), fresh.get(name), plan.field.field_id, ids)
+    rows = [
+        Outcome(**row | outcome_words(plan) | _SAID) if row["field_id"] == plan.field.field_id
+        else Outcome(**row)
+        for row in outcomes_of(status)
+    ]  # fmt: skip
+    # Rows of layers that are no longer there must not stay.
+    store.remove(file_in(STATUS, chunk))
+    write_chunk(store, chunk, merged, status_table(rows))
+
+
+def _spliced(old: Any, new: Any, field_id: str, ids: list[str]) -> pa.Table:
+    """A table with one field's rows exchanged, the fields in their order."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    rest = None if old is None else old.filter(pc.not_equal(old["field_id"], field_id))
+    parts = [part for part in (rest, new) if part is not None]
+    whole = pa.concat_tables(parts, promote_options="permissive")
+    at = pc.index_in(whole["field_id"], pa.array(ids, pa.string()))
+    order = pc.sort_indices(pa.table({"at": at, "row": range(len(whole))}),
+                            sort_keys=[("at", "ascending"), ("row", "ascending")])  # fmt: skip
+    return whole.take(order)

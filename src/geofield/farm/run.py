@@ -1,0 +1,195 @@
+"""A run: places in, farm out; only what is missing is done."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from geofield.errors import OutputExistsError
+from geofield.farm import folder as place
+from geofield.farm.chunk import Orders, Task
+from geofield.farm.digest import difference, record_of
+from geofield.farm.engine import Control, Engine
+from geofield.farm.limits import Limits
+from geofield.farm.marks import WORK, excuse_all
+from geofield.farm.places import Places
+from geofield.farm.reviewed import reviewed_ids
+from geofield.farm.store import Store
+from geofield.farm.value import clear
+from geofield.farm.work import Job
+
+#: Places per chunk at most, with pictures and without: about half a minute of work.
+MOST_WITH_PICTURES, MOST_PARCELS = 25, 250
+_LEAST_PARCELS = 25
+#: Chunks that a run has at least, where there are enough places, so that all workers have work.
+_CHUNKS = 64
+
+
+@dataclass
+class Count:
+    """How far a run is.
+
+    Attributes
+    ----------
+    total : int
+        Places of the farm.
+    statuses : Counter
+        How many places have which status.
+    before : int
+        Places that were done when the run began.
+    """
+
+    total: int
+    statuses: Counter[str] = field(default_factory=Counter)
+    before: int = 0
+    _begun: float = field(default_factory=time.monotonic)
+
+    @property
+    def done(self) -> int:
+        """Places with a status."""
+        return sum(self.statuses.values())
+
+    @property
+    def failed(self) -> int:
+        """Places that failed or were lost."""
+        return self.statuses["failed"] + self.statuses["lost"]
+
+    @property
+    def per_minute(self) -> float:
+        """Places per minute in this run."""
+        return 60.0 * (self.done - self.before) / max(time.monotonic() - self._begun, 1e-3)
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds that are left at this pace; None where it is not known."""
+        pace = self.per_minute / 60.0
+        return (self.total - self.done) / pace if pace > 0 else None
+
+
+def chunk_fields(places: int, *, pictures: bool) -> int:
+    """Places per chunk: the same for the same work, whoever does it."""
+    wanted = -(-places // _CHUNKS)
+    if pictures:
+        return max(1, min(wanted, MOST_WITH_PICTURES))
+    return max(_LEAST_PARCELS, min(wanted, MOST_PARCELS))
+
+
+def run_farm(
+    places: Places,
+    job: Job,
+    store: Store,
+    engine: Callable[[], Engine],
+    *,
+    limits: Limits | None = None,
+    fresh: bool = False,
+    retry: bool = False,
+    imagery: Mapping[str, Any] | None = None,
+    control: Control | None = None,
+    tell: Callable[[Count], None] = lambda count: None,
+) -> Count:
+    """Plan all places that have no status yet.
+
+    Parameters
+    ----------
+    places : Places
+    job : Job
+    store : Store
+        New, empty, or a farm of the same places and settings.
+    engine : callable
+        Gives the engine; asked only when there is something to do.
+    limits : Limits, optional
+        Of one field.
+    fresh : bool
+        Plan all anew where the farm is of other places or settings; what a person reviewed stays.
+    retry : bool
+        Plan chunks again in which places failed or were lost.
+    imagery : mapping, optional
+        The pictures and their terms, for the record.
+    control : Control, optional
+    tell : callable
+        Called with the count when a chunk is done.
+
+    Raises
+    ------
+    OutputExistsError
+        When the folder holds something else.
+    FormatError
+        When it cannot be written.
+    """
+    with store.alone():
+        record = _prepare(places, job, store, imagery or {}, fresh=fresh)
+        done = place.committed(store)
+        if retry:
+            done = _forget_failed(store, done)
+        excuse_all(store)
+        count = Count(len(places), _statuses(store, done))
+        count.before = count.done
+        order = places.order()
+        size = record.chunk_fields
+        missing = sorted(set(range(record.chunks)) - set(done))
+        orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
+
+        def tasks() -> Iterator[Task]:
+            for chunk in missing:
+                yield Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
+
+        tell(count)
+        if missing:
+            hired = engine()
+            try:
+                for one in hired.run(tasks(), orders, control or Control()):
+                    count.statuses.update(one.counts)
+                    tell(count)
+            finally:
+                hired.close()
+        if count.done == count.total:
+            store.remove(WORK)
+        return count
+
+
+def _prepare(
+    places: Places, job: Job, store: Store, imagery: Mapping[str, Any], *, fresh: bool
+) -> place.Record:
+    """The record of the farm: the one that is there, when it is of the same work, or a new one."""
+    size = chunk_fields(len(places), pictures=job.imagery is not None)
+    wanted = record_of(places, job, imagery, size)
+    there = place.Record.read(store)
+    if there is None and store.names(""):
+        raise OutputExistsError(
+            f"{store.place} is not empty, and no farm.", hint="Choose another folder with --out."
+        )
+    if there is not None and there.digest != wanted.digest and not fresh:
+        raise OutputExistsError(
+            f"{store.place} is a farm of other work: {difference(there, wanted)}.",
+            hint="Choose another folder, or --fresh: all is planned anew, what you reviewed stays.",
+        )
+    if there is not None and fresh:
+        clear(store)
+        store.remove(WORK)
+    if there is None or there.digest != wanted.digest or fresh:
+        store.put(place.RECORD, wanted.to_json())
+    return wanted
+
+
+def _statuses(store: Store, chunks: list[int]) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    for chunk in chunks:
+        table = place.read_part(store, place.STATUS, chunk, ["status"])
+        if table is not None:
+            counts.update(table["status"].to_pylist())
+    return counts
+
+
+def _forget_failed(store: Store, chunks: list[int]) -> list[int]:
+    """The chunks in which all went well; the marks of the others are taken away."""
+    kept = []
+    for chunk in chunks:
+        counts = _statuses(store, [chunk])
+        if counts["failed"] or counts["lost"]:
+            store.remove(place.file_of(place.STATUS, chunk))
+        else:
+            kept.append(chunk)
+    return kept

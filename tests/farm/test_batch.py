@@ -1,0 +1,355 @@
+"""``geofield batch`` as a process: farms, restarts, bad input."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+
+import geofield as gf
+from geofield.farm import read_farm
+
+GEOFIELD = Path(sys.executable).with_name("geofield")
+#: The command without the extra, as where it is not installed.
+PLAIN = [
+    sys.executable,
+    "-c",
+    "import sys; sys.modules['distributed'] = None; from geofield.cli import main; main()",
+]
+
+
+RECTANGLE = ((0, 0), (80, 0), (80, 60), (0, 60))
+
+
+def batch(*arguments: object, code: int = 0, plain: bool = True) -> str:
+    """Run the command; its messages."""
+    line = [*(PLAIN if plain else [str(GEOFIELD)]), "batch", *map(str, arguments)]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=500, check=False)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def layers_of(farm: Path) -> dict[str, bytes]:
+    """The bytes of all files of a farm but its status, which holds seconds and workers."""
+    return {
+        str(file.relative_to(farm)): file.read_bytes()
+        for file in sorted(farm.rglob("*"))
+        if file.is_file() and file.relative_to(farm).parts[0] != "status"
+    }
+
+
+def parcels(path: Path, count: int = 60, **columns: object) -> Path:
+    """Parcels of many shapes side by side, in two zones."""
+    rng = np.random.default_rng(5)
+    shapes = []
+    for number in range(count):
+        row, column = divmod(number, 10)
+        corners = rng.uniform(0, 12, (4, 2)) + np.array(RECTANGLE)
+        x, y = 11.99 + column * 0.002, 50.0 + row * 0.002
+        shapes.append(shapely.Polygon(corners / [71_000, 111_000] + [x, y]))
+    frame = gpd.GeoDataFrame(
+        {"id": [f"p{n}" for n in range(count)], "crop": ["rye", "oats"] * (count // 2), **columns},
+        geometry=shapes,
+        crs=4326,
+    )
+    frame.to_file(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def farm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A farm of parcels made by one worker, beside its places."""
+    folder = tmp_path_factory.mktemp("batch")
+    batch(parcels(folder / "parcels.gpkg"), "--spacing", 5, "--out", folder / "farm",
+          "--workers", 1)  # fmt: skip
+    return folder / "farm"
+
+
+def test_a_farm_holds_every_place(farm: Path) -> None:
+    whole = read_farm(farm)
+    assert len(whole) == 60
+    assert set(whole.status["status"]) == {"done"}
+    assert set(whole.fields["crop"]) == {"rye", "oats"}
+    assert set(whole.fields["utm_epsg"]) == {32632, 32633}
+    assert whole["p7"].settings.tracks.spacing_m == 5.0
+    assert sorted(farm.glob("*.csv")) == []
+    alone = next(
+        plan
+        for plan in gf.plan_fields(farm.parent / "parcels.gpkg", spacing_m=5)
+        if plan.field.field_id == "p7"
+    )
+    assert whole["p7"] == alone
+
+
+def test_a_restart_does_only_what_is_missing(farm: Path, tmp_path: Path) -> None:
+    before = layers_of(farm)
+    mark = farm / "status" / "chunk=0001" / "part-0.parquet"
+    kept = farm / "status" / "chunk=0000" / "part-0.parquet"
+    stamp = kept.stat().st_mtime_ns
+    mark.unlink()
+    (farm / "tracks" / "chunk=0001" / "part-0.parquet").write_bytes(b"half")
+    said = batch(farm.parent / "parcels.gpkg", "--spacing", 5, "--out", farm)
+    assert "60 done" in said
+    assert mark.exists()
+    assert kept.stat().st_mtime_ns == stamp
+    assert layers_of(farm) == before
+
+
+@pytest.mark.slow
+def test_dask_and_two_workers_give_the_same_bytes(farm: Path, tmp_path: Path) -> None:
+    said = batch(farm.parent / "parcels.gpkg", "--spacing", 5, "--out", tmp_path / "farm",
+                 "--workers", 2, plain=False)  # fmt: skip
+    assert "dashboard at http" in said
+    assert layers_of(tmp_path / "farm") == layers_of(farm)
+
+
+def test_other_work_is_refused_and_fresh_does_it(farm: Path, tmp_path: Path) -> None:
+    places = parcels(tmp_path / "parcels.gpkg", 20)
+    batch(places, "--spacing", 5, "--out", tmp_path / "farm")
+    before = layers_of(tmp_path / "farm")
+    said = batch(places, "--spacing", 6, "--out", tmp_path / "farm", code=1)
+    assert "spacing_m was 5.0 and is 6.0" in said
+    assert "--fresh" in said
+    assert layers_of(tmp_path / "farm") == before
+    batch(places, "--spacing", 6, "--fresh", "--out", tmp_path / "farm")
+    assert {p.settings.tracks.spacing_m for p in read_farm(tmp_path / "farm")} == {6.0}
+
+
+def test_pictures_are_searched_for_outlines_and_obstacles(sample: Path, tmp_path: Path) -> None:
+    text = (sample / "seeds.csv").read_text().splitlines()[:2]
+    text += ["far,x,x,36.5,33.5,0,1", "edge,x,x,35.07,33.53,0,1"]
+    (tmp_path / "seeds.csv").write_text("\n".join(text))
+    said = batch(tmp_path / "seeds.csv", sample / "field_1.tif", "--spacing", 4,
+                 "--out", tmp_path / "farm")  # fmt: skip
+    assert "2 places have no plan" in said
+    whole = read_farm(tmp_path / "farm")
+    assert whole.ids == ["field_1"]
+    assert len(whole.obstacles) > 5
+    status = whole.status.set_index("field_id")
+    assert status.loc["field_1", "status"] in ("done", "doubtful")
+    assert status.loc["far", "status"] == "failed"
+    assert "outside" in status.loc["far", "error"]
+    # The reasons and columns are in a file of places again.
+    again = pd.read_csv(tmp_path / "farm" / "failed.csv").set_index("field_id")
+    assert set(again.index) == {"far", "edge"}
+    assert again.loc["far", "image"] == "x"
+    assert "outside" in again.loc["far", "error"]
+    said = batch(tmp_path / "farm" / "failed.csv", sample / "field_1.tif", "--out",
+                 tmp_path / "again", code=1)  # fmt: skip
+    assert "None of the 2 places" in said
+    assert not (tmp_path / "again").exists()
+
+
+def test_failed_parcels_are_parcels_again(tmp_path: Path) -> None:
+    places = parcels(tmp_path / "p.gpkg", 4, spacing_m=[5.0, 900.0, 5.0, 900.0])
+    batch(places, "--out", tmp_path / "farm")
+    assert len(read_farm(tmp_path / "farm")) == 2
+    mended = pd.read_csv(tmp_path / "farm" / "failed.csv")
+    assert list(mended["field_id"]) == ["p1", "p3"]
+    mended["spacing_m"] = 9.0
+    mended.to_csv(tmp_path / "mended.csv", index=False)
+    batch(tmp_path / "mended.csv", "--out", tmp_path / "second")
+    second = read_farm(tmp_path / "second")
+    assert sorted(second.ids) == ["p1", "p3"]
+    assert second["p1"].tracks.spacing_m == 9.0
+
+
+def test_obstacles_of_a_file_are_avoided(tmp_path: Path) -> None:
+    places = parcels(tmp_path / "p.gpkg", 10)
+    middle = gpd.read_file(places).to_crs(32632).centroid.buffer(6.0)
+    gpd.GeoDataFrame(geometry=middle, crs=32632).to_file(tmp_path / "ponds.shp")
+    batch(places, "--obstacles", tmp_path / "ponds.shp", "--spacing", 4, "--out", tmp_path / "farm")
+    whole = read_farm(tmp_path / "farm")
+    assert len(whole.obstacles) == 10
+    assert set(whole.gaps["cause"].str.startswith("obstacle")) == {True}
+
+
+def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_path: Path) -> None:
+    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+            str(tmp_path / "farm"), "--workers", "1"]  # fmt: skip
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
+    work = tmp_path / "farm" / ".work"
+    until = time.monotonic() + 120
+    while not list(work.glob("*.marks")) and time.monotonic() < until:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=200)
+    assert process.returncode == 1
+    assert "What is begun is finished" in said
+    assert "The same command does what is missing" in said
+    done = len(read_farm(tmp_path / "farm"))
+    assert 0 < done < 60
+    batch(*line[4:])
+    assert layers_of(tmp_path / "farm") == layers_of(farm)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_run_that_is_ended_at_once_goes_on_later(
+    number: signal.Signals, farm: Path, tmp_path: Path
+) -> None:
+    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+            str(tmp_path / "farm"), "--workers", "2"]  # fmt: skip
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 120
+    while not list((tmp_path / "farm" / ".work").glob("*.marks")) and time.monotonic() < until:
+        time.sleep(0.005)
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    assert process.returncode in (1, -signal.SIGKILL)
+    assert len(read_farm(tmp_path / "farm")) < 60
+    batch(*line[4:])
+    assert layers_of(tmp_path / "farm") == layers_of(farm)
+
+
+def test_a_program_sees_how_far_it_is(tmp_path: Path) -> None:
+    places = parcels(tmp_path / "p.gpkg", 60)
+    said = batch(places, "--out", tmp_path / "farm", "--progress", "json")
+    told = [json.loads(line)["progress"] for line in said.splitlines() if '"progress"' in line]
+    assert told[0]["done"] == 0
+    assert told[-1]["done"] == told[-1]["total"] == 60
+    assert {"failed", "per_minute", "left_s", "what"} <= told[-1].keys()
+
+
+def killing(folder: Path, body: str) -> dict[str, str]:
+    """An environment in which a worker does something bad at the field p3."""
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(
+        "import sys\n"
+        "if sys.argv[-1:] and 'worker' in ' '.join(sys.orig_argv):\n"
+        "    import geofield.farm.chunk as chunk\n"
+        "    plain = chunk.plan_place\n"
+        "    def bad(place, job, previous=None):\n"
+        f"        if place.field_id == 'p3':\n            {body}\n"
+        "        return plain(place, job, previous)\n"
+        "    chunk.plan_place = bad\n"
+    )
+    return {**os.environ, "PYTHONPATH": str(folder)}
+
+
+@pytest.mark.parametrize(
+    ("body", "options", "status", "words"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", (), "lost", "2 times"),
+        ("import time; time.sleep(1000)", ("--time-limit", "2"), "failed", "time limit of 2 s"),
+        ("globals().update(x=bytearray(900_000_000)); import time; time.sleep(100)",
+         ("--memory-limit", "700"), "failed", "memory limit of 700 MB"),
+        ("raise RuntimeError('odd')", (), "failed", "RuntimeError: odd"),
+    ],
+)  # fmt: skip
+def test_a_bad_field_does_not_take_others_with_it(
+    body: str, options: tuple[str, ...], status: str, words: str, tmp_path: Path
+) -> None:
+    places = parcels(tmp_path / "p.gpkg", 10)
+    line = [*PLAIN, "batch", str(places), "--out", str(tmp_path / "farm"), "--workers", "1"]
+    done = subprocess.run([*line, *options], capture_output=True, text=True, timeout=300,
+                          check=False, env=killing(tmp_path / "bad", body))  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    whole = read_farm(tmp_path / "farm")
+    assert len(whole) == 9
+    row = whole.status.set_index("field_id").loc["p3"]
+    assert row["status"] == status
+    assert words in row["error"]
+    # And without what was bad, it is done.
+    batch(*line[4:], "--retry")
+    assert len(read_farm(tmp_path / "farm")) == 10
+
+
+def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
+    places = parcels(tmp_path / "p.gpkg", 20)
+    batch(places, "--spacing", 5, "--out", tmp_path / "farm")
+    untouched = layers_of(tmp_path / "farm")
+    mine = tmp_path / "p4.gpkg"
+    subprocess.run([GEOFIELD, "farm", "get", tmp_path / "farm", "p4", "-o", mine], check=True)
+    outline = gpd.read_file(mine, layer="field")
+    outline.geometry = outline.geometry.buffer(-3.0, join_style="mitre")
+    outline.to_file(mine, layer="field", driver="GPKG")
+    subprocess.run([GEOFIELD, "tracks", mine, "--spacing", "5", "-o", mine], check=True)
+    subprocess.run([GEOFIELD, "farm", "put", mine, tmp_path / "farm"], check=True)
+    edited = gf.read_plan(mine)
+    whole = read_farm(tmp_path / "farm")
+    assert whole["p4"] == edited
+    assert len(whole) == 20
+    assert bool(whole.status.set_index("field_id").loc["p4", "reviewed"])
+    assert layers_of(tmp_path / "farm") != untouched
+    # The chunk planned again from the places: the person's word stands.
+    (tmp_path / "farm" / "status" / "chunk=0000" / "part-0.parquet").unlink()
+    kept = layers_of(tmp_path / "farm")
+    batch(places, "--spacing", 5, "--out", tmp_path / "farm")
+    assert layers_of(tmp_path / "farm") == kept
+    # With another spacing the tracks are new, and the outline is theirs.
+    batch(places, "--spacing", 8, "--fresh", "--out", tmp_path / "farm")
+    again = read_farm(tmp_path / "farm")["p4"]
+    assert again.tracks.spacing_m == 8.0
+    assert again.field.polygon.equals(edited.field.polygon)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("none.csv", "--out", "farm"), 1, "no file none.csv"),
+        (("empty.csv", "--out", "farm"), 1, "empty"),
+        (("points.csv", "--out", "farm"), 1, "points"),
+        (("points.csv", "none.tif", "--out", "farm"), 1, "none.tif"),
+        (("p.gpkg", "--id-column", "nr", "--out", "farm"), 1, "no column 'nr'"),
+        (("p.gpkg", "--id-column", "crop", "--out", "farm"), 1, "more than once"),
+        (("p.gpkg", "google", "--out", "farm"), 1, "forbid"),
+        (("p.gpkg", "--out", "thesis"), 1, "not empty"),
+        (("p.gpkg", "--spacing", "-1", "--out", "farm"), 2, "spacing_m"),
+        (("p.gpkg", "--out", "p.gpkg"), 1, "p.gpkg"),
+        (("p.gpkg", "--scheduler", "tcp://127.0.0.1:9", "--out", "farm"), 1, "does not answer"),
+        (("p.gpkg", "--scheduler", "x", "--workers", "2", "--out", "farm"), 2, "not both"),
+        (("two.gpkg", "--out", "farm"), 1, "--layer"),
+    ],
+)
+def test_bad_input_is_told_and_leaves_nothing(
+    arguments: tuple[str, ...], code: int, words: str, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GEOFIELD_KEY_GOOGLE", "mine")
+    places = parcels(tmp_path / "p.gpkg", 4)
+    gpd.read_file(places).to_file("two.gpkg", layer="a")
+    gpd.read_file(places).to_file("two.gpkg", layer="b")
+    Path("empty.csv").write_text("lat,lon\n")
+    Path("points.csv").write_text("lat,lon\n35.07,33.53\n")
+    Path("thesis").mkdir()
+    Path("thesis/text.txt").write_text("years of work")
+    said = batch(*arguments, code=code, plain=False)
+    assert words in said
+    left = set(Path("farm").rglob("*")) if Path("farm").exists() else set()
+    assert not {path for path in left if path.suffix == ".parquet"}
+    assert [each.name for each in Path("thesis").iterdir()] == ["text.txt"]
+
+
+def test_parcels_that_overlap_are_told(tmp_path: Path) -> None:
+    frame = gpd.read_file(parcels(tmp_path / "p.gpkg", 4))
+    frame.loc[1, "geometry"] = shapely.affinity.translate(frame.geometry[0], 0.0003)
+    frame.to_file(tmp_path / "over.gpkg")
+    said = batch(tmp_path / "over.gpkg", "--out", tmp_path / "farm")
+    assert "2 parcels overlap others, such as p0: it overlaps p1 by 0.3" in said
+    notes = read_farm(tmp_path / "farm").status.set_index("field_id")["notes"]
+    assert "overlaps p0" in notes["p1"]
+    assert notes["p3"] == ""
+
+
+def test_two_runs_do_not_write_into_one_farm(tmp_path: Path) -> None:
+    import fcntl
+
+    places = parcels(tmp_path / "p.gpkg", 4)
+    (tmp_path / "farm").mkdir()
+    handle = os.open(tmp_path / "farm", os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    said = batch(places, "--out", tmp_path / "farm", code=1)
+    assert "Another geofield" in said
+    os.close(handle)
