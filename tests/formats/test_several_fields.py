@@ -72,7 +72,7 @@ def out(tmp_path_factory):
         ",".join(FORMATS),
         "--out",
         folder / "out",
-        "--name",
+        "--stem",
         "farm",
         "--json",
     )

@@ -68,13 +68,15 @@ def export(
 ) -> None:
     """Write other formats from one or more plans.
 
-    PLAN is a GeoPackage of geofield, or any file it can import. Of several plans, formats
-    that can hold several fields get them in one file (one ISOXML task file, one set of
-    Shapefiles, one KML with folders, one linked dataset); the others have a folder per field.
+    PLAN is a GeoPackage of geofield, the folder of a farm, or any file it can import. Of
+    several plans, formats that can hold several fields get them in one file (one ISOXML task
+    file, one set of Shapefiles, one KML with folders, one linked dataset); the others have a
+    file or folder per field.
     Columns "customer" and "farm" of the field say whose it is. All products come into place
     together or not at all; what a format cannot carry is said once.
     """
     from geofield.cli.claiming import claim_folder
+    from geofield.farm import is_farm, read_farm
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.gpkg_read import scene_beside
@@ -92,6 +94,9 @@ def export(
     claim_folder(folder, {product.partition("/")[0] for product in products})
     datasets = []
     for plan_file in plan_files:
+        if is_farm(plan_file):
+            datasets += [plan.to_dataset() for plan in read_farm(plan_file)]
+            continue
         dataset = read_dataset(plan_file, crs=crs)
         for note in dataset.notes:
             say(note)

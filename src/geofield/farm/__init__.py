@@ -3,6 +3,6 @@
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
 from geofield.farm.stream import plan_fields
-from geofield.farm.value import Farm, read_farm
+from geofield.farm.value import Farm, is_farm, read_farm
 
-__all__ = ["Farm", "Place", "Places", "plan_fields", "read_farm", "read_places"]
+__all__ = ["Farm", "Place", "Places", "is_farm", "plan_fields", "read_farm", "read_places"]

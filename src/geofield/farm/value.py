@@ -336,6 +336,13 @@ def clear(store: Store) -> None:
         store.remove(name)
 
 
+def is_farm(folder: str | Path) -> bool:
+    """Whether a folder, or an address of an object store, holds a farm."""
+    if "://" not in str(folder):
+        return (Path(folder) / place.RECORD).is_file()
+    return Store.of(folder).get(place.RECORD) is not None
+
+
 def read_farm(folder: str | Path) -> Farm:
     """Read a farm that ``geofield batch`` or :meth:`Farm.write` wrote, finished or not.
 

@@ -7,7 +7,7 @@ into one dataset with ``field_id`` in every row, or is written once per field.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -23,6 +23,28 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
 FIELD_ID = "field_id"
+
+
+@dataclass(frozen=True, eq=False)
+class Joined(Dataset):
+    """Tables of several fields; track points are left to each field's own products.
+
+    Attributes
+    ----------
+    further : tuple of Layer
+        Layers beside those of a field.
+    """
+
+    further: tuple[schema.Layer, ...] = ()
+
+    def layers(self, *, working: bool = False) -> list[schema.Layer]:
+        """The layers to write: those of a field but its points, and further ones with rows."""
+        own = [each for each in super().layers(working=working) if each != schema.TRACK_POINTS]
+        return own + [each for each in self.further if self.has(each.name)]
+
+    def has(self, name: str) -> bool:
+        """Whether a layer has rows."""
+        return name in self.tables and len(self.tables[name]) > 0
 
 
 def field_ids(datasets: Sequence[Dataset]) -> list[str]:
@@ -52,7 +74,7 @@ def field_ids(datasets: Sequence[Dataset]) -> list[str]:
     return found
 
 
-def joined(datasets: Sequence[Dataset]) -> Dataset:
+def joined(datasets: Sequence[Dataset]) -> Joined:
     """The tables of several fields as one dataset, ``field_id`` in every row.
 
     In the CRS that all share, else in WGS 84; lengths and areas stand in columns and are true
@@ -72,7 +94,7 @@ def joined(datasets: Sequence[Dataset]) -> Dataset:
         if parts:
             tables[layer.name] = pd.concat(parts, ignore_index=True)
     software = datasets[0].provenance.software
-    return Dataset(tables, crs, "farm", Provenance(software))
+    return Joined(tables, crs, "farm", Provenance(software))
 
 
 def _named(table: gpd.GeoDataFrame, field_id: str) -> gpd.GeoDataFrame:

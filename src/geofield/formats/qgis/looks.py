@@ -31,7 +31,7 @@ def _rgba(color: str, opacity: int = 255) -> str:
     return ",".join(map(str, (*theme.rgb(color), opacity)))
 
 
-_FIELD, _DRIVE, _GAP = _rgba(theme.OUTLINE), _rgba(theme.TRACK), _rgba(theme.GAP)
+_DRIVE, _GAP = _rgba(theme.TRACK), _rgba(theme.GAP)
 _TURN, _UNFIT, _HEADLAND = _rgba(theme.TURN), _rgba(theme.UNFIT), _rgba(theme.HEADLAND)
 #: Millimetres of a pixel of the theme's dashes.
 _DASH_MM = 0.2
@@ -98,25 +98,28 @@ def field_rules(frame: str) -> tuple[Rule, ...]:
     frame : str
         The picture's frame in the layer's CRS as a strip, WKT; empty where there is none.
     """
-    layers: tuple[SymbolLayer, ...] = (line(_BLACK, 1.3), line(_FIELD, 0.8))
+    along: tuple[SymbolLayer, ...] = ()
     if frame:
-        along = f"intersection(boundary($geometry), geom_from_wkt('{frame}'))"
-        layers += (
-            generated(along, line(_BLACK, 1.3)),
-            generated(along, line(_rgba(theme.DOUBT), 1.0, dash="2;2")),
+        shared = f"intersection(boundary($geometry), geom_from_wkt('{frame}'))"
+        along = (
+            generated(shared, line(_BLACK, 1.3)),
+            generated(shared, line(_rgba(theme.DOUBT), 1.0, dash="2;2")),
         )
-    return (
-        Rule("Outline", "fill", layers, max_scale=REGION_SCALE),
-        Rule(
-            "Field",
-            "fill",
-            (
-                fill(_rgba(theme.OUTLINE, 110), _FIELD, 0.5),
-                at_centre(marker("circle", _FIELD, _BLACK, 3)),
-            ),
-            min_scale=REGION_SCALE,
-        ),
-    )
+    rules = []
+    for ending, color, condition in (
+        ("", theme.OUTLINE, '"doubts" IS NULL'),
+        (" to be checked", theme.DOUBT, '"doubts" IS NOT NULL'),
+    ):
+        near = (line(_BLACK, 1.3), line(_rgba(color), 0.8), *along)
+        far = (
+            fill(_rgba(color, 110), _rgba(color), 0.5),
+            at_centre(marker("circle", _rgba(color), _BLACK, 3)),
+        )
+        rules += [
+            Rule(f"Outline{ending}", "fill", near, condition, max_scale=REGION_SCALE),
+            Rule(f"Field{ending}", "fill", far, condition, min_scale=REGION_SCALE),
+        ]
+    return tuple(rules)
 
 
 _FIRST = "start_point(extend(geometry_n($geometry, 1), {0}, 0))"
@@ -278,6 +281,29 @@ LOOKS: dict[str, Look] = {
         tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
         '[% "kind" %], fits: [% "fits" %]',
     ),
+    "places": Look(
+        (
+            Rule(
+                "Place without a plan",
+                "marker",
+                (marker("circle", _UNFIT, _WHITE, 3.5),),
+                '"error" IS NOT NULL',
+            ),
+        ),
+        (
+            Label(
+                '"field_id"',
+                8,
+                _WHITE,
+                "120,0,0,230",
+                filter='"error" IS NOT NULL',
+                max_scale=REGION_SCALE,
+                above=True,
+            ),
+        ),
+        tip='<b>[% "name" %]</b> [% "field_id" %]: [% "status" %]'
+        "[% if(\"error\" IS NULL, '', '<br>' || \"error\" || ' ' || coalesce(\"hint\", '')) %]",
+    ),
     "route": Look(
         (
             Rule(
@@ -294,6 +320,7 @@ LOOKS: dict[str, Look] = {
 
 #: From top to bottom in the project.
 ORDER = (
+    "places",
     "obstacles",
     "track_points",
     "gaps",

@@ -63,6 +63,12 @@ def _add_rule(style: ET.Element, rule: Rule) -> None:
 
 
 #: The filters of the rules by their legend: what QGIS's expressions say.
+_MISSING = {"Outline": "doubts", "Field": "doubts"}
+_PRESENT = {
+    "Outline to be checked": "doubts",
+    "Field to be checked": "doubts",
+    "Place without a plan": "error",
+}
 _CONDITIONS: dict[str, tuple[str, str]] = {
     **{label: ("status", status) for label, status in OBSTACLE_RULES.items()},
     "Turn": ("fits", "yes"),
@@ -72,6 +78,13 @@ _CONDITIONS: dict[str, tuple[str, str]] = {
 
 def _add_filter(element: ET.Element, label: str) -> None:
     root = ET.SubElement(element, f"{{{OGC}}}Filter")
+    column = _PRESENT.get(label) or _MISSING.get(label)
+    if column is not None:
+        if label in _PRESENT:
+            root = ET.SubElement(root, f"{{{OGC}}}Not")
+        none = ET.SubElement(root, f"{{{OGC}}}PropertyIsNull")
+        ET.SubElement(none, f"{{{OGC}}}PropertyName").text = column
+        return
     name, value = _CONDITIONS[label]
     element = ET.SubElement(root, f"{{{OGC}}}PropertyIsEqualTo")
     ET.SubElement(element, f"{{{OGC}}}PropertyName").text = name

@@ -1,0 +1,97 @@
+"""The overview of a farm for QGIS: all fields in one GeoPackage, with a styled project.
+
+Outlines are coloured by doubt, places without a plan are red points, tracks and obstacles appear
+when one looks closer.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from geofield import __version__, schema
+from geofield.crs import LONLAT
+from geofield.formats.gpkg import write as write_gpkg
+from geofield.formats.many import Joined
+from geofield.model import ImagerySource, Provenance
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from geofield.farm.value import Farm
+
+#: Name of the files, without suffix.
+STEM = "farm"
+#: Fields up to which the overview holds obstacles and tracks; beyond, outlines and places.
+MOST_FIELDS = 20_000
+
+PLACES = schema.Layer(
+    "places",
+    "Point",
+    "Places",
+    "What was asked for and what became of it.",
+    ("place", "field_id"),
+    (
+        schema.Column("place", "int", "Row in the places file", "place"),
+        schema.Column("field_id", "str", "Field id", "field_id"),
+        schema.Column("name", "str", "Name", "name"),
+        schema.Column(
+            "status", "str", "Status", "status", values=("done", "doubtful", "failed", "lost")
+        ),
+        schema.Column("error", "str", "Error", "error"),
+        schema.Column("hint", "str", "What helps", "hint"),
+        schema.Column("notes", "str", "Notes", "notes"),
+        schema.Column("reviewed", "str", "Reviewed", "reviewed", values=("yes", "no")),
+    ),
+    optional=True,
+)
+#: Those that a person works on; the others follow from them.
+_DETAILS = tuple(
+    each
+    for each in schema.LAYERS
+    if not each.working and each not in (schema.FIELD, schema.TRACK_POINTS)
+)
+
+
+def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path]:
+    """Write ``farm.gpkg`` and ``farm.qgz``.
+
+    Parameters
+    ----------
+    farm : Farm
+    folder : Path
+    name : str
+        Title of the project.
+
+    Returns
+    -------
+    list of Path
+    """
+    return write_gpkg(dataset_of(farm, name), folder, stem=STEM, options={})
+
+
+def dataset_of(farm: Farm, name: str) -> Joined:
+    """All fields as one dataset, with the places as a layer beside those of the schema."""
+    fields = farm.layer(schema.FIELD.name)
+    crs = LONLAT if fields.crs is None else fields.crs
+    tables: dict[str, gpd.GeoDataFrame] = {schema.FIELD.name: fields}
+    for layer in _DETAILS if len(farm) <= MOST_FIELDS else ():
+        table = farm.layer(layer.name)
+        if len(table) or not layer.optional:
+            tables[layer.name] = table.to_crs(crs)
+    places = farm.status.to_crs(crs)
+    reviewed = places["reviewed"].map({True: "yes", False: "no"})
+    told = places.assign(reviewed=reviewed).replace("", None)
+    tables[PLACES.name] = schema.conform(PLACES, told)
+    software = f"geofield {__version__}"
+    return Joined(tables, crs, name, Provenance(software, _source(fields)), further=(PLACES,))
+
+
+def _source(fields: gpd.GeoDataFrame) -> ImagerySource:
+    """What all fields say of their imagery, as one."""
+
+    def told(column: str) -> str:
+        return ", ".join(sorted({str(each) for each in fields[column].dropna() if str(each)}))
+
+    days = sorted({str(day)[:10] for day in fields["imagery_date"].dropna()})
+    return ImagerySource(told("imagery"), days[-1] if days else None, "", told("licence"))
