@@ -82,7 +82,7 @@ def outlines(sizes: list[int]) -> list[str]:
             plan = partial(plan_tracks, field, crs=CRS, spacing_m=4.0, **options)
             cells.append(processor_s(plan))
         tracks = plan_tracks(field, crs=CRS, spacing_m=4.0)
-        cells.append(processor_s(lambda t=tracks: t.statistics))
+        cells.append(processor_s(partial(getattr, tracks, "statistics")))
         lines.append(f"| {size} | " + " | ".join(f"{cell:.3f}" for cell in cells) + " |")
     return lines
 
@@ -101,13 +101,13 @@ def obstacles(sizes: list[int], most_for_route: int) -> list[str]:
                 )
             )
 
-        cells = [processor_s(lambda p=plan: p(0.0)), processor_s(lambda p=plan: p(8.0))]
+        cells = [processor_s(partial(plan, 0.0)), processor_s(partial(plan, 8.0))]
         tracks = made[0]
-        cells.append(processor_s(lambda t=tracks: t.statistics))
-        cells.append(processor_s(lambda t=tracks: t.points))
+        cells.append(processor_s(partial(getattr, tracks, "statistics")))
+        cells.append(processor_s(partial(getattr, tracks, "points")))
         route = "-"
         if size <= most_for_route:
-            route = f"{processor_s(lambda t=tracks: plan_route(t, turning_radius_m=5.0)):.3f}"
+            route = f"{processor_s(partial(plan_route, tracks, turning_radius_m=5.0)):.3f}"
         figures = " | ".join(f"{cell:.3f}" for cell in cells)
         lines.append(f"| {size} | {len(tracks.segments)} | {figures} | {route} |")
     return lines
@@ -118,11 +118,11 @@ def spacings(widths_m: list[float]) -> list[str]:
     lines = ["| spacing | pieces | seconds |", "| ---: | ---: | ---: |"]
     for width_m in widths_m:
         found: list[Tracks] = []
-        seconds = processor_s(
-            lambda w=width_m, f=found: f.append(
-                plan_tracks(field, trees, crs=CRS, spacing_m=w, clearance_m=3.0)
-            )
-        )
+
+        def plan(width_m: float, found: list[Tracks]) -> None:
+            found.append(plan_tracks(field, trees, crs=CRS, spacing_m=width_m, clearance_m=3.0))
+
+        seconds = processor_s(partial(plan, width_m, found))
         lines.append(f"| {width_m:g} m | {len(found[0].segments)} | {seconds:.3f} |")
     return lines
 

@@ -21,6 +21,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -239,7 +240,8 @@ def large(say: Say) -> None:
             check=True,
         ).stdout.splitlines()
     spent, peak = map(float, told[0].split())
-    score = overlap(shapely.from_wkt(told[1]), big.field.polygon_px(big.scene.grid))
+    outline: Any = shapely.from_wkt(told[1])
+    score = overlap(outline, big.field.polygon_px(big.scene.grid))
     say(
         f"4000 x 4000 px: {spent:.1f} s, overlap {score:.3f}; peak memory of the process that "
         f"reads the picture and finds the field, {peak:.2f} GiB."
@@ -304,4 +306,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -62,10 +63,12 @@ def found(case: Case) -> Result:
     except GeofieldError:
         return Result(case.name, case.site, 0.0, True, 0.0, time.process_time() - start)
     seconds = time.process_time() - start
-    figures = dict(field.quality.figures)
+    quality = field.quality
+    assert quality is not None
+    figures = dict(quality.figures)
     shared = overlap(field.polygon_px(case.scene.grid), case.truth)
     certain = figures.get("certainty", 0.0)
-    return Result(case.name, case.site, shared, not field.quality.trusted, certain, seconds)
+    return Result(case.name, case.site, shared, not quality.trusted, certain, seconds)
 
 
 def of_kind(case: Case, kind: str) -> Result:
@@ -95,7 +98,8 @@ def another(case: Case, kind: str) -> Case:
 
 def clicked(case: Case, way: str, most: int = MOST_CLICKS) -> list[float]:
     """Overlaps after the first point, the second, ... until the aim is reached."""
-    include, exclude = [(case.x_px, case.y_px)], []
+    include: list[Point] = [(case.x_px, case.y_px)]
+    exclude: list[Point] = []
     run = WAYS[way](case)
     overlaps: list[float] = []
     for _ in range(most):
@@ -161,7 +165,7 @@ def felzenszwalb(case: Case) -> Callable[[list[Point], list[Point]], shapely.Pol
 WAYS = {"geofield": ours, "random walker": random_walker, "felzenszwalb": felzenszwalb}
 
 
-def polygon_of(mask: np.ndarray) -> shapely.Geometry:
+def polygon_of(mask: np.ndarray) -> Any:
     from rasterio.features import shapes
 
     parts = [shapely.geometry.shape(one) for one, _ in shapes(mask.astype(np.uint8), mask=mask)]

@@ -82,7 +82,7 @@ def large_plan(tracks: int = 1500, segments: int = 38_000, obstacles: int = 10_0
             "point_count": per_track * 95,
             "length_m": np.full(tracks, LENGTH_M),
         },
-        shapely.multilinestrings(lines, indices=track),
+        shapely.multilinestrings(np.asarray(lines), indices=track),
         UTM,
     )
     grid = Grid(6000, 4800, Affine(0.5, 0, X0, 0, -0.5, Y0 + LENGTH_M), UTM)

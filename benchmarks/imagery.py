@@ -25,14 +25,16 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from common import machine, write_page
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT))
 
 LAT, LON, ZOOM = 35.075373, 33.531142, 18
 SIDE = 40
@@ -71,7 +73,7 @@ def _serve(form: str, ready: multiprocessing.Queue[int]) -> None:
 
     class Tiles(asyncio.Protocol):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            self.transport = transport
+            self.transport: Any = transport
             self.rest = b""
 
         def data_received(self, data: bytes) -> None:
@@ -320,9 +322,7 @@ def large_window(folder: Path) -> list[str]:
         for state in ("cold", "warm"):
             if state == "cold":
                 forget()
-            ours[state].append(
-                timed(lambda lat=lat, lon=lon: read_scene(cog, lat=lat, lon=lon, size_px=640))
-            )
+            ours[state].append(timed(partial(read_scene, cog, lat=lat, lon=lon, size_px=640)))
 
         def peer(x: float = x, y: float = y) -> None:
             with rasterio.open(cog) as file:
@@ -353,12 +353,13 @@ def large_window(folder: Path) -> list[str]:
 
 
 def faults(folder: Path) -> list[str]:
+    from tests.imagery import tile_server as server_module
+    from tests.imagery.tile_server import TileServer, chosen, first_time, serving
+
     from geofield.errors import NetworkError
     from geofield.imagery import Acquired, FetchOptions, Where, acquire
     from geofield.imagery.sources.xyz import XYZSource
     from geofield.imagery.terms import Terms
-    from imagery import tile_server as server_module
-    from imagery.tile_server import TileServer, chosen, first_time, serving
 
     where = Where(lat=LAT, lon=LON, zoom=ZOOM, size_px=19 * 256)
     options = FetchOptions(backoff_s=0.02, timeout_s=1.0)

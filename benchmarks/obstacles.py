@@ -18,6 +18,7 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -59,13 +60,13 @@ def chip(path: Path, bands: int = 4, finer: int = 1) -> Scene:
     return Scene(grid, pixels, roles, np.ones(grid.shape, bool))
 
 
-def of_table(table: object) -> Circles:
-    trees = active(table)  # type: ignore[arg-type]
+def of_table(table: Any) -> Circles:
+    trees = active(table)
     trees = trees[trees["kind"] == "tree"]
     return trees[["x_px", "y_px"]].to_numpy(float), trees["radius_px"].to_numpy(float)
 
 
-def ours(strategy: str, **options: object) -> Detector:
+def ours(strategy: Any, **options: Any) -> Detector:
     return lambda scene: of_table(gf.detect_obstacles(scene, strategy=strategy, **options))
 
 
@@ -119,7 +120,7 @@ def chips_row(detector: Detector, bands: int = 4, finer: int = 1) -> tuple[float
         xy = detector(scene)[0] / finer
         seconds.append((time.perf_counter() - start) / scene.valid.size * 1e6)
         # Labels count pixels from their centres, detections from the picture's corner.
-        ring = Ring(np.array(json.loads(row.area_px)))
+        ring = Ring(np.array(json.loads(str(row.area_px))))
         truth = labels[labels.image == row.image][["x_px", "y_px"]].to_numpy(float) + 0.5
         truth = truth[ring.contains_points(truth)] if len(truth) else truth
         xy = xy[ring.contains_points(xy)] if len(xy) else xy
@@ -157,7 +158,7 @@ def in_field(run: Detector) -> Callable[[object], Circles]:
     return detect
 
 
-def whole_detector(field: object, **options: object) -> Circles:
+def whole_detector(field: object, **options: Any) -> Circles:
     found = gf.detect_obstacles(field.scene, field.field, **options)  # type: ignore[attr-defined]
     # Whatever is driven around counts, polygons too.
     found = active(found)
@@ -173,7 +174,7 @@ def reliability_row() -> tuple[float, int]:
         found = gf.detect_obstacles(scene, min_confidence=0.1)
         truth = labels[labels.image == row.image][["x_px", "y_px"]].to_numpy(float) + 0.5
         xy = found[["x_px", "y_px"]].to_numpy(float)
-        keep = Ring(np.array(json.loads(row.area_px))).contains_points(xy)
+        keep = Ring(np.array(json.loads(str(row.area_px)))).contains_points(xy)
         match = match_points(xy, truth, 10)
         good = np.isin(np.arange(len(xy)), match.detected_index)
         confidence.extend(found["confidence"].to_numpy()[keep])

@@ -15,7 +15,9 @@ import json
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import geopandas as gpd
@@ -52,7 +54,7 @@ def areas(every: int) -> Iterator[Case]:
     for row in list(pd.read_csv(DATA / "trees/areas.csv").itertuples())[::every]:
         scene = read_scene(DATA / "trees" / f"{row.image}.tif")
         xy = labels.loc[labels.image == row.image, ["x_px", "y_px"]].to_numpy(float) + 0.5
-        yield Case(scene, xy, shapely.Polygon(json.loads(row.area_px)))
+        yield Case(scene, xy, shapely.Polygon(json.loads(str(row.area_px))))
 
 
 def sites_left_out(every: int) -> Iterator[Case]:
@@ -83,7 +85,7 @@ def with_bands(case: Case, kind: str) -> Case:
     return replace(case, scene=replace(scene, bands=np.ascontiguousarray(pixels), roles=roles))
 
 
-def found_in(case: Case, **options: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def found_in(case: Case, **options: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres, confidences and statuses of the trees found in a case's area."""
     table = gf.detect_obstacles(case.scene, **options)
     table = table[table["kind"] == "tree"]
@@ -148,7 +150,7 @@ def calibration_rows(cases: list[Case]) -> list[str]:
     return rows
 
 
-def driven(case: Case, **options: object) -> tuple[Driving, int, int]:
+def driven(case: Case, **options: Any) -> tuple[Driving, int, int]:
     """What a driver loses in a case's area; trees seen at all, and false alarms."""
     grid = case.scene.grid
     polygon = shapely.transform(case.area, grid.to_metric_array)
@@ -156,7 +158,7 @@ def driven(case: Case, **options: object) -> tuple[Driving, int, int]:
     found = gf.detect_obstacles(case.scene, field, **options)
     tracks = gf.plan_tracks(polygon, found, crs=grid.metric_crs, spacing_m=SPACING_M)
     true = trees_of(case)
-    points = shapely.points(np.column_stack(grid.to_crs(*case.trees.T, grid.metric_crs)))
+    points = shapely.points(grid.to_metric_array(case.trees))
     truth = gpd.GeoDataFrame(geometry=points, crs=grid.metric_crs)
     lost = driving(tracks.segments, found, truth, polygon)
     xy = found.loc[found["kind"] == "tree", ["x_px", "y_px"]].to_numpy(float)
@@ -211,9 +213,7 @@ def jpeg(quality: int) -> Callable[[np.ndarray], np.ndarray]:
         how = [cv2.IMWRITE_JPEG_QUALITY, quality]
         parts = [eight[..., :3], *(eight[..., k] for k in range(3, eight.shape[2]))]
         read = [
-            cv2.imdecode(
-                cv2.imencode(".jpg", np.ascontiguousarray(p), how)[1], cv2.IMREAD_UNCHANGED
-            )
+            np.asarray(cv2.imdecode(cv2.imencode(".jpg", np.ascontiguousarray(p), how)[1], -1))
             for p in parts
         ]
         return np.dstack(read).transpose(2, 0, 1).astype(float)
@@ -258,7 +258,7 @@ def scored(cases: list[Case], change: Callable[[Case], Case]) -> float:
     for case in cases:
         other = change(case)
         scale = other.scene.grid.width_px / case.scene.grid.width_px
-        wide = replace(other, area=shapely.transform(other.area, lambda c, s=scale: c * s))
+        wide = replace(other, area=shapely.transform(other.area, partial(np.multiply, scale)))
         xy, _, _ = found_in(wide, min_confidence=BALANCED)
         true = other.trees[shapely.contains_xy(other.area, *other.trees.T)]
         counted += len(xy) + len(true)

@@ -23,6 +23,7 @@ import psutil
 import rasterio
 import shapely
 from affine import Affine
+from pyproj import CRS
 from rasterio.windows import Window
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -175,7 +176,7 @@ def large_plan(folder: Path) -> Path:
     x, y = 500_000.0, 4_000_000.0
     field = gf.Field(
         shapely.Polygon([(x, y), (x + 1000, y + 50), (x + 1020, y + 1000), (x + 10, y + 990)]),
-        crs=32636,
+        crs=CRS.from_epsg(32636),
     )
     rng = np.random.default_rng(7)
     cx, cy = x + 50 + 900 * rng.random(400), y + 80 + 880 * rng.random(400)

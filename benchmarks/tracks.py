@@ -11,6 +11,7 @@ import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -113,7 +114,7 @@ def track_lines(case: Case, frame: TrackFrame) -> np.ndarray:
 
 def one_overlay(case: Case, lines: np.ndarray) -> np.ndarray:
     """All tracks with the free area in one overlay."""
-    free = case.polygon
+    free: Any = case.polygon
     if case.obstacles:
         free = shapely.difference(free, shapely.union_all(case.obstacles))
     return shapely.get_parts(shapely.intersection(shapely.MultiLineString(list(lines)), free))
@@ -170,17 +171,21 @@ def tracks_table(everything: bool) -> list[str]:
             np.arange(1, len(case.obstacles) + 1),
         )
         rows = track_lines(case, frame)
-        mine, ends = timed(lambda c=case, s=shapes, f=frame: ours(c, s, f))
-        standing = case.obstacles or None
+        mine, ends = timed(partial(ours, case, shapes, frame))
         full, _ = timed(
-            lambda c=case, o=standing: plan_tracks(
-                c.polygon, o, crs=CRS, spacing_m=SPACING_M, direction=73.74
+            partial(
+                plan_tracks,
+                case.polygon,
+                case.obstacles or None,
+                crs=CRS,
+                spacing_m=SPACING_M,
+                direction=73.74,
             )
         )
         whole = None
         if everything or not case.obstacles:
-            whole, _ = timed(lambda c=case, r=rows: one_overlay(c, r))
-        indexed, theirs = timed(lambda c=case, r=rows: indexed_overlay(c, r))
+            whole, _ = timed(partial(one_overlay, case, rows))
+        indexed, theirs = timed(partial(indexed_overlay, case, rows))
         length = float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).sum())
         peer = min(indexed, whole if whole is not None else np.inf)
         lines.append(
@@ -204,7 +209,7 @@ def growth_table() -> list[str]:
             np.empty((0, 3)), np.empty(0, np.int64), np.array(case.obstacles, dtype=object),
             np.arange(1, count + 1),
         )  # fmt: skip
-        mine, ends = timed(lambda c=case, s=shapes, f=frame: ours(c, s, f))
+        mine, ends = timed(partial(ours, case, shapes, frame))
         lines.append(f"| {len(ends)} | {mine:.1f} ms | {1e3 * mine / len(ends):.2f} ms |")
     return lines
 
@@ -225,8 +230,8 @@ def route_table() -> list[str]:
     for pattern in ("boustrophedon", "skip", "shortest"):
         for curve in ("dubins", "reeds_shepp"):
             taken, planned = timed(
-                lambda p=pattern, c=curve: plan_route(
-                    tracks, pattern=p, skip=7, turning_radius_m=5.0, curve=c
+                partial(
+                    plan_route, tracks, pattern=pattern, skip=7, turning_radius_m=5.0, curve=curve
                 ),
                 most=3,
             )

@@ -55,7 +55,7 @@ def test_the_terminal_and_the_report_tell(out: tuple[Path, str]) -> None:
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert any(OUTSIDE in doubt for doubt in report["field"]["doubts"])
     assert 0 <= report["field"]["certainty"] <= 1
-    turns = read_plan(folder / "field.gpkg").tracks.turns  # type: ignore[union-attr]
+    turns = read_plan(folder / "field.gpkg").tracks.turns
     assert turns is not None
     unfit = int((turns["fits"] == "no").sum())
     assert unfit > 0

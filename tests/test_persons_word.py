@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import geopandas as gpd
 import numpy as np
@@ -23,7 +24,7 @@ from geofield.crs import ground_scale_of
 from geofield.plan import Plan, read_plan
 from geofield.simulate import SimulatedField, SimulationSettings, simulate_field
 
-Frame = gpd.GeoDataFrame
+Frame: TypeAlias = gpd.GeoDataFrame
 
 
 def geofield(*args: object) -> str:

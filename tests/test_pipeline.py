@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
 import shapely
+from pyproj import CRS
 
 import geofield as gf
 from geofield.errors import FieldError, OutputExistsError, TrackError
@@ -74,14 +76,14 @@ def test_a_window_is_read_once(
         return read(*args, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(imagery, "read_scene", counted)
-    where = {"lat": simulated.lat, "lon": simulated.lon}
+    where: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon}
     plan_field(simulated_tif, **where, settings=SETTINGS, size_m=180.0)
     assert sizes
     assert len(sizes) == len(set(sizes))
 
 
 def test_a_window_grows_with_its_field(simulated: SimulatedField, simulated_tif: Path) -> None:
-    where = {"lat": simulated.lat, "lon": simulated.lon}
+    where: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon}
     whole = plan_field(simulated_tif, **where, settings=SETTINGS)
     grown = plan_field(simulated_tif, **where, settings=SETTINGS, size_m=60.0)
     assert grown.grid is not None
@@ -169,7 +171,7 @@ def test_a_moved_outline_is_kept(file: Path, simulated: SimulatedField) -> None:
     inside = edited.field.polygon.buffer(1e-6)
     assert all(inside.covers(segment) for segment in tracks.tracks.segments.geometry)
     # Running everything again keeps it too, and knows it as a person's from then on.
-    where = {"lat": simulated.lat, "lon": simulated.lon}
+    where: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon}
     again = plan_field(simulated.scene, **where, settings=SETTINGS, previous=edited)
     assert again.field.polygon.equals(edited.field.polygon)
     assert again.field.method == "drawn"
@@ -186,7 +188,7 @@ def test_another_fields_plan_is_not_mixed_in(
 
     elsewhere = replace(plan.field, polygon=translate(plan.field.polygon, 5000, 0))
     other = replace(plan, field=elsewhere, evidence=Evidence(), tracks=None)
-    where = {"lat": simulated.lat, "lon": simulated.lon}
+    where: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon}
     again = run_field(simulated.scene, **where, settings=SETTINGS, previous=other)
     assert again.obstacles is None
     assert other.obstacles is not None
@@ -272,7 +274,7 @@ def test_the_public_names_load() -> None:
         assert getattr(gf, name) is not None
     assert callable(gf.plan_field)
     with pytest.raises(AttributeError, match="no attribute"):
-        _ = gf.nothing  # type: ignore[attr-defined]
+        _ = gf.nothing
 
 
 def test_plans_differ_when_anything_differs(plan: Plan) -> None:
@@ -289,7 +291,9 @@ def test_plans_differ_when_anything_differs(plan: Plan) -> None:
 
 @pytest.mark.parametrize("tracks", [{"spacing_m": 30.0}, {"spacing_m": 3.0, "headland_m": 11.0}])
 def test_a_field_smaller_than_one_track_is_refused(tracks: dict[str, float]) -> None:
-    small = Plan(gf.Field(shapely.box(500_000, 3_900_000, 500_020, 3_900_020), crs="EPSG:32636"))
+    small = Plan(
+        gf.Field(shapely.box(500_000, 3_900_000, 500_020, 3_900_020), crs=CRS("EPSG:32636"))
+    )
     assert run_tracks(small, settings=load_settings(None, {"tracks": {"spacing_m": 3.0}})).tracks
     with pytest.raises(TrackError):
         run_tracks(small, settings=load_settings(None, {"tracks": tracks}))

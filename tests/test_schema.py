@@ -5,6 +5,7 @@ from __future__ import annotations
 import geopandas as gpd
 import pandas as pd
 import pytest
+from pyproj import CRS
 from shapely import Point
 
 from geofield import schema
@@ -40,7 +41,7 @@ def test_every_layer_is_well_formed(layer: schema.Layer) -> None:
         unit = column.name.rpartition("_")[2]
         if unit in ("m", "ha", "deg", "px"):
             assert column.unit, column.name
-    table = schema.empty(layer, "EPSG:32636")
+    table = schema.empty(layer, CRS("EPSG:32636"))
     assert list(table.columns) == [*layer.column_names, "geometry"]
     assert table.crs == "EPSG:32636"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import pytest
@@ -12,7 +13,7 @@ import geofield as gf
 
 mpl.use("agg")
 SAMPLE = Path(__file__).resolve().parents[1] / "sample_data" / "field_1.tif"
-POINT = {"lat": 35.075373, "lon": 33.531142}
+POINT: dict[str, Any] = {"lat": 35.075373, "lon": 33.531142}
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +59,9 @@ def test_the_plot_lies_where_the_plan_lies(plan: gf.Plan, tmp_path: Path) -> Non
     assert axes.get_xlim()[0] <= left < right <= axes.get_xlim()[1]
     assert axes.get_ylim()[0] <= bottom < top <= axes.get_ylim()[1]
     picture = axes.get_images()[0]
-    assert picture.get_extent()[0] == pytest.approx(plan.grid.transform.c)  # type: ignore[union-attr]
+    assert picture.get_extent()[0] == pytest.approx(plan.grid.transform.c)
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert "tracks" in labels
     assert any("detected" in label for label in labels)
-    axes.figure.savefig(tmp_path / "plan.png", dpi=60)
+    axes.get_figure(root=True).savefig(tmp_path / "plan.png", dpi=60)
     assert plan.plot(axes) is axes

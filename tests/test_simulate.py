@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def test_equal_brightness_means_equal_grey_levels_and_other_colours() -> None:
     )
     made = simulate_field(3, settings)
     inside = made.field.mask(made.scene.grid)
-    ring = made.field.polygon.buffer(25).difference(made.field.polygon.buffer(6))
+    ring: Any = made.field.polygon.buffer(25).difference(made.field.polygon.buffer(6))
     outside = made.field.mask(made.scene.grid) ^ True
     near = type(made.field)(ring, made.field.crs).mask(made.scene.grid) & outside
     grey, red = made.scene.grey, made.scene.bands[0].astype(float)

@@ -162,7 +162,7 @@ def whole(plan: Path) -> None:
 def test_a_stop_at_any_moment_leaves_products_whole(plan: Path, kind: signal.Signals) -> None:
     dice = random.Random(int(kind))
     for spacing in (5, 6, 7):
-        line = [GEOFIELD, "tracks", plan, "--spacing", str(spacing), "-o", plan]
+        line = [str(GEOFIELD), "tracks", str(plan), "--spacing", str(spacing), "-o", str(plan)]
         with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as process:
             time.sleep(dice.uniform(0.3, 2.5))
             process.send_signal(kind)

@@ -22,6 +22,7 @@ from affine import Affine
 from crown_pictures import SIMULATED, simulated, site_of, trees_of
 from crown_samples import INPUTS, OUTPUTS, Pictures
 from crown_targets import CELL_PX
+from pyproj import CRS
 from rasterio.features import rasterize
 from scipy import ndimage
 from scipy.optimize import isotonic_regression
@@ -52,7 +53,9 @@ def scene_of(bands: np.ndarray, kind: str) -> Scene:
         pixels = np.clip(np.rint(grey), 0, 255).astype(np.uint8)[None]
     roles = BANDS[kind]
     pixels = np.ascontiguousarray(pixels[: len(roles)])
-    grid = Grid(pixels.shape[2], pixels.shape[1], Affine(0.6, 0, 4e5, 0, -0.6, 4e6), 32611)
+    grid = Grid(
+        pixels.shape[2], pixels.shape[1], Affine(0.6, 0, 4e5, 0, -0.6, 4e6), CRS.from_epsg(32611)
+    )
     return Scene(grid, pixels, roles, np.ones(grid.shape, bool))
 
 
@@ -161,7 +164,7 @@ def main() -> None:
         "NAIP) without the sites left out; simulated fields; painted things",
     }
     FACTS.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
-    curves = {}
+    curves: dict[str, Any] = {}
     half = np.unique(sites, return_inverse=True)[1] % 2 == 1
     for kind in BANDS:
         answer, hit, side = [], [], []
@@ -182,9 +185,9 @@ def main() -> None:
         facts["left_out"][kind] = result
         print(kind, result, f"{len(a)} answers on open land", flush=True)
     facts["calibration"] = curves
-    answer, right = things()
+    said, right = things()
     print(f"things: {right.sum()} of {len(right)} answers right")
-    facts["standing"]["calibration"] = curve(answer, right, 8)
+    facts["standing"]["calibration"] = curve(said, right, 8)
     network.cache_clear()
     text = json.dumps(facts, indent=1)
     FACTS.write_text(text + "\n", encoding="utf-8")

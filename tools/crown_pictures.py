@@ -98,9 +98,9 @@ def main() -> None:
     names, bands, trees = chips(folder)
     judges = left_out(names)
     regions = [np.ones((SIDE_PX, SIDE_PX), bool)] * len(names)
-    for number in range(SIMULATED):
-        field = simulated(number)
-        names.append(f"simulated_{number}")
+    for seed in range(SIMULATED):
+        field = simulated(seed)
+        names.append(f"simulated_{seed}")
         bands.append(field.scene.bands)
         trees.append(trees_of(field))
         regions.append(field.field.mask(field.scene.grid))

@@ -128,7 +128,9 @@ class Sampler:
         else:
             rgb = image[..., :3]
             if kind > 0.78:
-                rgb = np.repeat((rgb @ np.float32([0.299, 0.587, 0.114]))[..., None], 3, axis=2)
+                rgb = np.repeat(
+                    (rgb @ np.array([0.299, 0.587, 0.114], np.float32))[..., None], 3, axis=2
+                )
             x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
         return {"x": x} | targets(trees, valid, other, known * open_land)
 
@@ -215,7 +217,7 @@ def jpeg(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
     infrared = cv2.imdecode(
         cv2.imencode(".jpg", np.ascontiguousarray(eight[..., 3]), quality)[1], cv2.IMREAD_GRAYSCALE
     )
-    return np.dstack([visible, infrared]).astype(np.float32)
+    return np.dstack([np.asarray(visible), np.asarray(infrared)]).astype(np.float32)
 
 
 def shade(rng: np.random.Generator, side: int) -> np.ndarray:

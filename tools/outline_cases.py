@@ -11,6 +11,7 @@ import json
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -50,7 +51,7 @@ def labelled() -> Iterator[Case]:
         for row in rows:
             scene = read_scene(DATA / (folder or row["folder"]) / f"{row['image']}.tif")
             x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
-            truth = shapely.make_valid(shapely.Polygon(json.loads(row["polygon_px"])))
+            truth: Any = shapely.make_valid(shapely.Polygon(json.loads(row["polygon_px"])))
             name = f"{mark} {row['image']} ({x:.0f}, {y:.0f})"
             sure = row.get("certainty") or ""
             yield Case(name, mark, site_of(row["image"]), scene, x, y, truth, sure)
@@ -125,11 +126,11 @@ def jpeg(bands: np.ndarray, quality: int) -> np.ndarray:
     """Bands through JPEG, as tiles are: colours together, near infrared by itself."""
     settings = [cv2.IMWRITE_JPEG_QUALITY, quality]
     colour = np.ascontiguousarray(np.moveaxis(bands[:3], 0, -1)[..., ::-1])
-    back = cv2.imdecode(cv2.imencode(".jpg", colour, settings)[1], cv2.IMREAD_COLOR)
+    back = np.asarray(cv2.imdecode(cv2.imencode(".jpg", colour, settings)[1], cv2.IMREAD_COLOR))
     layers = [np.moveaxis(back[..., ::-1], -1, 0)]
     for band in bands[3:]:
         grey = cv2.imencode(".jpg", np.ascontiguousarray(band), settings)[1]
-        layers.append(cv2.imdecode(grey, cv2.IMREAD_GRAYSCALE)[None])
+        layers.append(np.asarray(cv2.imdecode(grey, cv2.IMREAD_GRAYSCALE))[None])
     return np.concatenate(layers)
 
 

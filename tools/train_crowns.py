@@ -119,7 +119,9 @@ def judged(net: CrownNetwork, pictures: Pictures) -> str:
             low, high = levels(image)
             rgb = image[..., :3]
             if kind == "grey":
-                rgb = np.repeat((rgb @ np.float32([0.299, 0.587, 0.114]))[..., None], 3, axis=2)
+                rgb = np.repeat(
+                    (rgb @ np.array([0.299, 0.587, 0.114], np.float32))[..., None], 3, axis=2
+                )
                 low, high = levels(rgb)
             x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
             if kind == "nir":

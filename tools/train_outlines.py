@@ -14,6 +14,7 @@ import json
 import math
 import time
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -158,15 +159,16 @@ def turned(
         shift = shift + rng.uniform(-1, 1, 2) * max(slack, 0)
     full = np.column_stack([matrix, shift])
     size = (SIDE_PX, SIDE_PX)
-    bands = cv2.warpAffine(bands, full, size, flags=cv2.INTER_LINEAR)
-    mask = cv2.warpAffine(mask, full, size, flags=cv2.INTER_LINEAR)
+    warped, cut = (
+        cv2.warpAffine(each, full, size, flags=cv2.INTER_LINEAR) for each in (bands, mask)
+    )
     valid = cv2.warpAffine(np.full((rows, columns), 255, np.uint8), full, size)
-    return bands, mask, valid
+    return warped.astype(np.uint8), cut.astype(np.uint8), valid.astype(np.uint8)
 
 
 def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
     """Another camera, light, haze and file, (rows, columns, 4)."""
-    levels = np.repeat(np.arange(256, dtype=np.float32)[:, None], 4, axis=1)
+    levels: Any = np.repeat(np.arange(256, dtype=np.float32)[:, None], 4, axis=1)
     if rng.random() < 0.8:
         levels = 255 * (levels / 255) ** np.float32(math.exp(rng.normal(0, 0.22)))
         levels *= np.exp(rng.normal(0, 0.07, 4)).astype(np.float32)
@@ -176,7 +178,7 @@ def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
         levels = levels * (1 - haze) + haze * colour
     if rng.random() < 0.35:
         levels = (levels - 110) * np.float32(rng.uniform(0.45, 1.4)) + 110
-    f = cv2.LUT(bands, levels.astype(np.float32).reshape(1, 256, 4))
+    f: Any = cv2.LUT(bands, levels.astype(np.float32).reshape(1, 256, 4))
     if rng.random() < 0.3:
         f = cv2.GaussianBlur(f, (0, 0), rng.uniform(0.5, 1.3))
     if rng.random() < 0.25:
@@ -185,15 +187,15 @@ def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
         low = cv2.resize(few, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_LINEAR)
         f *= low[..., None]
     if rng.random() < 0.35:
-        noise = np.empty(f.shape, np.float32)
-        cv2.randn(noise, (0, 0, 0, 0), (float(rng.uniform(0.5, 4)),) * 4)
+        noise: Any = np.empty(f.shape, np.float32)
+        cv2.randn(noise, (0, 0, 0, 0), (float(rng.uniform(0.5, 4)),) * 4)  # type: ignore[call-overload]
         f += noise
     if rng.random() < 0.4:
         quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 92))]
         u = cv2.convertScaleAbs(np.maximum(f, 0))
         rgb = cv2.imdecode(cv2.imencode(".jpg", u[..., :3], quality)[1], cv2.IMREAD_COLOR)
         nir = cv2.imdecode(cv2.imencode(".jpg", u[..., 3], quality)[1], cv2.IMREAD_GRAYSCALE)
-        f = np.dstack([rgb, nir]).astype(np.float32)
+        f = np.dstack([np.asarray(rgb), np.asarray(nir)]).astype(np.float32)
     return np.clip(f, 0, 255)
 
 
@@ -230,10 +232,10 @@ def sample(
     stack = np.moveaxis(values, -1, 0)
     x = normalised(stack[:3], stack[3] if has_nir else None, ok)
     points = points_maps([seed], [])
-    target = cv2.resize(
+    target: Any = cv2.resize(
         (inside & ok).astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA
     )
-    counts = cv2.resize(ok.astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA)
+    counts: Any = cv2.resize(ok.astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA)
     return x, points, target, counts, [seed], []
 
 
@@ -343,7 +345,7 @@ def train(options: argparse.Namespace) -> None:
             group["lr"] = (
                 RATE * min(1.0, step / 100 + 0.01) * (0.5 + 0.5 * math.cos(math.pi * done)) + 1e-5
             )
-        batch = [
+        batch: list[Any] = [
             sample(
                 known[int(rng.choice(len(known), p=weight))]
                 if rng.random() < REAL

@@ -9,6 +9,7 @@ import base64
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 
@@ -25,7 +26,7 @@ import geofield as gf
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
 SAMPLE = ROOT / "sample_data" / "field_1.tif"
-POINT = {"lat": 35.075373, "lon": 33.531142}
+POINT: dict[str, Any] = {"lat": 35.075373, "lon": 33.531142}
 CRS = "EPSG:32636"
 
 

@@ -94,9 +94,11 @@ class _Handler(BaseHTTPRequestHandler):
     def log_message(self, *_: Any) -> None:
         """Quiet."""
 
+    server: ThreadingHTTPServer
+
     def do_GET(self) -> None:
         if self.path.partition("?")[0].endswith("WMTSCapabilities.xml"):
-            address = f"http://127.0.0.1:{self.server.server_address[1]}"
+            address = f"http://127.0.0.1:{self.server.server_port}"
             self._reply(capabilities(address), "application/xml")
             return
         zoom, row, column = self.path.removesuffix(".png").split("/")[-3:]

@@ -7,10 +7,12 @@ import sqlite3
 import subprocess
 import warnings
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
 import pyarrow.parquet as pq
+import pyproj
 import pytest
 import shapely
 
@@ -28,8 +30,9 @@ def plan_at(x: float, y: float, epsg: int, name: str, **own: object) -> gf.Plan:
 
     outline = shapely.affinity.translate(SQUARE, x, y)
     hole = shapely.Point(x + 70.0, y + 50.0).buffer(5.0)
+    polygon: Any = outline.difference(hole)
     field = gf.Field(
-        outline.difference(hole), f"EPSG:{epsg}", name=name, field_id=name, method="boundary",
+        polygon, pyproj.CRS(epsg), name=name, field_id=name, method="boundary",
         own=tuple(own.items()),
     )  # fmt: skip
     trees = gpd.GeoDataFrame(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -144,7 +145,7 @@ def test_a_column_named_like_a_setting_holds_for_its_field(tmp_path: Path) -> No
     ],
 )
 def test_bad_rows_are_told_by_their_number(
-    change: dict[str, list[object]], words: str, tmp_path: Path
+    change: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
     POINTS.assign(**change).to_csv(tmp_path / "bad.csv", index=False)
     with pytest.raises(FormatError, match=words):

@@ -1,5 +1,7 @@
 """The user's own parcel instead of extraction."""
 
+from typing import Any
+
 import geopandas as gpd
 import pytest
 import shapely
@@ -59,7 +61,7 @@ def test_an_invalid_parcel_is_repaired_and_flagged():
 
 
 def test_holes_and_parts_are_kept():
-    ring = A.difference(shapely.box(9.9999, 49.9999, 10.0001, 50.0001))
+    ring: Any = A.difference(shapely.box(9.9999, 49.9999, 10.0001, 50.0001))
     table = gpd.GeoDataFrame({"name": ["x"]}, geometry=[shapely.MultiPolygon([ring, B])], crs=4326)
     field = field_from_boundary(table, lat=50.0005, lon=10.0005)
     assert len(list(field.polygon.interiors)) == 1

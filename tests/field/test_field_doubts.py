@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from affine import Affine
 
+from geofield.crs import parse_crs
 from geofield.errors import FieldWarning, GeofieldError
 from geofield.field import extract_field
 from geofield.grid import Grid
@@ -17,7 +18,7 @@ ROLES = ("red", "green", "blue", "nir")
 
 def scene_of(bands, valid=None):
     rows, columns = bands.shape[1:]
-    grid = Grid(columns, rows, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), "EPSG:32633")
+    grid = Grid(columns, rows, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), parse_crs("EPSG:32633"))
     valid = np.ones((rows, columns), bool) if valid is None else valid
     return Scene(grid, np.clip(bands, 0, 255).astype(np.uint8), ROLES, valid)
 
@@ -109,7 +110,7 @@ def test_tiny_pictures_do_not_crash(shape):
 def test_grey_pictures_work():
     grey = np.full((200, 200), 90.0) + np.random.default_rng(0).normal(0, 3, (200, 200))
     grey[40:160, 50:170] += 60
-    grid = Grid(200, 200, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), "EPSG:32633")
+    grid = Grid(200, 200, Affine(0.6, 0, 500_000, 0, -0.6, 5_000_000), parse_crs("EPSG:32633"))
     scene = Scene(grid, grey.astype(np.uint8)[None], ("grey",), np.ones((200, 200), bool))
     field = judged(scene, 100, 100)
     assert field is not None

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def figures(several):
 
 def table(monkeypatch, tmp_path, change):
     """The ranking of a table that was changed."""
-    folder = ranking.files("geofield.learned")
+    folder = files("geofield.learned")
     known = json.loads((folder / "outline_ranking.json").read_text("utf-8"))
     change(known)
     (tmp_path / "outline_ranking.json").write_text(json.dumps(known), "utf-8")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import warnings
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -78,7 +79,7 @@ def test_any_outline_is_made_to_obey_any_points(seed):
     exclude = rng.uniform(0, side, (rng.integers(0, 5), 2))
     away = np.hypot(*(include[:, None] - exclude).transpose(2, 0, 1)).min(axis=0, initial=1e9)
     include, exclude = include.tolist(), exclude[away > 0.5].tolist()
-    outline = shapely.convex_hull(shapely.MultiPoint(rng.uniform(0, side, (6, 2))))
+    outline: Any = shapely.convex_hull(shapely.MultiPoint(rng.uniform(0, side, (6, 2))))
     made = obeying(outline, include, exclude)
     assert made.is_valid
     assert obeys(made, include, exclude)

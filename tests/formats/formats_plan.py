@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import shapely
@@ -157,8 +158,8 @@ def _optional(outline):
 
 def _tracks(outline, obstacles):
     kept = obstacles[obstacles["status"] != "rejected"]
-    rows = {"tracks": [], "segments": [], "gaps": []}
-    shapes = {"tracks": [], "segments": [], "gaps": []}
+    rows: dict[str, list[Any]] = {"tracks": [], "segments": [], "gaps": []}
+    shapes: dict[str, list[Any]] = {"tracks": [], "segments": [], "gaps": []}
     for number, offset in enumerate(np.arange(2.5, 60, 5.0), start=1):
         whole = shapely.LineString([(X0 - 5, Y0 + offset), (X0 + 125, Y0 + offset)])
         free = shapely.intersection(whole, outline)

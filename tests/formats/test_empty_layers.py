@@ -17,7 +17,9 @@ from geofield.formats import FORMATS, write_dataset
 from geofield.formats.shapefile_profiles import PROFILES
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
-PRODUCTS = [(name, {}) for name in FORMATS if name not in ("shapefile", "scene")]
+PRODUCTS: list[tuple[str, dict[str, str]]] = [
+    (name, {}) for name in FORMATS if name not in ("shapefile", "scene")
+]
 PRODUCTS += [("shapefile", {"profile": profile}) for profile in PROFILES]
 #: A terminal's files and AgOpenGPS's are of one field, or none.
 ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "report", "html")
@@ -61,7 +63,7 @@ def test_every_format_with_every_empty_layer(tmp_path, name, options, case):
 
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_empty_shapefiles_have_the_columns_of_full_ones(tmp_path, profile):
-    columns = {}
+    columns: dict[str, dict[str, object]] = {}
     for name, dataset in (("full", make_dataset()), ("empty", without("obstacles"))):
         write_dataset(dataset, tmp_path / name, ["shapefile"], options={"profile": profile})
         columns[name] = {}

@@ -144,7 +144,7 @@ def test_read_only_folder(dataset, tmp_path, monkeypatch):
         # Not by permissions: the tests may run as root, who may write everywhere.
         raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path))
 
-    monkeypatch.setattr(staging_module.tempfile, "mkdtemp", refused)
+    monkeypatch.setattr("tempfile.mkdtemp", refused)
     with pytest.raises(FormatError, match="cannot be written"):
         write_dataset(dataset, tmp_path, ["gpkg"])
     with pytest.raises(FormatError, match="cannot be written"):

@@ -81,7 +81,7 @@ def test_rings_of_drawings_are_closed(tmp_path):
     write_dataset(make_dataset(), tmp_path, ["dxf"])
     lines = (tmp_path / "field.dxf").read_text(encoding="utf-8").split("\n")
     pairs = [(a.strip(), b.strip()) for a, b in zip(lines[::2], lines[1::2], strict=False)]
-    flags = {}
+    flags: dict[str, list[int]] = {}
     for code, value in pairs:
         if code == "0":
             entity = layer = None

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import fiona
@@ -184,7 +185,8 @@ def test_one_linked_dataset(out, files, kind):
         "SELECT ?field (COUNT(?segment) AS ?n) WHERE { ?segment a gf:Segment ; "
         "gf:onTrack/gf:inField ?field } GROUP BY ?field"
     )
-    found = {row["field"].value: int(row["n"].value) for row in store.query(count)}
+    rows: Any = store.query(count)
+    found = {row["field"].value: int(row["n"].value) for row in rows}
     assert sorted(found.values()) == [len(d.table("segments")) for d in FARM]
 
 

@@ -175,7 +175,7 @@ def test_the_repeated_reference_line_lies_on_the_explicit_ones(tmp_path, lon, la
         4326, CRS.from_proj4(f"+proj=aeqd +lat_0={middle[1]} +lon_0={middle[0]} +ellps=WGS84"),
         always_xy=True,
     )  # fmt: skip
-    start, end = np.array(flat.transform(*zip(a, b, strict=True))).T
+    start, end = np.array(flat.transform([a[0], b[0]], [a[1], b[1]])).T
     along = (end - start) / np.hypot(*(end - start))
     worst, count = 0.0, 0
     for pattern in explicit:

@@ -86,10 +86,10 @@ def hostile(folder: Path) -> Iterator[Sample]:
     bomb = folder / "bomb.zip"
     with (
         zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("a.geojson", "w", force_zip64=True) as file,
+        archive.open("a.geojson", "w", force_zip64=True) as member,
     ):
         for _ in range(30):
-            file.write(b" " * (1 << 23))
+            member.write(b" " * (1 << 23))
     yield Sample("archive bomb", bomb, _VECTOR)
 
 

@@ -12,7 +12,7 @@ from rasterio.enums import ColorInterp
 
 #: A place in UTM zone 36N.
 EAST, NORTH, RESOLUTION = 548_000.0, 3_881_000.0, 0.5
-UTM = "EPSG:32636"
+UTM: Any = "EPSG:32636"
 
 
 def ground(rows: int = 96, columns: int = 128, bands: int = 3) -> np.ndarray:

@@ -76,8 +76,9 @@ def test_a_point_becomes_an_exact_cog(tmp_path: Path) -> None:
     from rio_cogeo import cog_validate
 
     with serving() as server:
+        source: Any = find_source(server.template)
         source = replace(
-            find_source(server.template),
+            source,
             name="survey",
             terms=Terms("© Survey", "CC BY 4.0", may_cache=True, url="https://example.org/terms"),
             date="2024-05-01",

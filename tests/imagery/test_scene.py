@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_a_plain_picture_is_read_as_it_is(rgb: str) -> None:
 
 
 @pytest.mark.parametrize("size", [{"size_px": 21}, {"size_m": 10.6}])
-def test_a_window_lies_around_the_point(rgb: str, size: dict[str, float]) -> None:
+def test_a_window_lies_around_the_point(rgb: str, size: dict[str, Any]) -> None:
     whole = SceneReader.open(rgb).grid
     lon, lat = whole.to_lonlat(60.5, 40.5)
     scene = read_scene(rgb, lat=lat, lon=lon, **size)

@@ -21,6 +21,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from geofield.crs import parse_crs
 from geofield.errors import ImageryError, NetworkError, PointOutsideError, TermsError
 from geofield.grid import Grid
 from geofield.imagery import FetchOptions, Where, acquire, find_source, open_reader, read_scene
@@ -288,7 +289,7 @@ def wms_server(server: TileServer, crs_name: str) -> None:
         transform = Affine(
             (box[2] - box[0]) / width, 0, box[0], 0, (box[1] - box[3]) / height, box[3]
         )
-        grid = Grid(width, height, transform, upper["CRS"])
+        grid = Grid(width, height, transform, parse_crs(upper["CRS"]))
         handler.reply(200, encode(pattern(grid)), "image/png")
 
     server.routes["/wms"] = answer
@@ -409,7 +410,9 @@ def wmts_server(server: TileServer, *, mercator: bool, rest: bool) -> None:
             return
         resolution = [4000, 2000, 1000][int(matrix[1:])] * 0.00028
         left, top = 4_000_000 + column * 256 * resolution, 6_000_000 - row * 256 * resolution
-        grid = Grid(256, 256, Affine(resolution, 0, left, 0, -resolution, top), "EPSG:31468")
+        grid = Grid(
+            256, 256, Affine(resolution, 0, left, 0, -resolution, top), parse_crs("EPSG:31468")
+        )
         handler.reply(200, encode(pattern(grid)), "image/png")
 
     def by_rest(handler: Handler, query: dict[str, str]) -> None:
@@ -557,10 +560,10 @@ def test_sheets_of_another_zone_fit_to_a_pixel(tmp_path: Path) -> None:
     folder.mkdir()
     lon0, lat0 = 36.0, 35.0
     for name, epsg, shift in [("west", 32636, -260), ("east", 32637, -140)]:
-        unit = Grid(1, 1, Affine.identity(), f"EPSG:{epsg}")
+        unit = Grid(1, 1, Affine.identity(), parse_crs(epsg))
         x, y = unit.from_lonlat(lon0, lat0)
         place = Affine(0.5, 0, round(x) + 0.5 * shift, 0, -0.5, round(y) + 100)
-        grid = Grid(400, 400, place, f"EPSG:{epsg}")
+        grid = Grid(400, 400, place, parse_crs(epsg))
         px, py = np.meshgrid(np.arange(400) + 0.5, np.arange(400) + 0.5)
         lons, lats = grid.to_lonlat(px, py)
         # A smooth function of the place on earth.

@@ -76,7 +76,7 @@ def test_an_unknown_network_is_told():
 def test_the_model_files_stay_small_and_honest():
     folder = files("geofield.learned")
     facts = json.loads((folder / "crowns.json").read_text())
-    assert (folder / "crowns.onnx").stat().st_size < 1.5e6
+    assert len((folder / "crowns.onnx").read_bytes()) < 1.5e6
     for kind in ("nir", "rgb", "grey"):
         curve = facts["calibration"][kind]
         assert np.all(np.diff(curve["answer"]) > 0)

@@ -24,7 +24,7 @@ def detections(shared, bands):
         assert scene.roles == ("red", "green", "blue", "nir")
         scene = Scene(scene.grid, scene.bands[:bands], scene.roles[:bands], scene.valid)
         found = gf.detect_obstacles(scene, min_confidence=0.2)
-        area = shapely.Polygon(json.loads(row.area_px))
+        area = shapely.Polygon(json.loads(str(row.area_px)))
         xy = found[["x_px", "y_px"]].to_numpy(float)
         # Labels are pixel indices: half a pixel from the corner-based coordinates.
         truth = labels[labels.image == row.image][["x_px", "y_px"]].to_numpy(float) + 0.5

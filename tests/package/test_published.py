@@ -11,6 +11,7 @@ import tomllib
 import venv
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,10 +59,20 @@ def test_the_wheel_does_the_main_job_outside_the_checkout(wheel: Path, tmp_path:
     place = ["--lat", "35.075373", "--lon", "33.531142", "--spacing", "6"]
     formats = ["--format", "gpkg", "--format", "rdf", "--out", "out"]
     picture = ROOT / "sample_data" / "field_1.tif"
-    run = [python, "-m", "geofield", "run", picture, *place, *formats]
+    run: list[Any] = [python, "-m", "geofield", "run", picture, *place, *formats]
     done = subprocess.run(run, cwd=tmp_path, env=clean, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    page = [python, "-m", "geofield", "export", "out/field.gpkg", "-f", "html", "--out", "page"]
+    page: list[Any] = [
+        python,
+        "-m",
+        "geofield",
+        "export",
+        "out/field.gpkg",
+        "-f",
+        "html",
+        "--out",
+        "page",
+    ]
     done = subprocess.run(
         page, cwd=tmp_path, env=clean, capture_output=True, text=True, check=False
     )
@@ -85,7 +96,7 @@ def test_recipes_say_what_the_project_says() -> None:
     names = {"opencv-python-headless": "py-opencv"}
     wanted = set()
     for dependency in PROJECT["dependencies"]:
-        name, bound = re.fullmatch(r"([A-Za-z0-9-]+)(.*)", dependency).groups()  # type: ignore[union-attr]
+        name, bound = re.fullmatch(r"([A-Za-z0-9-]+)(.*)", dependency).groups()
         wanted.add(names.get(name, name) + bound)
     assert conda == wanted
     for text in (recipe, (ROOT / "CITATION.cff").read_text()):

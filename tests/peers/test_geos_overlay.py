@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -125,7 +127,7 @@ def overlay(
         nearest = positions[np.abs(positions[:, None] - v).argmin(axis=0)]
         return np.column_stack((u, np.where(np.abs(nearest - v) <= SNAP_M, nearest, v)))
 
-    free = shapely.transform(polygon, turn)
+    free: Any = shapely.transform(polygon, turn)
     if obstacles:
         blocked = shapely.union_all([shapely.transform(each, turn) for each in obstacles])
         free = shapely.difference(free, blocked)
@@ -195,7 +197,7 @@ def test_real_parcels(parcels: gpd.GeoDataFrame, spacing_m: float) -> None:
         polygon = parcels.geometry.iloc[[row]].to_crs(int(epsg)).iloc[0]
         centre = polygon.centroid
         x0, y0 = np.rint(centre.x), np.rint(centre.y)
-        polygon = shapely.transform(polygon, lambda xy, o=(x0, y0): xy - o)
+        polygon = shapely.transform(polygon, partial(np.add, (-x0, -y0)))
         west, south, east, north = polygon.bounds
         places = rng.uniform((west, south), (east, north), (25, 2))
         obstacles = list(

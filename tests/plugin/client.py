@@ -218,10 +218,9 @@ def loaded(algorithm, values):
 
 def spoken(language):
     """What a dialogue says in another language."""
-    from qgis.PyQt.QtCore import QCoreApplication
-
     from geofield_qgis.algorithms import PlanAlgorithm, TracksAlgorithm
     from geofield_qgis.words import Words
+    from qgis.PyQt.QtCore import QCoreApplication
 
     words = Words(language)
     QCoreApplication.installTranslator(words)

@@ -14,8 +14,9 @@ import pytest
 from plugin_place import PLUGINS, ROOT
 
 sys.path.insert(0, str(PLUGINS))
-import geofield
 import translate
+
+import geofield
 
 FOLDER = PLUGINS / "geofield_qgis"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import shapely
@@ -30,7 +31,7 @@ def small_plan(
     x0, y0 = 548_400.0, 3_881_500.0
     outline = rotate(shapely.box(x0, y0, x0 + 80, y0 + 60), 7, origin=(x0, y0))
     hole = shapely.Point(x0 + 55, y0 + 45).buffer(2.5)
-    polygon = outline.difference(hole)
+    polygon: Any = outline.difference(hole)
     grid = Grid.web_mercator(lat=35.0756, lon=33.5315, zoom=19, width_px=640, height_px=640)
     field = Field(polygon, crs, name=name, field_id="cy-1", method="auto", licence="CC BY 4.0")
     obstacles = _obstacles(x0, y0, grid, crs)
@@ -179,11 +180,12 @@ def plan_lines(polygon, obstacles, crs, *, spacing_m, step_m, grid=None) -> Trac
     free = polygon.difference(shapely.union_all(kept.geometry.to_numpy()))
     left, bottom, right, top = polygon.bounds
     ys = np.arange(bottom + spacing_m / 2, top, spacing_m)
-    lines, segments, gaps = [], [], []
+    lines: list[Any] = []
+    segments, gaps = [], []
     for y in ys:
         line = shapely.LineString([(left - 1, y), (right + 1, y)])
-        pieces = shapely.get_parts(line.intersection(free))
-        pieces = sorted((p for p in pieces if p.length > 0.5), key=lambda p: p.bounds[0])
+        parts = shapely.get_parts(line.intersection(free))
+        pieces = sorted((p for p in parts if p.length > 0.5), key=lambda p: p.bounds[0])
         if not pieces:
             continue
         number = len(lines) + 1
@@ -250,7 +252,7 @@ def long_plan(points: int) -> Dataset:
         [np.column_stack([np.full(rows, x0), y]), np.column_stack([np.full(rows, x0 + length), y])],
         axis=1,
     )
-    lines = shapely.linestrings(coordinates)
+    lines: Any = shapely.linestrings(coordinates)
     number = np.arange(1, rows + 1)
     ones = np.ones(rows, dtype=np.int64)
     field = shapely.box(x0 - 5, y0 - 5, x0 + length + 5, y[-1] + 5)

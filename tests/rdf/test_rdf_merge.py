@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import pyoxigraph as ox
 import pytest
@@ -156,7 +157,7 @@ def test_what_is_not_driven_around_is_no_obstacle(tmp_path, profile):
     plan = small_plan()
     plan.tables["obstacles"].loc[1, "status"] = "possible"
     (path,) = write.write_turtle(plan, tmp_path, options={"rdf_profile": profile})
-    graph = rdflib.Graph().parse(path)
+    graph: Any = rdflib.Graph().parse(path)
 
     def numbers(text):
         return sorted(int(row[0]) for row in graph.query(text))
@@ -179,7 +180,7 @@ def test_the_outlines_doubt_is_told(tmp_path):
     plan.tables["field"].loc[0, "certainty"] = 0.62
     plan.tables["field"].loc[0, "doubts"] = "goes on outside the picture"
     for path in write.write_rdfxml(plan, tmp_path, options={})[:1]:
-        graph = rdflib.Graph().parse(path)
+        graph: Any = rdflib.Graph().parse(path)
         rows = list(graph.query("SELECT ?c ?d { ?s a gf:Survey ; gf:certainty ?c ; gf:doubts ?d }"))
         assert [(float(c), str(d)) for c, d in rows] == [(0.62, "goes on outside the picture")]
     got = read(tmp_path / "field.rdf").table("field").iloc[0]
@@ -193,7 +194,7 @@ def test_points_come_when_asked_for_and_say_each_place_once(tmp_path):
     assert "TrackPoint" not in without.read_text()
     with_points = write.write_rdfxml(plan, tmp_path, options={"points": True})[2]
     assert with_points.stat().st_size > 1.5 * size
-    graph = rdflib.Graph().parse(with_points)
+    graph: Any = rdflib.Graph().parse(with_points)
     (point, *_) = graph.subjects(rdflib.RDF.type, rdflib.URIRef(expand("gf:TrackPoint")))
     told = list(graph.predicate_objects(point))
     assert len(told) == 4

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rdflib
@@ -28,7 +29,7 @@ def geofield(*arguments):
 
 
 def classes(path):
-    graph = rdflib.Graph().parse(path)
+    graph: Any = rdflib.Graph().parse(path)
     return {str(each).rpartition("#")[2] for each in graph.objects(predicate=rdflib.RDF.type)}
 
 
@@ -78,15 +79,16 @@ def test_run_brings_points_only_when_asked(tmp_path):
 
 def test_a_plan_is_an_rdflib_graph(plan, tmp_path):
     one = gf.read_plan(plan)
-    graph = one.to_graph(base_iri="https://farm.example/")
-    assert isinstance(graph, rdflib.Graph)
+    graph: Any = one.to_graph(base_iri="https://farm.example/")
+    assert type(graph) is rdflib.Graph
     # Prefixes are bound: a query needs none.
-    rows = list(
+    rows: Any = list(
         graph.query("SELECT ?no ?m { ?t a gf:Track ; gf:trackNo ?no ; geo:hasMetricLength ?m }")
     )
     assert {int(no): float(m) for no, m in rows} == pytest.approx(
         dict(zip(one.tracks.lines["track_no"], one.tracks.lines["length_m"], strict=True))
     )
+    wkt: Any
     (wkt,) = graph.query("SELECT ?w { ?f a gf:Field ; geo:hasDefaultGeometry/geo:asWKT ?w }")
     outline = shapely.from_wkt(str(wkt[0]).partition("> ")[2])
     assert outline.symmetric_difference(one.field.polygon_lonlat).area < 1e-6 * outline.area

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import pytest
 import rdflib
@@ -111,7 +112,7 @@ def test_oxigraph_and_rdflib_give_the_same_answers_to_what_is_shown(files, store
         assert shown.startswith("# Needs a store with geof:")
         geosparql.register_in_rdflib()
         functions = geosparql.oxigraph_functions()
-    graph = rdflib.Graph()
+    graph: Any = rdflib.Graph()
     for path in files:
         graph.parse(path)
     theirs = [

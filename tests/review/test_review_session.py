@@ -35,13 +35,13 @@ def test_a_rejected_obstacle_gives_its_track_back(plan: Plan) -> None:
     before = plan.tracks.statistics
     lost = {loss.obstacle_no: loss.length_m for loss in before.losses}[8]
     session.do({"do": "status", "no": 8, "status": "rejected"})
-    after = session.plan.tracks.statistics  # type: ignore[union-attr]
+    after = session.plan.tracks.statistics
     assert after.length_m > before.length_m + 0.9 * lost > before.length_m
     assert row(session.plan, 8)["status"] == "rejected"
     session.undo()
-    assert session.plan.tracks.statistics.length_m == before.length_m  # type: ignore[union-attr]
+    assert session.plan.tracks.statistics.length_m == before.length_m
     session.redo()
-    assert session.plan.tracks.statistics.length_m == after.length_m  # type: ignore[union-attr]
+    assert session.plan.tracks.statistics.length_m == after.length_m
 
 
 def test_a_moved_obstacle_stands_where_it_was_put(plan: Plan) -> None:

@@ -76,9 +76,9 @@ def test_other_bad_values_are_refused():
     with pytest.raises(ObstacleError, match="threshold"):
         find_circles(grey, (6, 14), edge_threshold=2)
     with pytest.raises(ObstacleError, match="polarity"):
-        find_circles(grey, (6, 14), polarity="grey")
+        find_circles(grey, (6, 14), polarity="grey")  # type: ignore[arg-type]
     with pytest.raises(ObstacleError, match="method"):
-        find_circles(grey, (6, 14), method="three_stage")
+        find_circles(grey, (6, 14), method="three_stage")  # type: ignore[arg-type]
 
 
 def test_the_study_range_warns():

@@ -57,6 +57,6 @@ def test_canny_edge_of_a_disc_is_a_closed_thin_ring():
 
 def test_unknown_method_and_colour_are_refused():
     with pytest.raises(ObstacleError, match="laplace"):
-        edge_map(np.zeros((5, 5)), "laplace")
+        edge_map(np.zeros((5, 5)), "laplace")  # type: ignore[arg-type]
     with pytest.raises(ObstacleError, match="one band"):
         edge_map(np.zeros((5, 5, 3)))

@@ -93,23 +93,23 @@ def test_a_range_includes_both_ends():
 
 def test_bad_names_are_refused(grey, region):
     with pytest.raises(ObstacleError, match="strategy"):
-        run_strategy(grey, region, "best", HOW)
+        run_strategy(grey, region, "best", HOW)  # type: ignore[arg-type]
     with pytest.raises(ObstacleError, match="edge method"):
-        run_strategy(grey, region, "single", HOW, methods=["laplace"])
+        run_strategy(grey, region, "single", HOW, methods=["laplace"])  # type: ignore[list-item]
     with pytest.raises(ObstacleError, match="needs one"):
         run_strategy(grey, region, "t_range", HOW, methods=["sobel", "canny"])
 
 
 def test_checks_on_circles():
-    circles = Circles(
-        *np.array([[10.5, 10.5, 3], [10.7, 10.5, 3], [30.5, 30.5, 2], [-5, 10, 3]]).T, np.ones(4)
-    )
+    x, y, radius = np.array([[10.5, 10.5, 3], [10.7, 10.5, 3], [30.5, 30.5, 2], [-5, 10, 3]]).T
+    circles = Circles(x, y, radius, np.ones(4))
     assert first_of_duplicates(circles).tolist() == [True, False, True, True]
     region = np.zeros((40, 40), bool)
     region[:20] = True
     assert inside(circles, region).tolist() == [True, True, False, False]
     # The pixel in row 19 ends at 20, counted from the picture's corner.
-    edge = Circles(*np.array([[3.0, 19.9, 1], [3.0, 20.1, 1]]).T, np.ones(2))
+    x, y, radius = np.array([[3.0, 19.9, 1], [3.0, 20.1, 1]]).T
+    edge = Circles(x, y, radius, np.ones(2))
     assert inside(edge, region).tolist() == [True, False]
     grey = np.full((40, 40), 200.0)
     grey[25:36, 25:36] = 100.0

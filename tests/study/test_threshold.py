@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from affine import Affine
 
+from geofield.crs import parse_crs
 from geofield.errors import FieldError, FieldWarning, PointOutsideError, SettingsError
 from geofield.field import extract_field
 from geofield.grid import Grid
@@ -13,7 +14,7 @@ from geofield.study.threshold import study_pictures
 
 def scene_of(grey):
     rows, columns = grey.shape
-    grid = Grid(columns, rows, Affine(0.5, 0, 500_000, 0, -0.5, 5_000_000), "EPSG:32633")
+    grid = Grid(columns, rows, Affine(0.5, 0, 500_000, 0, -0.5, 5_000_000), parse_crs("EPSG:32633"))
     return Scene(grid, grey.astype(np.uint8)[None], ("grey",), np.ones(grey.shape, bool))
 
 

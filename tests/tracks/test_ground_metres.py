@@ -206,7 +206,7 @@ def test_the_scale_is_that_of_short_geodesics(place):
     to_crs = Transformer.from_crs(4326, crs, always_xy=True)
     x, y = to_crs.transform(*place)
     for azimuth in (10.0, 100.0):
-        ends = [away(*place, azimuth + turn, 5.0) for turn in (0.0, 180.0)]
+        ends = [away(place[0], place[1], azimuth + turn, 5.0) for turn in (0.0, 180.0)]
         (x0, y0), (x1, y1) = (to_crs.transform(*end) for end in ends)
         assert np.hypot(x1 - x0, y1 - y0) / 10.0 == pytest.approx(ground_scale(crs, x, y), rel=2e-9)
 

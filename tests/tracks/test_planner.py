@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -22,7 +23,7 @@ from geofield.model.obstacles import circle_polygons
 from geofield.tracks import longest_edge, plan_tracks
 
 #: One unit is one metre on the ground here: a zone of scale 1 along its middle.
-CRS = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
+CRS: Any = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
 X, Y = 500000.0, 5600000.0
 
 
@@ -106,7 +107,7 @@ def test_rejected_and_possible_obstacles_do_not_count(status: str) -> None:
 
 
 def test_identity_survives_changes_of_obstacles() -> None:
-    field = shapely.difference(box(0, 0, 120, 80), box(50, 50, 60, 80))
+    field: Any = shapely.difference(box(0, 0, 120, 80), box(50, 50, 60, 80))
     before = plan_tracks(field, circles((30, 30, 6), (90, 60, 5)), crs=CRS, spacing_m=3.0)
     after = plan_tracks(
         field, circles((30, 30, 6), (90, 60, 5), (70, 20, 4)), crs=CRS, spacing_m=3.0
@@ -126,7 +127,7 @@ def test_identity_survives_changes_of_obstacles() -> None:
 
 
 def test_gaps_name_every_cause() -> None:
-    field = shapely.difference(box(0, 0, 100, 40), box(40, 20, 50, 40))
+    field: Any = shapely.difference(box(0, 0, 100, 40), box(40, 20, 50, 40))
     obstacles = [box(48, 24, 55, 30), box(54, 24, 60, 30), box(10, 24, 14, 30)]
     tracks = plan_tracks(field, obstacles, crs=CRS, spacing_m=4.0, direction=90.0)
     causes = set(tracks.gaps["cause"])
@@ -138,7 +139,7 @@ def test_gaps_name_every_cause() -> None:
 
 
 def test_tracks_keep_one_number_across_a_notch() -> None:
-    field = shapely.difference(box(0, 0, 100, 40), box(40, 9, 60, 40))
+    field: Any = shapely.difference(box(0, 0, 100, 40), box(40, 9, 60, 40))
     tracks = plan_tracks(field, crs=CRS, spacing_m=4.0)
     assert tracks.lines["track_no"].tolist() == list(range(1, 11))
     assert tracks.lines["segment_count"].tolist() == [1, 1] + [2] * 8
@@ -208,7 +209,7 @@ def test_fewest_is_the_narrow_way() -> None:
 
 
 def test_fewest_turns_counts_pieces() -> None:
-    comb = shapely.difference(
+    comb: Any = shapely.difference(
         box(0, 0, 200, 60), shapely.union_all([box(x, 20, x + 10, 60) for x in range(20, 200, 40)])
     )
     tracks = plan_tracks(comb, crs=CRS, spacing_m=4.0, direction="fewest")
@@ -240,7 +241,7 @@ def test_ab_lines_are_tracks_themselves() -> None:
         ("spread", [1.9, 5.7, 9.5, 13.3, 17.1]),
     ],
 )
-def test_last_strips(last_strip: str, expected: list[float]) -> None:
+def test_last_strips(last_strip: Any, expected: list[float]) -> None:
     tracks = plan_tracks(box(0, 0, 100, 19), crs=CRS, spacing_m=4.0, last_strip=last_strip)
     y = shapely.get_coordinates(tracks.segments.geometry.to_numpy())[::2, 1] - Y
     y = y if y[0] < y[-1] else 19.0 - y
@@ -322,7 +323,7 @@ def test_points_are_numbered_and_have_both_ends() -> None:
 def test_no_point_lies_outside_or_in_a_buffer(
     rows: list[tuple[float, float, float]], heading: float, spacing_m: float
 ) -> None:
-    field = shapely.difference(box(0, 0, 100, 60), box(40, 30, 55, 60))
+    field: Any = shapely.difference(box(0, 0, 100, 60), box(40, 30, 55, 60))
     obstacles = circles(*rows) if rows else None
     tracks = plan_tracks(field, obstacles, crs=CRS, spacing_m=spacing_m, direction=heading)
     xy = shapely.get_coordinates(tracks.points.geometry.to_numpy())
@@ -392,7 +393,7 @@ def test_outlines_are_repaired_or_refused() -> None:
         assert plan_tracks(spike, crs=CRS, spacing_m=4.0).segments[
             "length_m"
         ].sum() == pytest.approx(1000.0)
-    single = plan_tracks(shapely.MultiPolygon([field]), crs=CRS, spacing_m=4.0)
+    single = plan_tracks(shapely.MultiPolygon([field]), crs=CRS, spacing_m=4.0)  # type: ignore[arg-type]
     assert single.segments.equals(flat)
     bow = Polygon([(X, Y), (X + 100, Y + 40), (X + 100, Y), (X, Y + 40)])
     for wrong, match in (
@@ -404,7 +405,7 @@ def test_outlines_are_repaired_or_refused() -> None:
         (Polygon([(X, Y), (X + 1, np.inf), (X + 2, Y)]), "finite"),
     ):
         with pytest.raises(TrackError, match=match):
-            plan_tracks(wrong, crs=CRS, spacing_m=4.0)
+            plan_tracks(wrong, crs=CRS, spacing_m=4.0)  # type: ignore[arg-type]
 
 
 def test_degrees_are_refused() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
@@ -14,8 +16,8 @@ from geofield.tracks.route.order import track_order
 from geofield.tracks.route.passage import Passage
 
 #: One unit is one metre on the ground here: a zone of scale 1 along its middle.
-CRS = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
-FIELD = shapely.difference(
+CRS: Any = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
+FIELD: Any = shapely.difference(
     shapely.box(500000, 5600000, 500300, 5600200),
     shapely.union(
         shapely.box(500120, 5600120, 500180, 5600200), shapely.box(500040, 5600040, 500060, 5600060)
@@ -39,7 +41,7 @@ def tracks() -> Tracks:
     ("radius_m", "curve"), [(None, "dubins"), (5.0, "dubins"), (5.0, "reeds_shepp")]
 )
 def test_route_is_whole_and_free(
-    tracks: Tracks, pattern: str, radius_m: float | None, curve: str
+    tracks: Tracks, pattern: Any, radius_m: float | None, curve: Any
 ) -> None:
     planned = plan_route(tracks, pattern=pattern, turning_radius_m=radius_m, curve=curve)
     route, turns = planned.route, planned.turns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -30,7 +31,7 @@ def outlines(count: int) -> gpd.GeoDataFrame:
     )
 
 
-def run(*arguments: str | Path) -> dict[str, object]:
+def run(*arguments: str | Path) -> dict[str, Any]:
     result = CliRunner().invoke(cli, ["tracks", *map(str, arguments), "--json"])
     assert result.exception is None, result.output
     return json.loads(result.stdout)
@@ -49,7 +50,7 @@ def test_one_polygon_with_trees(tmp_path: Path) -> None:
         tmp_path / "parcel.geojson", "--obstacles", tmp_path / "trees.shp", "--spacing", "5",
         "--headland", "10", "--route", "skip", "--turning-radius", "4", "-o", out,
     )  # fmt: skip
-    (row,) = report["fields"]  # type: ignore[misc]
+    (row,) = report["fields"]
     assert row["gap_count"] > 0
     assert {loss["obstacle_no"] for loss in row["losses"]} == {1, 2}
     assert row["turns_that_do_not_fit"] == 0
@@ -64,7 +65,7 @@ def test_one_polygon_with_trees(tmp_path: Path) -> None:
     edited = pyogrio.read_dataframe(out, layer="obstacles")
     assert edited["obstacle_no"].tolist() == [1, 2]
     report = run(out, "--spacing", "8", "--direction", "30", "-o", out)
-    (row,) = report["fields"]  # type: ignore[misc]
+    (row,) = report["fields"]
     assert row["heading_deg"] == pytest.approx(30.0)
     assert "turn_count" not in row
 
@@ -144,7 +145,7 @@ def test_a_machine_of_the_settings_file(tmp_path: Path, monkeypatch: pytest.Monk
         "parcel.shp", "--obstacles", "tree.shp", "--machine", "drill", "--headland-passes", "2",
         "--route", "skip", "-o", "plan.gpkg",
     )  # fmt: skip
-    (row,) = report["fields"]  # type: ignore[misc]
+    (row,) = report["fields"]
     assert row["spacing_m"] == 5.5
     headland = pyogrio.read_dataframe("plan.gpkg", layer="headland")
     assert headland["width_m"].tolist() == [11.0]
