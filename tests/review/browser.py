@@ -109,6 +109,14 @@ class Page:
         )
         return int(found[0]), int(found[1])
 
+    def view(self) -> tuple[list[float], float]:
+        """The middle of the map, a place of the plan, and metres per pixel."""
+        found = self.driver.execute_async_script(
+            "const done = arguments[0]; import('/map.js').then(({view}) =>"
+            " done([view.getCenter(), view.getResolution()]));"
+        )
+        return found[0], found[1]
+
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 6) -> None:
         """Press at one place of the plan, move, and let go at another."""
         (x0, y0), (x1, y1) = self.pixel(*start), self.pixel(*end)

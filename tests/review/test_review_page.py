@@ -148,9 +148,31 @@ def test_the_outline_is_edited_and_tracks_turn(page: Page) -> None:
     assert "Drawn by a person" in page.text("certainty")
     page.driver.find_element(By.CSS_SELECTOR, "[data-tool=direction]").click()
     x, y = after["obstacles"][7]["centre"]
-    page.click(x - 20, y + 20)
-    page.click(x + 30, y - 30)
+    page.drag((x - 20, y + 20), (x + 30, y - 30))
     page.wait(lambda: abs(page.state()["figures"]["heading_deg"] - 135) < 4)
+
+
+def test_the_map_moves_with_the_mouse_whatever_has_the_focus(page: Page) -> None:
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    time.sleep(0.3)
+    before, zoom = page.view()
+    x, y = before
+    page.drag((x + 12, y + 14), (x + 30, y + 14))
+    page.wait(lambda: page.view()[0][0] < x - 10)
+    assert page.view()[1] == zoom
+
+
+def test_corners_are_added_and_taken_away(page: Page) -> None:
+    page.press("o")
+    ring = page.state()["field"]["rings"][0]
+    (x0, y0), (x1, y1) = sorted(ring, key=lambda place: place[1])[-2:]
+    page.drag(((x0 + x1) / 2, (y0 + y1) / 2), ((x0 + x1) / 2, (y0 + y1) / 2 - 12))
+    page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring) + 1)
+    corner = next(place for place in page.state()["field"]["rings"][0] if list(place) not in ring)
+    page.click(*corner)
+    page.press(Keys.DELETE)
+    page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring))
+    assert {tuple(place) for place in page.state()["field"]["rings"][0]} == set(map(tuple, ring))
 
 
 def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> None:
@@ -301,6 +323,11 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     page.driver.find_element(By.CSS_SELECTOR, "#language option[value=de]").click()
     page.run("document.getElementById('menu').close()")
     assert page.text("confirm") == "Bestätigen"
+    assert page.run("return document.querySelector('[name=last_strip]').value") == "overrun"
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    box.clear()
+    box.send_keys("5000", Keys.ENTER)
+    page.wait(lambda: "5000 m ist größer als das Feld" in page.text("message"))
     assert "warten auf Ihr Wort" in page.text("left")
 
 

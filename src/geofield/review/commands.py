@@ -22,6 +22,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
 from geofield.settings import Settings, TrackSettings
+from geofield.settings.tracks import said_over
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -154,7 +155,7 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
     from pydantic import ValidationError
 
     try:
-        tracks = TrackSettings(**{**settings.tracks.model_dump(), **given})
+        tracks = TrackSettings(**said_over(settings.tracks.model_dump(), given))
     except ValidationError as error:
         problem = error.errors()[0]
         name = ".".join(str(part) for part in problem["loc"])

@@ -88,7 +88,7 @@ def document(dataset: Dataset, scene: Scene | None = None) -> str:
     source = dataset.provenance.source
     credit = " · ".join(text for text in (source.attribution, source.licence, source.date) if text)
     style = page_file("vendor/ol.css").decode() + page_file("standalone.css").decode()
-    script = inlined("words.js", "symbols.js", "standalone.js")
+    script = inlined("said.js", "words.js", "symbols.js", "standalone.js")
     title = html.escape(dataset.name)
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">

@@ -1,6 +1,6 @@
 // A plan on a page that is one file: picture, layers, what each thing is, legend.
 
-import {label, number, t} from "./words.js";
+import {label, number, t, told} from "./words.js";
 import {cased, closed, driveFeatures, driveStyle, frameStyle, gapFeatures, gapStyle, legend, line, lonlatOf, obstacleFeature, obstacleStyle,
   outlineColor, setTheme, trackFeatures, trackStyle, turnStyle} from "./js";
 
@@ -33,6 +33,7 @@ const shown = {
 const popup = new ol.Overlay({element: document.getElementById("popup"), positioning: "bottom-center", offset: [0, -12],
                               stopEvent: true, autoPan: {margin: 20}});
 const map = new ol.Map({target: "map", layers, view, overlays: [popup],
+  interactions: ol.interaction.defaults.defaults({onFocusOnly: false, altShiftDragRotate: false, pinchRotate: false}),
   controls: ol.control.defaults.defaults({rotate: false, attribution: false}).extend([new ol.control.ScaleLine({minWidth: 90})])});
 projection.getMetersPerUnit = () => plan.scale;
 projection.setGetPointResolution(resolution => resolution);
@@ -73,7 +74,7 @@ if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.len
 if (f.turns) facts.push(["turns", String(f.turns)]);
 if (plan.obstacles.length) facts.push(["obstacles", String(plan.obstacles.length)]);
 document.getElementById("facts").replaceChildren(...facts.flatMap(([name, text]) => [node("dt", t(name)), node("dd", text)]));
-const doubts = [...field.doubts, ...(field.frame.length ? [t("frame")] : []),
+const doubts = [...field.doubts.map(told), ...(field.frame.length ? [t("frame")] : []),
   ...(f.turns_that_do_not_fit ? [t("unfit", {n: f.turns_that_do_not_fit})] : [])];
 document.getElementById("doubts").replaceChildren(
   ...(field.certainty === null ? [] : [node("li", t("sure", {p: number(100 * field.certainty)}))]), ...doubts.map(text => node("li", text)));

@@ -18,8 +18,8 @@ export function fade(color, alpha) {
   return `rgba(${value >> 16},${(value >> 8) & 255},${value & 255},${alpha})`;
 }
 
-const lettering = (text, font, color, placement) => new ol.style.Style({text: new ol.style.Text({
-  text, font, placement, overflow: true, fill: new ol.style.Fill({color}), stroke: stroke("#000", 3)})});
+const lettering = (text, font, color, placement, offsetX = 0) => new ol.style.Style({text: new ol.style.Text({
+  text, font, placement, offsetX, overflow: true, fill: new ol.style.Fill({color}), stroke: stroke("#000", 3)})});
 
 export const frameStyle = () => [new ol.style.Style({stroke: stroke("#fff", 4)}),
   new ol.style.Style({stroke: stroke("#000", 4, [10, 10])})];
@@ -45,7 +45,7 @@ export function driveStyle(feature, resolution) {
   return [new ol.style.Style({image: new ol.style.RegularShape({points: 3, radius: 8, rotateWithView: true,
       rotation: Math.PI / 2 - feature.get("turned"), scale: [0.7, 1.15],
       fill: new ol.style.Fill({color: theme.turn}), stroke: stroke("#000", 1.2)})}),
-    ...(resolution < 0.35 ? [lettering(String(feature.get("order")), "11px system-ui, sans-serif", theme.turn)] : [])];
+    ...(resolution < 0.2 ? [lettering(String(feature.get("order")), "600 11px system-ui, sans-serif", "#fff", "point", 16)] : [])];
 }
 
 export function obstacleStyle(feature, resolution, chosen) {

@@ -1,5 +1,7 @@
 // The page's words in English and German.
 
+import {SAID} from "./said.js";
+
 const WORDS = {
   en: {
     undo: "Undo", redo: "Redo", save: "Save", more: "More", keys: "Keys", tools: "Tools", map: "Map",
@@ -28,6 +30,8 @@ const WORDS = {
     k_next: "Next obstacle, the most doubtful first", k_prev: "Previous obstacle", k_confirm: "Confirm", k_reject: "Reject",
     k_reset: "Take your word back", k_add: "Add a circle: press at its middle and drag", k_move: "Move by the arrow keys",
     k_size: "Smaller, larger", k_outline: "Edit the outline's corners", k_ground: "Click ground that belongs to the field", k_notground: "Click ground that does not",
+    v_overrun: "over the border", v_leave: "left out", v_shift: "moved inside", v_spread: "spacing evened",
+    v_none: "none", v_boustrophedon: "one by one", v_skip: "skipping some", v_shortest: "shortest",
     outline_no: "Outline {n} · {p} %", alternatives: "Other outlines", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
     k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
   },
@@ -58,6 +62,8 @@ const WORDS = {
     k_next: "Nächstes Hindernis, das zweifelhafteste zuerst", k_prev: "Voriges Hindernis", k_confirm: "Bestätigen", k_reject: "Verwerfen",
     k_reset: "Ihr Wort zurücknehmen", k_add: "Kreis: in der Mitte drücken und ziehen", k_move: "Mit den Pfeiltasten verschieben",
     k_size: "Kleiner, größer", k_outline: "Ecken des Umrisses ändern", k_ground: "Boden anklicken, der dazugehört", k_notground: "Boden anklicken, der nicht dazugehört",
+    v_overrun: "über den Rand", v_leave: "auslassen", v_shift: "hineinrücken", v_spread: "Abstand anpassen",
+    v_none: "keiner", v_boustrophedon: "eine nach der anderen", v_skip: "überspringend", v_shortest: "kürzester",
     outline_no: "Umriss {n} · {p} %", alternatives: "Andere Umrisse", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
     k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
   },
@@ -73,6 +79,12 @@ function remembered() {
 export function t(name, values = {}) {
   const text = WORDS[language][name] ?? WORDS.en[name] ?? name;
   return text.replace(/\{(\w+)\}/g, (_, key) => values[key]);
+}
+
+// What the program says, where it is known in the page's language.
+export function told(text) {
+  const found = SAID[language]?.find(([pattern]) => pattern.test(text));
+  return found ? text.replace(...found) : text;
 }
 
 export const currentLanguage = () => language;

@@ -1,5 +1,7 @@
 // Speaks to the server: one request at a time for what drags, errors as words.
 
+import {told} from "./web/words.js";
+
 // A tab keeps its name when it is loaded again.
 const tab = sessionStorage.getItem("tab") ?? String(crypto.getRandomValues(new Uint32Array(2)));
 sessionStorage.setItem("tab", tab);
@@ -7,7 +9,7 @@ let token = "";
 
 export class Refused extends Error {
   constructor(status, answer) {
-    super([answer.message, answer.hint].filter(Boolean).join(" "));
+    super([answer.message, answer.hint].filter(Boolean).map(told).join(" "));
     this.status = status;
   }
 }

@@ -5,7 +5,7 @@ import * as maps from "./map.js";
 import * as tools from "./tools.js";
 import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
-import {currentLanguage, label, number, setLanguage, t} from "./web/words.js";
+import {currentLanguage, label, number, setLanguage, t, told} from "./web/words.js";
 
 const $ = id => document.getElementById(id);
 let state, chosen = null, ended = false;
@@ -80,7 +80,7 @@ function showTracks(answer, moving = false) {
     ["heading", `${number(f.heading_deg, 1)}°`], ["lost_all", `${number(f.lost_m)} m`]];
   if (f.turns !== null) facts.push(["turns", number(f.turns)]);
   $("facts").replaceChildren(...facts.flatMap(([name, value]) => [node("dt", t(name)), node("dd", value)]));
-  $("notes").replaceChildren(...answer.notes.map(text => node("li", text)));
+  $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
 }
 
 const node = (tag, text) => Object.assign(document.createElement(tag), {textContent: text});
@@ -89,7 +89,7 @@ function showField() {
   const field = state.field;
   $("certainty").textContent = field.certainty !== null ? t("sure", {p: number(100 * field.certainty)})
     : field.method === "drawn" ? t("drawn") : t("unknown");
-  const doubts = [...field.doubts];
+  const doubts = field.doubts.map(told);
   if (field.frame.length) doubts.push(t("frame"));
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
   const shown = JSON.stringify(field.rings);
@@ -189,7 +189,7 @@ const ACTIONS = {
   next: () => step(true), previous: () => step(false), confirm: () => verdict("confirmed"), reject: () => verdict("rejected"),
   reset: () => verdict("detected"), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => resize(1 / 1.1), larger: () => resize(1.1),
-  remove: () => chosen !== null && commit({do: "delete", no: chosen}), tool: name => tools.use(name), nudge,
+  remove: () => tools.removeCorner() || (chosen !== null && commit({do: "delete", no: chosen})), tool: name => tools.use(name), nudge,
   escape: () => { if (tools.current() === "select") choose(null); tools.use("select"); },
 };
 
@@ -254,7 +254,7 @@ async function start() {
   $("export").onclick = () => act(() => api.exportAs($("export-format").value),
     answer => say(t("exported", {files: answer.files.join(", ")})));
   $("save-as").onclick = async () => { if (await save($("save-name").value)) $("menu").close(); };
-  $("reload").onclick = () => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(answer.brought_back); });
+  $("reload").onclick = () => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(told(answer.brought_back)); });
   $("stop").onclick = () => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); });
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
@@ -262,7 +262,7 @@ async function start() {
   });
   window.addEventListener("beforeunload", event => { if (state.edited && !ended) event.preventDefault(); });
   if (!state.yours) say(t("second"), true, {text: t("take"), act: () => act(() => api.takeOver(), () => say(""))});
-  else if (state.brought_back) say(state.brought_back);
+  else if (state.brought_back) say(told(state.brought_back));
   document.body.dataset.ready = "yes";
 }
 

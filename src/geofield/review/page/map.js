@@ -35,7 +35,9 @@ export function build(state, chosen) {
   add("handle", new ol.style.Style({image: new ol.style.RegularShape({points: 4, radius: 9, angle: Math.PI / 4,
     fill: new ol.style.Fill({color: "#fff"}), stroke: symbols.stroke("#000", 2)})}));
   add("sketch", symbols.cased(state.theme.outline, 2, [6, 6]));
-  map = new ol.Map({target: "map", layers, view, controls: ol.control.defaults.defaults({rotate: false, attribution: false})
+  // The page is the map: it moves whatever has the focus.
+  const interactions = ol.interaction.defaults.defaults({onFocusOnly: false, altShiftDragRotate: false, pinchRotate: false});
+  map = new ol.Map({target: "map", layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false})
     .extend([new ol.control.ScaleLine({minWidth: 90})]), keyboardEventTarget: document.getElementById("map")});
   // The scale bar knows no CRS of its own making: true metres on the ground come from the server.
   ol.proj.addProjection(projection);

@@ -4,7 +4,9 @@ import * as maps from "./map.js";
 import {preview, endPreview} from "./api.js";
 
 export const TOOLS = ["select", "circle", "polygon", "ground", "notground", "outline", "anew", "direction", "measure"];
-let desk, active = "select", held = [];
+let desk, touched = null, active = "select", held = [];
+// Pixels around a thing that count as the thing: fingers are wide.
+const reach = matchMedia("(pointer: coarse)").matches ? 16 : 6;
 const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
 const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
 
@@ -20,9 +22,25 @@ export function begin(given) {
     if (event.dragging || active !== "select") return;
     maps.map.getTargetElement().style.cursor = maps.obstacleAt(event.pixel) === null ? "" : "pointer";
   });
+  maps.map.getViewport().addEventListener("pointerdown", event => { touched = maps.map.getEventCoordinate(event); }, true);
   maps.view.on("change:resolution", () => maps.showHandle(desk.row(desk.chosen())));
   use("select");
 }
+
+// The corner that was touched last: fingers have no Alt key.
+export function removeCorner() {
+  if (active !== "outline") return false;
+  const rings = outlineRings(), near = 16 * maps.view.getResolution();
+  let best = null;
+  rings.forEach((places, ring) => places.forEach(([x, y], corner) => {
+    const away = touched ? Math.hypot(x - touched[0], y - touched[1]) : Infinity;
+    if (away < near && (!best || away < best.away)) best = {away, ring, corner};
+  }));
+  if (best) commit({do: "outline", rings: rings.map((places, ring) => places.filter((_, i) => ring !== best.ring || i !== best.corner))});
+  return true;
+}
+
+const outlineRings = () => maps.sources.outline.getFeatures()[0].getGeometry().getCoordinates().map(part => part.slice(0, -1).map(at));
 
 export const current = () => active;
 
@@ -61,9 +79,8 @@ const MAKERS = {
   polygon: () => [shape("Polygon", geometry => ({do: "polygon", ring: ring(geometry)}))],
   anew: () => [shape("Polygon", geometry => ({do: "outline", rings: [ring(geometry)]}), true)],
   outline() {
-    const modify = new ol.interaction.Modify({source: maps.sources.outline, pixelTolerance: 12});
-    const command = () => ({do: "outline", rings: maps.sources.outline.getFeatures()[0].getGeometry()
-      .getCoordinates().map(part => part.slice(0, -1).map(at))});
+    const modify = new ol.interaction.Modify({source: maps.sources.outline, pixelTolerance: 2 * reach});
+    const command = () => ({do: "outline", rings: outlineRings()});
     let listening = null;
     modify.on("modifystart", ({features}) => {
       listening = features.item(0).getGeometry().on("change", () => live(command()));
@@ -75,11 +92,15 @@ const MAKERS = {
     return [modify];
   },
   direction() {
-    const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "LineString", maxPoints: 2});
-    const command = geometry => {
-      const [a, b] = geometry.getCoordinates();
-      return {do: "direction", a: at(a), b: at(b)};
+    // Whatever way the hand takes: its two ends count.
+    const straight = (way, line) => {
+      const ends = [way[0], way.at(-1)];
+      if (!line) return new ol.geom.LineString(ends);
+      line.setCoordinates(ends);
+      return line;
     };
+    const draw = new ol.interaction.Draw({source: maps.sources.sketch, type: "LineString", freehand: true, geometryFunction: straight});
+    const command = geometry => ({do: "direction", a: at(geometry.getFirstCoordinate()), b: at(geometry.getLastCoordinate())});
     draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => {
       if (target.getLength() > 2) live(command(target));
     }));
@@ -116,7 +137,7 @@ function mover() {
   const translate = new ol.interaction.Translate({
     filter: feature => feature.getId() === desk.chosen(),
     layers: layer => layer.getSource() === maps.sources.obstacles,
-    hitTolerance: 4,
+    hitTolerance: reach,
   });
   let from = null;
   const command = event => ({do: "move", no: desk.chosen(), dx_m: at(event.coordinate)[0] - from[0], dy_m: at(event.coordinate)[1] - from[1]});
@@ -135,12 +156,12 @@ function mover() {
 
 function resizer() {
   const translate = new ol.interaction.Translate({
-    layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: 6,
+    layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: reach,
   });
   const command = event => {
     const row = desk.row(desk.chosen()), [x, y] = row.centre;
-    const reach = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
-    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((reach * desk.scale() - row.buffer_m) * 1000) / 1000)};
+    const away = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
+    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((away * desk.scale() - row.buffer_m) * 1000) / 1000)};
   };
   translate.on("translating", event => {
     const row = desk.row(desk.chosen()), wanted = command(event);

@@ -1,0 +1,113 @@
+"""The review page on a phone, by fingers: the touches that a browser gets from a screen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browser import Page, chromium, served
+from selenium import webdriver
+
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
+
+Spot = tuple[float, float]
+
+
+class Fingers:
+    """One or more fingers on the screen."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def _send(self, kind: str, *spots: Spot) -> None:
+        points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(spots)]
+        given = {"type": kind, "touchPoints": points}
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", given)
+
+    def move(self, *ways: tuple[Spot, Spot], steps: int = 8) -> None:
+        """Put each finger down at the first of two spots and lift it at the second."""
+        self._send("touchStart", *(start for start, _ in ways))
+        for step in range(1, steps + 1):
+            share = step / steps
+            spots = ((a + (c - a) * share, b + (d - b) * share) for (a, b), (c, d) in ways)
+            self._send("touchMove", *spots)
+            time.sleep(0.02)
+        self._send("touchEnd")
+        time.sleep(0.5)
+
+    def tap(self, x: float, y: float) -> None:
+        """Touch a spot."""
+        self._send("touchStart", (x, y))
+        self._send("touchEnd")
+        time.sleep(0.5)  # a second one would make it a double tap
+
+
+@pytest.fixture
+def page(plan_path: Path) -> Iterator[Page]:
+    driver = chromium(390, 844)
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    touch = {"enabled": True, "maxTouchPoints": 5}
+    driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    try:
+        with served(plan_path) as (address, _):
+            page = Page(driver, address)
+            yield page
+            assert not page.complaints()
+    finally:
+        driver.quit()
+
+
+def test_a_field_is_reviewed_by_fingers(page: Page) -> None:
+    fingers = Fingers(page.driver)
+    left, top, width, height = page.run(
+        "const b = document.getElementById('map').getBoundingClientRect();"
+        "return [b.left, b.top, b.width, b.height];"
+    )
+    x, y = left + width / 2, top + height / 2
+
+    middle, zoom = page.view()
+    fingers.move(((x - 20, y), (x - 80, y)), ((x + 20, y), (x + 80, y)))
+    assert page.view()[1] < 0.5 * zoom  # two fingers apart: nearer
+    fingers.move(((x, y + 50), (x + 60, y + 50)))
+    assert page.view()[0][0] < middle[0] - 5  # one finger: the map goes with it
+
+    before = page.state()["obstacles"]
+    number, spot = next(
+        (row["no"], spot)
+        for row in before
+        if left + 40 < (spot := page.pixel(*row["centre"]))[0] < left + width - 80
+        and top + 60 < spot[1] < top + height - 60
+    )
+    fingers.tap(*spot)
+    chosen = "return document.querySelector('#list [aria-current=true] b')?.textContent"
+    assert page.run(chosen) == str(number)
+    page.button("confirm")
+    page.wait(lambda: page.obstacle(number)["status"] == "confirmed")
+
+    page.run(f"document.querySelector('#list [data-no=\"{number}\"]').click()")
+    time.sleep(0.4)
+    spot = page.pixel(*page.obstacle(number)["centre"])
+    fingers.move((spot, (spot[0] + 40, spot[1] + 10)))
+    was = next(row["centre"] for row in before if row["no"] == number)
+    page.wait(lambda: page.obstacle(number)["centre"][0] > was[0] + 2)
+
+    page.run("document.querySelector('[data-tool=circle]').click()")
+    fingers.move(((x - 100, y + 80), (x - 80, y + 80)))
+    page.wait(lambda: len(page.state()["obstacles"]) == len(before) + 1)
+
+
+def test_corners_of_the_outline_by_fingers(page: Page) -> None:
+    fingers = Fingers(page.driver)
+    page.run("document.querySelector('[data-tool=outline]').click()")
+    ring = page.state()["field"]["rings"][0]
+    at = max(range(len(ring)), key=lambda i: ring[i][0])
+    x, y = page.pixel(*ring[at])
+    fingers.move(((x, y), (x - 20, y + 5)))
+    page.wait(lambda: page.state()["field"]["rings"][0][at] != ring[at])
+    moved = page.state()["field"]["rings"][0]
+    fingers.tap(*page.pixel(*moved[at]))
+    page.run("document.getElementById('remove').click()")
+    page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring) - 1)
