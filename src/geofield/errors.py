@@ -6,6 +6,8 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
+from geofield.wording import in_python
+
 
 class GeofieldError(Exception):
     """Base of every error that geofield raises on purpose.
@@ -27,7 +29,8 @@ class GeofieldError(Exception):
         self.hint = hint
 
     def __str__(self) -> str:
-        return f"{self.message} {self.hint}" if self.hint else self.message
+        # Whoever reads this text is at Python; the command line takes message and hint.
+        return in_python(f"{self.message} {self.hint}" if self.hint else self.message)
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only arguments are lost by the default, and pools pickle errors.

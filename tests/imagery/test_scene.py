@@ -335,7 +335,7 @@ def test_points_outside_or_on_no_data(tmp_path: Path) -> None:
     lon, lat = grid.to_lonlat(64, 48)
     with pytest.raises(PointOutsideError, match="covers lat"):
         read_scene(path, lat=lat + 1, lon=lon)
-    with pytest.raises(PointOutsideError, match=f"look swapped: try --lat {lat} --lon {lon}"):
+    with pytest.raises(PointOutsideError, match=f"look swapped: try lat={lat} lon={lon}"):
         read_scene(path, lat=lon, lon=lat)
     lon, lat = grid.to_lonlat(64, 5)
     with pytest.raises(PointOutsideError, match="no data"):

@@ -168,7 +168,7 @@ def test_google_needs_acknowledgement_and_is_never_cached(tmp_path: Path) -> Non
         source = GoogleStaticSource(key=KEY, address=server.address + "/staticmap")
         options = replace(FAST, cache_dir=tmp_path / "cache")
         where = Where(lat=LAT, lon=LON, zoom=18)
-        with pytest.raises(TermsError, match="--acknowledge-terms"):
+        with pytest.raises(TermsError, match="acknowledged=True"):
             acquire(source, where, tmp_path / "a.tif", options=options)
         assert server.paths == []
         options = replace(options, acknowledged=True)
@@ -313,7 +313,7 @@ def test_wms(tmp_path: Path, crs_name: str, lat: float, lon: float, zoom: int | 
         wms_server(server, crs_name)
         client = Client(attempts=2)
         address = server.address + "/wms?service=WMS"
-        with pytest.raises(ImageryError, match=r"2 layers.*--layer.*ortho, plan"):
+        with pytest.raises(ImageryError, match=r"2 layers.*layer=.NAME.*ortho, plan"):
             find_source(address, client=client, point=(lon, lat))
         with pytest.raises(ImageryError, match="Did you mean 'ortho'"):
             find_source(address, client=client, layer="orto")

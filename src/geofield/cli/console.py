@@ -8,6 +8,7 @@ or, at the end, ``{"error": {"message": "...", "hint": "..."}}``. Other lines ar
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import stat
@@ -23,6 +24,8 @@ import click
 Progress = Callable[..., None]
 
 _PROGRAM_WATCHES = False
+_LOG = logging.getLogger("geofield.cli")
+_LOG.addHandler(logging.NullHandler())
 
 
 def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
@@ -32,11 +35,13 @@ def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
 
 def say(message: str) -> None:
     """A line for the person, on stderr."""
+    _LOG.info(message)
     click.echo(message, err=True)
 
 
 def say_note(message: str) -> None:
     """Something that the person should know, though the work went on."""
+    _LOG.warning(message)
     if _PROGRAM_WATCHES:
         _tell({"note": message})
     else:
@@ -45,6 +50,8 @@ def say_note(message: str) -> None:
 
 def say_error(message: str, hint: str | None) -> None:
     """Why the work failed, and what can be done."""
+    _LOG.error("%s %s", message, hint or "")
+    _LOG.debug("where it came from:", exc_info=True)
     if _PROGRAM_WATCHES:
         _tell({"error": {"message": message, "hint": hint or ""}})
         return
@@ -107,6 +114,21 @@ def _tell(value: Mapping[str, Any]) -> None:
 @contextmanager
 def progress_bar(*, quiet: bool = False) -> Iterator[Progress]:
     """A callback that draws a progress bar on stderr, or tells a program how far the work is."""
+    with _progress(quiet=quiet) as shown:
+        last = ""
+
+        def show(done: int, total: int, what: str) -> None:
+            nonlocal last
+            if what != last or done == total:
+                _LOG.debug("%s: %d of %d", what, done, total)
+            last = what
+            shown(done, total, what)
+
+        yield show
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[Progress]:
     if _PROGRAM_WATCHES:
         yield lambda done, total, what, **facts: _tell(
             {"progress": {"done": done, "total": total, "what": what, **facts}}

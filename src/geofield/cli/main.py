@@ -14,6 +14,7 @@ import click
 
 from geofield import __version__
 from geofield.cli.console import progress_option, say_error, say_note, stop_cleanly
+from geofield.cli.log import end_log, log_options
 from geofield.errors import GeofieldError, GeofieldWarning
 
 #: Name, "module:function" and the one line of help, in the order of the work.
@@ -59,7 +60,7 @@ class LazyGroup(click.Group):
         command: click.Command = getattr(importlib.import_module(module), function)
         if all(each.name != "progress" for each in command.params):
             # After the command's own options, before --help, which click adds.
-            command.params.append(progress_option())
+            command.params += [progress_option(), *log_options()]
         return command
 
     def resolve_command(
@@ -129,3 +130,5 @@ def main(args: list[str] | None = None) -> None:
             # The reader of our output (head, less) has gone: not our failure.
             sys.stderr.close()
             sys.exit(0)
+        finally:
+            end_log()

@@ -16,11 +16,10 @@ from typing import Any, Literal, TypeVar
 import click
 from pydantic.fields import FieldInfo
 
-from geofield.settings import LonLat, Settings, Stage
+from geofield.settings import LonLat, Settings, Stage, option_named
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-_UNITS = ("_m", "_deg", "_px", "_ha")
 SEPARATOR = "__"
 
 
@@ -109,11 +108,7 @@ def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 def option_of(section: str, name: str, field: FieldInfo) -> tuple[list[str], dict[str, Any]]:
     """Names and arguments of the option that stands for a setting, as click takes them."""
-    extra = field.json_schema_extra
-    flag = extra.get("option") if isinstance(extra, dict) else None
-    if not isinstance(flag, str):
-        flag = "--" + name.removesuffix(next((u for u in _UNITS if name.endswith(u)), ""))
-        flag = flag.replace("_", "-")
+    flag = option_named(name, field)
     arguments: dict[str, Any] = {"help": _help(field), **_click_type(field.annotation)}
     if arguments.pop("is_flag", False):
         flag = f"{flag}/--no-{flag[2:]}"

@@ -79,7 +79,7 @@ def all_commands(context: click.Context) -> dict[str, Any]:
                 "parameters": [
                     _parameter(each)
                     for each in command.params
-                    if each.name not in ("help", "progress")
+                    if each.name not in ("help", "progress", "log_file", "verbose")
                 ],
             }
     return found

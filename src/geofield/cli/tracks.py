@@ -100,7 +100,7 @@ def tracks(
                 if not several:
                     raise
                 failed.append(stem)
-                say(f"{stem}: {error}")
+                say(f"{stem}: {error.message} {error.hint or ''}")
                 continue
             save_plan(plan, target, read_from=file if is_plan else None, overwrite=overwrite)
             rows.append(_row(plan, target))

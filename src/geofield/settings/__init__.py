@@ -13,7 +13,7 @@ from geofield.settings.machines import Machine
 from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import LonLat
 from geofield.settings.tracks import DirectionName, TrackSettings
-from geofield.settings.whole import SECTIONS, Settings, Stage
+from geofield.settings.whole import SECTIONS, Settings, Stage, option_named
 
 __all__ = [
     "SECTIONS",
@@ -32,5 +32,6 @@ __all__ = [
     "TrackSettings",
     "from_mapping",
     "load_settings",
+    "option_named",
     "with_values",
 ]

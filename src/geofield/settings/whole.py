@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from pydantic import Field
+from pydantic.fields import FieldInfo
 
 from geofield.settings.export import ExportSettings
 from geofield.settings.field import FieldSettings
@@ -13,6 +14,7 @@ from geofield.settings.machines import Machine
 from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import Section
 from geofield.settings.tracks import TrackSettings
+from geofield.wording import learn
 
 
 class Settings(Section):
@@ -35,11 +37,30 @@ class Settings(Section):
     fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
 
 
+UNITS = ("_m", "_deg", "_px", "_ha")
 SECTIONS = ("imagery", "field", "obstacles", "tracks", "export", "fetch")
 Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
+
+
+def option_named(name: str, field: FieldInfo) -> str:
+    """The option of the command line that stands for a setting: its name without the unit."""
+    extra = field.json_schema_extra
+    if isinstance(extra, dict) and isinstance(extra.get("option"), str):
+        return str(extra["option"])
+    unit = next((each for each in UNITS if name.endswith(each)), "")
+    return "--" + name.removesuffix(unit).replace("_", "-")
 
 
 def names_of(section: str) -> tuple[str, ...]:
     """The names of a section's settings."""
     model: type[Section] = Settings.model_fields[section].annotation  # type: ignore[assignment]
     return tuple(model.model_fields)
+
+
+learn(
+    {
+        option_named(name, field)[2:]: name
+        for section in SECTIONS
+        for name, field in Settings.model_fields[section].annotation.model_fields.items()  # type: ignore[union-attr]
+    }
+)

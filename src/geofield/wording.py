@@ -1,0 +1,49 @@
+"""Hints in the words of who reads them: options for the command line, names for Python."""
+
+from __future__ import annotations
+
+import re
+
+_OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
+#: What an option is called in Python, where that is not its own name with underscores.
+_NAMES = {
+    "fresh": "previous=None",
+    "out": "the folder",
+    "overwrite": "overwrite=True",
+    "offline": "offline=True",
+    "no-cache": "no cache",
+    "acknowledge-terms": "acknowledged=True",
+    "boundary": "boundary=",
+    "boundary-name": "name=",
+    "json": "the value itself",
+}
+
+
+def learn(names: dict[str, str]) -> None:
+    """Tell what options are called in Python: those of the settings know their own names."""
+    _NAMES.update(names)
+
+
+def in_python(text: str) -> str:
+    """A message or hint with names of Python in place of options.
+
+    >>> in_python("Add --layer NAME, or leave out --crs.")
+    'Add layer="NAME", or leave out crs.'
+
+    What stands between backticks is a command for a terminal, and stays one.
+    """
+    parts = text.split("`")
+    return "`".join(
+        part if number % 2 else _OPTION.sub(_name, part) for number, part in enumerate(parts)
+    )
+
+
+def _name(found: re.Match[str]) -> str:
+    option, value = found.groups()
+    name = _NAMES.get(option, option.replace("-", "_"))
+    if value is None:
+        return name
+    try:
+        return f"{name}={float(value):g}" if "." not in value else f"{name}={float(value)}"
+    except ValueError:
+        return f'{name}="{value}"'

@@ -1,0 +1,43 @@
+"""What is told in Python speaks Python; on the command line it speaks of options."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import geofield as gf
+import geofield.settings  # knows what its options are called
+from geofield.wording import in_python
+
+SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("for instance --spacing 3.", "for instance spacing_m=3."),
+        ("Name it: --crs EPSG:4326, for instance.", 'Name it: crs="EPSG:4326", for instance.'),
+        ("or use --missing mask to leave", 'or use missing="mask" to leave'),
+        ("Add --size-m 400.", "Add size_m=400."),
+        ("--min-hole, --headland or --include-lonlat", "min_hole_m2, headland_m or include"),
+        ("see `geofield info --json`, or --fresh", "see `geofield info --json`, or previous=None"),
+    ],
+)  # fmt: skip
+def test_options_become_names(said: str, told: str) -> None:
+    assert in_python(said) == told
+
+
+def test_an_error_speaks_to_both() -> None:
+    with pytest.raises(gf.GeofieldError, match="for instance spacing_m=3") as caught:
+        gf.plan_field(SAMPLE, lat=35.075373, lon=33.531142, spacing_m=6000)
+    assert "--" not in str(caught.value)
+    assert caught.value.hint.endswith("--spacing 3.")
+    done = subprocess.run(
+        [Path(sys.executable).with_name("geofield"), "tracks", SAMPLE.with_suffix(".gpkg"),
+         "--spacing", "6000", "-o", "never.gpkg"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "--spacing 3." in done.stderr
