@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import stat
 import tempfile
 import time
@@ -22,7 +21,7 @@ from pathlib import Path
 
 from geofield.errors import OutputExistsError
 from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import PREFIX, alive, alone, is_living, sweep
+from geofield.leftovers import PREFIX, alive, alone, discard, is_living, sweep
 
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
@@ -70,7 +69,7 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
             refuse_claimed(target, chosen)
             try:
                 sign = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
-                held.callback(shutil.rmtree, sign, ignore_errors=True)
+                held.callback(discard, sign)
                 held.enter_context(alive(sign))
                 claim = _Claim(target.resolve(), sign, seen(target))
                 _write(sign, chosen)

@@ -21,6 +21,8 @@ PREFIX = ".geofield-"
 #: The file of a staging folder whose products are being moved into place.
 MOVING = "moving"
 _LOCK = "lock"
+#: What is left of a folder that was being removed, without a lock perhaps.
+_GONE = PREFIX + "gone-"
 #: A folder without a lock is another version's, or was made this moment.
 _OLD_S = 3600.0
 _PATIENCE_S = 30.0
@@ -77,6 +79,9 @@ def sweep(target: Path) -> None:
     for staging in target.glob(PREFIX + "*"):
         if staging.is_symlink() or not staging.is_dir():
             continue
+        if staging.name.startswith(_GONE):
+            shutil.rmtree(staging, ignore_errors=True)
+            continue
         try:
             with (staging / _LOCK).open("r+") as lock:
                 if not _LOCKS or not lock.read(1):
@@ -85,11 +90,21 @@ def sweep(target: Path) -> None:
                 _hold(lock.fileno())
                 if (staging / MOVING).exists():
                     _finish(staging, target)
-                shutil.rmtree(staging, ignore_errors=True)
+                discard(staging)
         except FileNotFoundError:
             _sweep_old(staging)
         except OSError:
             continue  # locked by the living, or not ours to remove
+
+
+def discard(staging: Path) -> None:
+    """Remove a staging folder; a stop meanwhile leaves a name that everybody may sweep."""
+    gone = staging.with_name(_GONE + staging.name.removeprefix(PREFIX))
+    try:
+        staging.rename(gone)
+    except OSError:
+        gone = staging
+    shutil.rmtree(gone, ignore_errors=True)
 
 
 def is_living(staging: Path) -> bool:

@@ -22,7 +22,7 @@ from pathlib import Path
 from geofield.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.errors import FormatError, OutputExistsError
 from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import MOVING, PREFIX, alive, alone, sweep
+from geofield.leftovers import MOVING, PREFIX, alive, alone, discard, sweep
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
 
@@ -75,7 +75,7 @@ def staged_folder(
                 except OSError as error:
                     raise cannot_write(target, error) from error
         finally:
-            shutil.rmtree(staging, ignore_errors=True)
+            discard(staging)
 
 
 @contextmanager

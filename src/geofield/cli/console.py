@@ -7,6 +7,7 @@ or, at the end, ``{"error": {"message": "...", "hint": "..."}}``. Other lines ar
 
 from __future__ import annotations
 
+import atexit
 import json
 import logging
 import os
@@ -77,6 +78,13 @@ def stop_cleanly() -> None:
     """Let SIGTERM end the work as Ctrl+C does: files half written are taken away first."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        atexit.register(_stop_no_more)
+
+
+def _stop_no_more() -> None:
+    """All is written and said, only Python itself is taken down: there is nothing to stop."""
+    for kind in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(kind, signal.SIG_IGN)
 
 
 def _choose_progress(context: click.Context, _: click.Parameter, value: str) -> None:

@@ -1,0 +1,47 @@
+"""Stops at random moments: products are the old ones or the new ones, whole.
+
+This is the short run; `benchmarks/stops.py` stops 200 times.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from pathlib import Path
+
+import pytest
+
+import geofield.cli.main  # noqa: F401  (the children inherit what is imported)
+from geofield.imagery import write_scene
+from geofield.simulate import SimulationSettings, simulate_field
+
+from .moments import STOPS, Work, make_works, stop
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:This process.*fork:DeprecationWarning"),
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs signals"),
+]
+
+
+@pytest.fixture(scope="module")
+def works(tmp_path_factory: pytest.TempPathFactory) -> list[Work]:
+    folder = tmp_path_factory.mktemp("works")
+    made = simulate_field(5, SimulationSettings(width_px=160, height_px=160, obstacles=3))
+    write_scene(made.scene, folder / "picture.tif")
+    point = ["--lat", str(made.lat), "--lon", str(made.lon)]
+    return make_works(folder, folder / "picture.tif", point)
+
+
+@pytest.mark.parametrize("kind", STOPS)
+def test_a_stop_leaves_old_products_or_new_ones(
+    works: list[Work], kind: object, tmp_path: Path
+) -> None:
+    dice = random.Random(str(kind))
+    moments = [(work, False) for work in works]
+    # And of one command, while its files are moved into place.
+    moments.append((works[STOPS.index(kind)], True))  # type: ignore[arg-type]
+    stops = [
+        stop(work, kind, dice, tmp_path / f"{work.name} {aimed}", aimed=aimed)  # type: ignore[arg-type]
+        for work, aimed in moments
+    ]
+    assert not [each for each in stops if each.faults]
