@@ -70,13 +70,13 @@ def _page(found: list[Stop], seed: int) -> list[str]:
         "faults |",
         "| --- | --- | ---: | ---: | ---: | --- | ---: |",
     ]
-    for (work, kind), each in groups.items():
-        products = Counter(one.products for one in each)
-        codes = Counter(one.code for one in each)
+    for (work, kind), stops in groups.items():
+        products = Counter(one.products for one in stops)
+        codes = Counter(one.code for one in stops)
         told = ", ".join(f"{code}: {count}" for code, count in sorted(codes.items()))
         lines.append(
-            f"| {work} | {kind} | {len(each)} | {products['old']} | {products['new']} | {told} | "
-            f"{sum(bool(one.faults) for one in each)} |"
+            f"| {work} | {kind} | {len(stops)} | {products['old']} | {products['new']} | {told} | "
+            f"{sum(bool(one.faults) for one in stops)} |"
         )
     lines += [
         "",
