@@ -47,9 +47,9 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     """Correct a plan on a page in the browser.
 
     Confirm or reject obstacles, add and move them, correct the outline, turn the tracks: they
-    follow at once. PLAN is a GeoPackage of geofield, or a folder with several. Saving writes into
-    it; until then every edit lies in a journal beside it, and comes back when the session was
-    killed.
+    follow at once. PLAN is a GeoPackage of geofield, a folder with several, or a farm, whose
+    fields come in the order of doubt. Saving writes into it; until then every edit lies in a
+    journal beside it, and comes back when the session was killed.
 
     The page is served to this machine only, under an address that holds a key.
     """

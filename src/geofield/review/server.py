@@ -214,7 +214,7 @@ class _Handler(BaseHTTPRequestHandler):
         show, *places = path.split("/")[2:]
         shelf = self.server.shelf
         numbers = [int(place) for place in places if place.isdecimal()]
-        if len(places) != 4 or len(numbers) != 4 or numbers[0] >= len(shelf.paths):
+        if len(places) != 4 or len(numbers) != 4 or numbers[0] >= len(shelf.names):
             self._json(404, {"message": "There is no such tile."})
             return
         plan, level, column, row = numbers

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sqlite3
 import threading
+from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 from geofield.errors import FormatError
 from geofield.review.desk import Desk
 
+#: The file that makes a folder a farm.
+FARM = "farm.json"
 #: Folders below the one that was named: `farm/field.gpkg` and `farm/field-7/field.gpkg`.
 _DEPTH = ("*.gpkg", "*/*.gpkg")
 
@@ -20,7 +24,7 @@ class Shelf:
     Parameters
     ----------
     place : Path
-        A GeoPackage of geofield, or a folder in which several lie.
+        A GeoPackage of geofield, a farm, or a folder in which several GeoPackages lie.
     picture : Path, optional
         Shown below; the picture beside each plan when not given.
 
@@ -31,11 +35,9 @@ class Shelf:
     """
 
     def __init__(self, place: Path, picture: Path | None = None) -> None:
-        self.paths = [place] if place.is_file() else plans_in(place)
-        self.names = [
-            path.name if path == place else str(path.relative_to(place)) for path in self.paths
-        ]
-        self._picture = picture
+        made = _desks_of(place, picture)
+        self.names = [name for name, _ in made]
+        self._make = [make for _, make in made]
         self._desks: dict[int, Desk] = {}
         self._lock = threading.RLock()
         self._holder: str | None = None
@@ -51,12 +53,12 @@ class Shelf:
         """A plan by its place in the list; what was edited on it is as it was left."""
         with self._lock:
             if number not in self._desks:
-                self._desks[number] = Desk(self.paths[number], self._picture)
+                self._desks[number] = self._make[number]()
             return self._desks[number]
 
     def open(self, number: int) -> None:
         """Work on another plan."""
-        if not 0 <= number < len(self.paths):
+        if not 0 <= number < len(self.names):
             raise FormatError(f"There is no plan {number} here.")
         with self._lock:
             self.desk_of(number)
@@ -77,6 +79,19 @@ class Shelf:
     def holds(self, tab: str) -> bool:
         """Whether a tab may edit."""
         return self._holder == tab
+
+
+def _desks_of(place: Path, picture: Path | None) -> list[tuple[str, Callable[[], Desk]]]:
+    """What the plans of a place are called, and how each comes on the desk."""
+    if place.is_file():
+        return [(place.name, partial(Desk, place, picture))]
+    if (place / FARM).is_file():
+        from geofield.review.farm import farm_desks
+
+        return farm_desks(place, picture)
+    return [
+        (str(path.relative_to(place)), partial(Desk, path, picture)) for path in plans_in(place)
+    ]
 
 
 def plans_in(folder: Path) -> list[Path]:

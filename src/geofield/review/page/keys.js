@@ -8,7 +8,7 @@ const KEYS = [
   ["m", "k_move", a => a.tool("select")], ["[", "k_size", a => a.smaller()], ["]", "k_size", a => a.larger()],
   ["o", "k_outline", a => a.tool("outline")],
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
-  ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
+  ["n", "k_onward", a => a.onward()], ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
 ];
 const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 const SHOWN = {Delete: "Del", Escape: "Esc"};

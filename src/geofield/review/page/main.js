@@ -190,8 +190,12 @@ const ACTIONS = {
   reset: () => verdict("detected"), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => resize(1 / 1.1), larger: () => resize(1.1),
   remove: () => tools.removeCorner() || (chosen !== null && commit({do: "delete", no: chosen})), tool: name => tools.use(name), nudge,
+  onward: () => goTo((state.plan + 1) % state.plans.length),
   escape: () => { if (tools.current() === "select") choose(null); tools.use("select"); },
 };
+
+// Edits stay with their plan on the server: nothing is lost by going to another one.
+const goTo = plan => plan !== state.plan && act(() => api.openPlan(plan), () => { ended = true; location.reload(); });
 
 // -- beginning ---------------------------------------------------------------------------
 
@@ -233,9 +237,9 @@ async function start() {
   $("language").value = currentLanguage();
   $("plans-row").hidden = state.plans.length < 2;
   $("plans").replaceChildren(...state.plans.map((name, i) => new Option(name, i, i === state.plan, i === state.plan)));
-  // Edits stay with their plan on the server: nothing is lost by going to another one.
-  $("plans").onchange = ({target}) => act(() => api.openPlan(Number(target.value)), () => { ended = true; location.reload(); });
-  for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more"])
+  $("onward").hidden = $("plans-row").hidden;
+  $("plans").onchange = ({target}) => goTo(Number(target.value));
+  for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more", "onward"])
     $(name).onclick = () => ACTIONS[name]();
   $("infrared").onchange = ({target}) => maps.showInfrared(target.checked, state);
   $("opacity").oninput = ({target}) => maps.setOpacity(Number(target.value));

@@ -1,0 +1,131 @@
+"""A farm on the page: its fields in the order of doubt, saved back into the farm."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browser import Page, chromium, served
+from selenium import webdriver
+from selenium.common.exceptions import NoAlertPresentException
+
+import geofield as gf
+from geofield.errors import ChangedError, GeofieldError
+from geofield.farm import read_farm
+from geofield.farm.reviewed import put_back
+from geofield.review import Session
+from geofield.review.shelf import Shelf
+
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A farm of two fields, as `geofield batch` leaves it."""
+    folder = tmp_path_factory.mktemp("farm")
+    command = [sys.executable, "-m", "geofield", "batch", str(SAMPLES / "seeds.csv")]
+    options = ["--spacing", "4", "--workers", "1", "--out", str(folder / "farm")]
+    picture = shutil.copy(SAMPLES / "field_1.tif", folder / "field_1.tif")
+    subprocess.run([*command, str(picture), *options], check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture
+def farm(planned: Path, tmp_path: Path) -> Path:
+    shutil.copytree(planned, tmp_path / "all")
+    return tmp_path / "all" / "farm"
+
+
+def statuses(farm: Path, field_id: str) -> list[str]:
+    plan = read_farm(farm)[field_id]
+    assert plan.obstacles is not None
+    return list(plan.obstacles["status"])
+
+
+def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path) -> None:
+    sure = dict(zip(*read_farm(farm).status[["field_id", "certainty"]].to_numpy().T, strict=True))
+    shelf = Shelf(farm)
+    shown = [name.split(" ")[0] for name in shelf.names]
+    assert sorted(shown, key=lambda one: sure[one]) == shown
+    desk = shelf.desk
+    assert desk.picture is not None  # it lies beside the farm
+    number = int(desk.session.plan.obstacles["obstacle_no"].iloc[0])  # type: ignore[index]
+    desk.edit({"do": "status", "no": number, "status": "rejected"})
+    assert "rejected" not in statuses(farm, shown[0])
+    assert desk.save()["saved_as"] == "farm"
+    assert "rejected" in statuses(farm, shown[0])
+    assert read_farm(farm)[shown[0]] == desk.session.plan
+    shelf.open(1)
+    shelf.desk.edit({"do": "status", "no": 1, "status": "confirmed"})
+    # Killed here: the edit of the second field comes back, and that field comes first.
+    again = Shelf(farm)
+    assert again.names[0].split(" ")[0] == shown[1]
+    assert str(again.desk.brought_back).startswith("1 edits")
+    assert again.names[1].endswith("✓")
+    again.desk.edit({"do": "undo"})
+    assert again.end() == []
+    shelf.desk_of(0).end()
+    assert not (farm / "reviewing").exists()
+
+
+def test_a_field_that_was_put_back_by_somebody_else_is_not_replaced(
+    farm: Path, tmp_path: Path
+) -> None:
+    shelf = Shelf(farm)
+    desk, name = shelf.desk, shelf.names[0].split(" ")[0]
+    desk.edit({"do": "status", "no": 1, "status": "confirmed"})
+    other = gf.read_farm(farm)[name]
+    session = Session(other)
+    session.do({"do": "status", "no": 1, "status": "rejected"})
+    session.plan.write(tmp_path / "other", formats=["gpkg"])
+    put_back(tmp_path / "other" / "field.gpkg", farm)
+    with pytest.raises(ChangedError, match="in the farm"):
+        desk.save()
+    assert statuses(farm, name)[0] == "rejected"
+    desk.reload()
+    assert "kept in" in str(desk.brought_back)
+    assert desk.session.plan.obstacles["status"].iloc[0] == "rejected"  # type: ignore[index]
+
+
+def test_a_farm_without_a_plan_is_refused(farm: Path) -> None:
+    shutil.rmtree(farm / "status")
+    with pytest.raises(GeofieldError, match="no plan yet"):
+        Shelf(farm)
+
+
+@pytest.fixture
+def driver() -> Iterator[webdriver.Chrome]:
+    one = chromium()
+    yield one
+    one.quit()
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.xdist_group("review")
+def test_one_field_after_another_on_the_page(driver: webdriver.Chrome, farm: Path) -> None:
+    with served(farm) as (address, process):
+        page = Page(driver, address)
+        first = page.state()["field_id"]
+        page.press("j", "r")
+        page.wait(lambda: page.judged() == 1)
+        page.button("save")
+        page.wait(lambda: "Saved in farm" in page.text("message"))
+        page.run("document.body.dataset.ready = ''")
+        page.press("n")
+        page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
+        assert page.state()["field_id"] != first
+        page.run("window.onbeforeunload = null")
+        driver.get("about:blank")
+        with contextlib.suppress(NoAlertPresentException):
+            driver.switch_to.alert.accept()
+        process.send_signal(signal.SIGINT)
+        process.wait(20)
+    assert "rejected" in statuses(farm, first)
+    assert not (farm / "reviewing").exists()
