@@ -55,6 +55,12 @@ Examples (on the project's own sample):
     is_flag=True,
     help="Plan all anew where the farm is of other work; what a person reviewed stays.",
 )
+@click.option(
+    "--overview/--no-overview",
+    default=True,
+    show_default=True,
+    help="Write farm.gpkg and farm.qgz for QGIS at the end.",
+)
 @click.option("--retry", is_flag=True, help="Try places again that failed or were lost.")
 @click.option(
     "--time-limit",
@@ -93,6 +99,7 @@ def batch(
     scheduler: str | None,
     obstacle_file: Path | None,
     fresh: bool,
+    overview: bool,
     retry: bool,
     time_limit_s: float,
     memory_limit_mb: float,
@@ -108,6 +115,7 @@ def batch(
     like settings (spacing_m, heading_deg, name, ...) hold for their field; all others come along.
     IMAGERY is whatever `geofield run` takes; parcels need none.
 
+    What a person edited in the farm's overview (farm.gpkg) is taken in first and kept.
     Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.
     """
     # Before the large imports: a typo is told at once.
@@ -115,8 +123,10 @@ def batch(
 
     settings = load_settings(settings_file, section_values(options))
     from geofield.errors import FieldError, GeofieldError
+    from geofield.farm.edits import put_edits
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
+    from geofield.farm.overview import OVERVIEW
     from geofield.farm.run import run_farm
     from geofield.farm.store import Store
     from geofield.farm.work import Job
@@ -138,13 +148,16 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("Name --workers or --scheduler, not both.")
     say(f"Places     {len(found)} of {places.name}")
+    if store.folder is not None:
+        for one in put_edits(store.folder, store.folder / OVERVIEW):
+            say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
     with progress_bar(quiet=as_json) as progress, two_interrupts() as control:
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
             imagery=about, control=control, tell=lambda at: _show(progress, at),
         )  # fmt: skip
-    files = finish(store, found)
+    files = finish(store, found, overview=overview)
     if as_json:
         echo_json({"farm": store.place, "places": count.total, **count.statuses, "files": files})
     else:

@@ -55,17 +55,33 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     epilog="""\b
 Example:
   geofield farm put field_1.gpkg farm/
+  geofield farm put farm/farm.gpkg farm/
 """
 )
 @click.argument("plan_file", metavar="PLAN", type=click.Path(exists=True, path_type=Path))
 @click.argument("folder", metavar="FARM")
 def put(plan_file: Path, folder: str) -> None:
-    """Put the reviewed PLAN of one field back into FARM.
+    """Put the reviewed PLAN of one field back into FARM, or all fields edited in its farm.gpkg.
 
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
     what a person said.
     """
+    from geofield.farm.edits import is_overview, put_edits
+    from geofield.farm.finish import renew
+    from geofield.farm.overview import OVERVIEW
     from geofield.farm.reviewed import put_back
+    from geofield.farm.store import Store
 
-    field_id = put_back(plan_file, folder)
-    say(f"Field      {field_id} of {folder} is now as you left it")
+    alone, store = not is_overview(plan_file), Store.of(folder)
+    place = store.folder
+    overview = plan_file if place is None else place / OVERVIEW
+    # Edits in the overview first: it is written anew below.
+    ids = [] if place is None else put_edits(place, overview if alone else plan_file)
+    if alone:
+        ids.append(put_back(plan_file, folder))
+    if ids:
+        renew(store, overview=overview.is_file())
+    for field_id in ids:
+        say(f"Field      {field_id} of {folder} is now as you left it")
+    if not ids:
+        say(f"{plan_file} has no edits.")

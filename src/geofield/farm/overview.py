@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
+from geofield.farm.edits import DETAILS, DIGESTS, digests_of
+from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined
 from geofield.model import ImagerySource, Provenance
+from geofield.staging import staged_folder
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
 #: Name of the files, without suffix.
 STEM = "farm"
+OVERVIEW = f"{STEM}.gpkg"
 #: Fields up to which the overview holds obstacles and tracks; beyond, outlines and places.
 MOST_FIELDS = 20_000
 
@@ -67,7 +71,9 @@ def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path
     -------
     list of Path
     """
-    return write_gpkg(dataset_of(farm, name), folder, stem=STEM, options={})
+    with staged_folder(folder, overwrite=True) as staging:
+        written = write_gpkg(dataset_of(farm, name), staging, stem=STEM, options={})
+    return [folder / path.name for path in written]
 
 
 def dataset_of(farm: Farm, name: str) -> Joined:
@@ -83,8 +89,14 @@ def dataset_of(farm: Farm, name: str) -> Joined:
     reviewed = places["reviewed"].map({True: "yes", False: "no"})
     told = places.assign(reviewed=reviewed).replace("", None)
     tables[PLACES.name] = schema.conform(PLACES, told)
-    software = f"geofield {__version__}"
-    return Joined(tables, crs, name, Provenance(software, _source(fields)), further=(PLACES,))
+    details = schema.OBSTACLES.name in tables
+    obstacles = tables[schema.OBSTACLES.name] if details else schema.empty(schema.OBSTACLES, crs)
+    evidence = {
+        DIGESTS: digests_of(fields, obstacles.assign(**({} if details else {FIELD_ID: []}))),
+        DETAILS: details,
+    }
+    origin = Provenance(f"geofield {__version__}", _source(fields), {}, evidence)
+    return Joined(tables, crs, name, origin, further=(PLACES,))
 
 
 def _source(fields: gpd.GeoDataFrame) -> ImagerySource:
