@@ -125,12 +125,12 @@ def progress_bar(*, quiet: bool = False) -> Iterator[Progress]:
     with _progress(quiet=quiet) as shown:
         last = ""
 
-        def show(done: int, total: int, what: str) -> None:
+        def show(done: int, total: int, what: str, **facts: Any) -> None:
             nonlocal last
             if what != last or done == total:
                 _LOG.debug("%s: %d of %d", what, done, total)
             last = what
-            shown(done, total, what)
+            shown(done, total, what, **facts)
 
         yield show
 
