@@ -12,6 +12,7 @@ import rdflib
 from rdf_plans import small_plan
 
 from geofield.formats.rdf import write
+from geofield.formats.rdf.guard import plain_xml
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import SH, compact
 from geofield.formats.rdf.parse import parse
@@ -278,3 +279,30 @@ def test_plain_entities_as_ontology_editors_write_them_are_fine(tmp_path):
         "</rdf:Description></rdf:RDF>"
     )
     assert any("no track number" in str(problem) for problem in validate(path))
+
+
+#: What brackets alone do not show: nesting that text, comments and attributes hide.
+HIDDEN = {
+    "ends of tags in the text": "<e:a>/>" * 150 + "</e:a>" * 150,
+    "ends of tags in comments": "<e:a><!--</e:a>-->" * 150 + "</e:a>" * 150,
+    "ends of tags in attributes": '<e:a x="/>">' * 150 + "</e:a>" * 150,
+}
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_nesting_is_found_however_it_is_hidden(tmp_path, name):
+    path = tmp_path / "x.rdf"
+    path.write_text(f"{XML}{HIDDEN[name]}</rdf:RDF>")
+    assert not plain_xml(path)
+    assert ["nested deeper" in str(problem) for problem in validate(path)] == [True]
+
+
+@pytest.mark.parametrize("text", [XML, f"{XML}</rdf:RDF>x", f"{XML}</rdf:RDF>{XML}</rdf:RDF>"])
+def test_a_file_cut_off_or_with_more_behind_it_is_refused(tmp_path, text):
+    path = tmp_path / "x.rdf"
+    path.write_text(text)
+    assert ["well-formed" in str(problem) for problem in validate(path)] == [True]
+
+
+def test_our_own_files_are_plain(plan, tmp_path):
+    assert all(map(plain_xml, write.write_rdfxml(plan, tmp_path, options={"points": True})))

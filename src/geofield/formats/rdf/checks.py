@@ -12,10 +12,11 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
+from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
-from geofield.formats.rdf.namespaces import GML, STUDY_POINT, expand
-from geofield.formats.rdf.parse import Graph, Problem
-from geofield.formats.rdf.scope import track_of
+from geofield.formats.rdf.namespaces import GML, STUDY_POINT
+from geofield.formats.rdf.parse import Problem
+from geofield.formats.rdf.scope import tracks_of
 from geofield.formats.rdf.wkt import geometry_of
 
 #: Farther than this from its field, in degrees (about 10 km), nothing belongs to it.
@@ -41,9 +42,8 @@ def check_graph(graph: Graph) -> Iterator[Problem]:
     yield from _double_numbers(graph)
     yield from _dangling(graph)
     bounds: dict[str, Bounds] = {}
-    for iri, node in graph.nodes.items():
-        for text in node.get(expand("geo:asWKT"), ())[:1]:
-            yield from _geometry(iri, text, bounds)
+    for iri, text in graph.column("geo:asWKT").items():
+        yield from _geometry(iri, text, bounds)
     yield from _positions(graph, bounds)
     yield from _places(graph, bounds)
 
@@ -74,7 +74,7 @@ def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
     owner = next(filter(None, (graph.value(iri, name) for name in owners)), None)
     if layer.layer.name == "track_points":
         # Points are numbered through the whole plan, not per track.
-        owner = graph.value(track_of(graph, iri), "gf:inPlan")
+        owner = graph.value(tracks_of(graph, [iri])[0], "gf:inPlan")
     elif layer.layer.name == "route":
         owner = graph.value(iri, "gf:inPlan")
     names = {column.name: name for column, name in layer.properties()}
@@ -86,15 +86,12 @@ def _dangling(graph: Graph) -> Iterator[Problem]:
     """Links to things of a class of which the file has some, but not this one."""
     present = {each.cls: set(graph.of_type(*classes(each))) for each in layer_maps()}
     present["gf:Field"] = set(graph.of_type("gf:Field"))
-    wkt = expand("geo:asWKT")
-    present["geo:Geometry"] = {iri for iri, node in graph.nodes.items() if wkt in node}
-    links = [(expand(name), cls, present[cls]) for name, cls in _LINKS.items()]
-    for iri, node in graph.nodes.items():
-        for predicate, cls, known in links:
-            for target in dict.fromkeys(node.get(predicate, ())):
-                if target not in known and (known or cls == "geo:Geometry"):
-                    message = f"Points to <{target}>, which is no {cls} of this file."
-                    yield Problem(message, f"<{iri}>", rule="dangling-link")
+    present["geo:Geometry"] = set(graph.column("geo:asWKT"))
+    for name, cls in _LINKS.items():
+        for iri, target in dict.fromkeys(graph.pairs(name)):
+            if target not in present[cls] and (present[cls] or cls == "geo:Geometry"):
+                message = f"Points to <{target}>, which is no {cls} of this file."
+                yield Problem(message, f"<{iri}>", rule="dangling-link")
 
 
 def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Problem]:
@@ -130,9 +127,8 @@ def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
 
 def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
     """Positions against geometries, and a feature's geometries against each other."""
-    for iri in graph.nodes:
-        default = graph.value(iri, "geo:hasDefaultGeometry")
-        box = bounds.get(default or "")
+    for iri, default in graph.column("geo:hasDefaultGeometry").items():
+        box = bounds.get(default)
         if box is None:
             continue
         lat, lon = (_float(graph.value(iri, f"wgs84:{name}")) for name in ("lat", "long"))
@@ -149,9 +145,9 @@ def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
                 yield Problem(message, f"<{iri}>", None, hint, "geometries-agree")
 
 
-def _of_one(default: str | None, other: str) -> bool:
+def _of_one(default: str, other: str) -> bool:
     """Whether two geometries should be one place: a field has one for each of its surveys."""
-    return "/survey/" not in other or other.startswith(default or "")
+    return "/survey/" not in other or other.startswith(default)
 
 
 def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:

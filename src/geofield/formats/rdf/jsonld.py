@@ -7,12 +7,22 @@ each file, so that readers need no network.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import IO, Any
 
 import pyoxigraph as ox
 
-from geofield.formats.rdf.namespaces import GF, STRING, TYPE, compact, expand
+from geofield.formats.rdf.names import NOT_IN_IRI
+from geofield.formats.rdf.namespaces import (
+    GF,
+    SCHEMA_PREFIXES,
+    STRING,
+    STUDY_PREFIXES,
+    TYPE,
+    compact,
+    expand,
+)
 from geofield.formats.rdf.resources import context
 from geofield.formats.rdf.triples import Column, Group
 
@@ -75,3 +85,56 @@ def _shown(iri: str, value: Any, terms: dict[tuple[str, str], str]) -> tuple[str
         return name, text
     typed = {} if kind == STRING else {"@type": compact(kind)}
     return compact(iri), {**typed, "@value": text}
+
+
+def flat_triples(path: Path) -> list[tuple[str, str, str]] | None:
+    """The triples of a file in exactly the form above, as texts; None for any other file.
+
+    Expanding JSON-LD takes four times as long. What is not as `write_jsonld` writes it, and what
+    is hostile, is left to the parser and its guard.
+    """
+    try:
+        document = json.loads(path.read_bytes())
+        told, nodes = document.pop("@context"), document.pop("@graph")
+        prefixes = {name: iri for name, iri in told.items() if isinstance(iri, str)}
+        known = {**SCHEMA_PREFIXES, **STUDY_PREFIXES}
+        if document or told != context() | prefixes or not prefixes.items() <= known.items():
+            return None
+        return list(_flat(nodes, prefixes))
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
+
+
+def _flat(nodes: Any, prefixes: dict[str, str]) -> Iterator[tuple[str, str, str]]:
+    """What each node says. Raises KeyError or TypeError where it is not plain."""
+    known: dict[str, str] = {}
+    terms: dict[str, tuple[str, bool]] = {"@type": (TYPE, True)}
+    for name, entry in context().items():
+        if isinstance(entry, dict):
+            terms[name] = (expand(entry["@id"]), entry.get("@type") == "@id")
+
+    def iri(name: str) -> str:
+        if name not in known:
+            prefix, _, rest = name.partition(":")
+            known[name] = name if rest.startswith("//") else prefixes[prefix] + rest
+            if NOT_IN_IRI.search(known[name]):
+                raise ValueError(name)
+        return known[name]
+
+    for node in nodes:
+        subject = iri(node.pop("@id"))
+        for name, told in node.items():
+            term = terms.get(name)
+            predicate = term[0] if term else iri(name)
+            for value in told if type(told) is list else (told,):
+                text, is_thing = (value, term[1]) if term else _valued(value)
+                yield subject, predicate, iri(text) if is_thing else text + ""
+
+
+def _valued(value: dict[str, str]) -> tuple[str, bool]:
+    """The text of a value object, and whether it names a thing."""
+    if value.keys() == {"@id"}:
+        return value["@id"], True
+    if not value.keys() <= {"@value", "@type"}:
+        raise KeyError("@value")
+    return value["@value"], False

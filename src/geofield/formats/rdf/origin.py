@@ -11,7 +11,7 @@ from affine import Affine
 
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.parse import Graph
+from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.scope import Scope
 from geofield.grid import Grid
 from geofield.model.dataset import Provenance

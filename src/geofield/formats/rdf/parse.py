@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyoxigraph as ox
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.guard import check_json, check_xml
-from geofield.formats.rdf.namespaces import TYPE, expand
+from geofield.formats.rdf.guard import check_json, check_xml, plain_xml
 
 #: File endings and their syntax; XML and JSON only where the ending says RDF.
 SYNTAXES: dict[str, ox.RdfFormat] = {
@@ -43,7 +42,7 @@ def parse(path: Path) -> Iterator[ox.Quad]:
         )
     if not path.is_file():
         raise FormatError(f"There is no file {path}.")
-    if syntax == ox.RdfFormat.RDF_XML:
+    if syntax == ox.RdfFormat.RDF_XML and not plain_xml(path):
         check_xml(path)
     elif syntax == ox.RdfFormat.JSON_LD:
         check_json(path)
@@ -51,76 +50,14 @@ def parse(path: Path) -> Iterator[ox.Quad]:
         # A relative name in a file without a base must not become the name of a local file.
         yield from ox.parse(path=path, format=syntax, base_iri="https://example.org/no-base/")
     except SyntaxError as error:
+        if syntax == ox.RdfFormat.RDF_XML:
+            check_xml(path)  # which knows the line
         line = f", line {error.lineno}" if error.lineno else ""
         raise FormatError(
             f"{path.name}{line}: {error.msg}.", hint="The file is not valid RDF in its syntax."
         ) from error
     except (OSError, ValueError) as error:
         raise FormatError(f"{path.name} cannot be read: {error}.") from error
-
-
-@dataclass(slots=True)
-class Graph:
-    """Triples by subject and predicate, as plain texts: what the readers look things up in.
-
-    Classes and predicates are asked for by prefixed name or full IRI.
-
-    Attributes
-    ----------
-    nodes : dict
-        Subject to predicate to values, in the order of the file.
-    by_type : dict
-        Class to subjects, made when first asked for.
-    """
-
-    nodes: dict[str, dict[str, list[str]]] = field(default_factory=dict)
-    by_type: dict[str, set[str]] = field(default_factory=dict, repr=False)
-
-    def add(self, quads: Iterable[ox.Quad]) -> None:
-        """Take in triples."""
-        nodes = self.nodes
-        self.by_type.clear()
-        name, node = "", nodes.get("", {})
-        for subject, predicate, value, _ in quads:
-            if subject.value != name:
-                name = subject.value
-                node = nodes.setdefault(name, {})
-            node.setdefault(predicate.value, []).append(value.value)
-
-    def merge(self, more: Graph) -> None:
-        """Take in another graph."""
-        self.by_type.clear()
-        for subject, node in more.nodes.items():
-            mine = self.nodes.setdefault(subject, {})
-            for predicate, values in node.items():
-                mine.setdefault(predicate, []).extend(values)
-
-    def everywhere(self, predicate: str) -> Iterator[str]:
-        """The values of a predicate, whatever the subject."""
-        name = expand(predicate)
-        return (value for node in self.nodes.values() for value in node.get(name, ()))
-
-    def of_type(self, *types: str) -> list[str]:
-        """The subjects of any of some classes, in the order of the file."""
-        if not self.by_type:
-            for iri, node in self.nodes.items():
-                for each in node.get(TYPE, ()):
-                    self.by_type.setdefault(each, set()).add(iri)
-        found = set().union(*(self.by_type.get(expand(each), ()) for each in types))
-        return [iri for iri in self.nodes if iri in found] if found else []
-
-    def values(self, subject: str | None, predicate: str) -> list[str]:
-        """All distinct values; none where there is nothing."""
-        node = self.nodes.get(subject or "", {})
-        return list(dict.fromkeys(node.get(expand(predicate), ())))
-
-    def value(self, subject: str | None, *predicates: str) -> str | None:
-        """The first value along a path of predicates, None where there is none."""
-        for predicate in predicates:
-            node = self.nodes.get(subject) if subject is not None else None
-            values = node.get(expand(predicate)) if node else None
-            subject = values[0] if values else None
-        return subject
 
 
 @dataclass(frozen=True, slots=True)

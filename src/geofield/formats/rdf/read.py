@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
+from geofield.formats.rdf.graph import Graph
+from geofield.formats.rdf.jsonld import flat_triples
 from geofield.formats.rdf.layers import (
     YES_NO,
     LayerMap,
@@ -26,8 +29,8 @@ from geofield.formats.rdf.layers import (
 )
 from geofield.formats.rdf.namespaces import GML, STUDY_OBSTACLE, STUDY_TREE, SVG_CIRCLE, expand
 from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
-from geofield.formats.rdf.parse import Graph, parse
-from geofield.formats.rdf.scope import Scope, choose, fields_of, track_of
+from geofield.formats.rdf.parse import parse
+from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
 from geofield.formats.rdf.study import STUDY_OBSTACLE_TERMS, STUDY_POINT_TERMS
 from geofield.formats.rdf.wkt import geometries_of, known_crs, split_literal
 from geofield.model.dataset import Dataset
@@ -36,6 +39,7 @@ from geofield.model.obstacles import circle_polygons
 if TYPE_CHECKING:
     import geopandas as gpd
 
+_DEFAULT = expand("geo:hasDefaultGeometry")
 #: A further type by which rows of a layer are known, and further names of their columns.
 _STUDY = {
     "obstacles": (STUDY_TREE + "tree", STUDY_OBSTACLE_TERMS),
@@ -64,8 +68,7 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
     path = Path(path)
     if path.is_dir():
         path = path / "field.rdf"
-    graph = Graph()
-    graph.add(parse(path))
+    graph = load(path)
     _add_siblings(graph, path)
     dataset = from_graph(graph, plan=plan, folder=path.parent)
     if not any(dataset.has(layer.name) for layer in schema.LAYERS):
@@ -76,6 +79,14 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
     return dataset
 
 
+def load(path: Path) -> Graph:
+    """The triples of a file; those of JSON-LD as geofield writes it without expanding it."""
+    graph = Graph()
+    flat = flat_triples(path) if path.suffix.lower() == ".jsonld" else None
+    graph.add(((s.value, p.value, o.value) for s, p, o, _ in parse(path)) if flat is None else flat)
+    return graph
+
+
 def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = None) -> Dataset:
     """A dataset from triples, for instance of several files merged."""
     scope, crs = choose(graph, plan), _metric_crs(graph)
@@ -83,11 +94,7 @@ def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = N
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in layer_maps():
         further = _STUDY.get(layer.layer.name, ())[:1]
-        subjects = [
-            iri
-            for iri in graph.of_type(*classes(layer), *further)
-            if scope.holds(graph, layer, iri)
-        ]
+        subjects = scope.rows(graph, layer, graph.of_type(*classes(layer), *further))
         if subjects or not layer.layer.optional:
             pixel_m = None if grid is None else grid.ground_resolution_m
             tables[layer.layer.name] = _Rows(graph, scope, layer, subjects).table(crs, pixel_m)
@@ -111,8 +118,7 @@ def _add_siblings(graph: Graph, path: Path) -> None:
         sibling = path.with_name(f"{path.stem.removesuffix(own[0])}{other}.rdf")
         if sibling == path or not sibling.is_file():
             continue
-        more = Graph()
-        more.add(parse(sibling))
+        more = load(sibling)
         theirs = fields_of(more)
         if not fields or not theirs or fields & theirs:
             graph.merge(more)
@@ -152,8 +158,8 @@ class _Rows:
         self.is_field = layer.layer.name == "field"
         if self.is_field:
             # One row, told by the field, its survey and (its heading) its plan.
-            known = [scope.field, *subjects]
-            self.subjects = [iri for iri in known if iri in graph.nodes][:1]
+            known = [scope.field or "", *subjects]
+            self.subjects = [iri for iri in known if graph.has(iri)][:1]
 
     def table(self, crs: CRS, pixel_m: float | None) -> gpd.GeoDataFrame:
         """All columns and geometries; what nothing tells is missing."""
@@ -164,65 +170,82 @@ class _Rows:
         study = _STUDY.get(of.name, ("", {}))[1]
         for column, name in self.layer.properties():
             names = [name, *study.get(column.name, ())[:1]]
-            data[column.name] = self.typed(column, [self.told(s, names) for s in self.subjects])
+            data[column.name] = self.typed(column, self.told(self.subjects, names))
         for link in self.layer.links:
             target = layer_map(link.target).properties()
             names = [name for column, name in target if column.name == link.target_key]
             names += study.get(link.column, ())[:1]
-            texts = [self.linked(iri, link.predicate, names) for iri in self.subjects]
+            texts = self.linked(link.predicate, names)
             data[link.column] = self.typed(of.column(link.column), texts)
         geometry = self.promoted(self.geometry(data, crs, pixel_m))
         return schema.conform(of, schema.table(of, data, geometry, crs))
 
-    def told(self, iri: str, names: Iterable[str]) -> str | None:
-        """The first value of any of some properties."""
+    def told(self, subjects: Sequence[str | None], names: Iterable[str]) -> list[str | None]:
+        """Of each subject the first value of any of some properties."""
+        found: list[str | None] = [None] * len(subjects)
         survey, plan = self.scope.survey, self.scope.plan
         for name in names:
-            sources: tuple[str | None, ...] = (iri,)
-            if self.is_field:
-                sources = (iri, survey, plan) if "heading" in name else (iri, survey)
-            for source in sources:
-                value = self.graph.value(source, name)
-                if value is not None:
-                    return value
-        return None
+            column = self.graph.column(name)
+            if not column:
+                continue
+            known = [column.get(subject or "") for subject in subjects]
+            found = [new if old is None else old for old, new in zip(found, known, strict=True)]
+            if self.is_field and found == [None]:
+                others = (survey, plan) if "heading" in name else (survey,)
+                found = [next((column[iri] for iri in others if iri in column), None)]
+        return found
 
-    def linked(self, iri: str, predicate: str, names: list[str]) -> str | None:
+    def linked(self, predicate: str, names: list[str]) -> list[str | None]:
         """The number of the thing a link points to, or the number told directly."""
-        on_track = predicate == "gf:onTrack"
-        target = track_of(self.graph, iri) if on_track else self.graph.value(iri, predicate)
-        number = None if target is None else self.told(target, names)
-        if number is None and target is not None:
-            # A file of points alone: the number is the last part of the thing's name.
-            tail = target.rstrip("/").rsplit("/", 1)[-1]
-            number = tail if tail.isdecimal() else None
-        return number if number is not None else self.told(iri, names)
+        link = self.graph.column(predicate)
+        targets: list[str | None] = list(map(link.get, self.subjects))
+        if predicate == "gf:onTrack":
+            targets = tracks_of(self.graph, self.subjects)
+        # Few things, pointed to by many.
+        things = list(dict.fromkeys(targets))
+        numbers = dict(zip(things, self.told(things, names), strict=True))
+        for thing in things:
+            if thing is not None and numbers[thing] is None:
+                # A file of points alone: the number is the last part of the thing's name.
+                tail = thing.rstrip("/").rsplit("/", 1)[-1]
+                numbers[thing] = tail if tail.isdecimal() else None
+        direct = self.told(self.subjects, names)
+        found = map(numbers.__getitem__, targets)
+        return [own if new is None else new for own, new in zip(direct, found, strict=True)]
 
     def typed(self, column: schema.Column, texts: list[str | None]) -> list[Any]:
         """Texts as the values of a column."""
         if column.type in ("int", "float"):
             kind, none = (int, None) if column.type == "int" else (float, np.nan)
-            rows = zip(texts, self.subjects, strict=True)
-            return [none if t is None else _number(t, kind, column.name, s) for t, s in rows]
-        values = {expand(value_iri(value)): value for value in column.values}
+            try:
+                values: list[Any] = [none if t is None else kind(t) for t in texts]
+                if np.isfinite(
+                    [v for v, t in zip(values, texts, strict=True) if t is not None]
+                ).all():
+                    return values
+            except (ValueError, OverflowError, TypeError):
+                pass
+            for text, subject in zip(texts, self.subjects, strict=True):
+                if text is not None:
+                    _need_number(text, kind, column.name, subject)
+        meaning = {expand(value_iri(value)): value for value in column.values}
         if column.values == YES_NO:
-            values = {"true": "yes", "false": "no", "1": "yes", "0": "no"}
-        return [None if t is None else values.get(t, t) for t in texts]
+            meaning = {"true": "yes", "false": "no", "1": "yes", "0": "no"}
+        return [None if t is None else meaning.get(t, t) for t in texts]
 
     def geometry(self, data: dict[str, Any], crs: CRS, pixel_m: float | None) -> Any:
         """Of each row: its literal, or what its position and radius tell."""
         if self.layer.layer.geometry == "Point":
             exact = [
                 self.typed(
-                    schema.Column(name, "float", "", ""),
-                    [self.graph.value(iri, f"gf:{name}") for iri in self.subjects],
+                    schema.Column(name, "float", "", ""), self.told(self.subjects, [f"gf:{name}"])
                 )
                 for name in ("easting", "northing")
             ]
             if not np.isnan(exact).any():
                 return shapely.points(*np.array(exact))
         places = [(self.scope.survey or s) if self.is_field else s for s in self.subjects]
-        texts = [self.best_wkt(iri, crs) for iri in places]
+        texts = self.literals(places, crs)
         geometry = geometries_of(texts, self.subjects, crs)
         missing = np.array([text is None for text in texts])
         if missing.any() and "lat" in data:
@@ -240,6 +263,17 @@ class _Rows:
                 hint="It needs geo:hasDefaultGeometry with one geo:asWKT.",
             )
         return geometry
+
+    def literals(self, places: list[str], crs: CRS) -> list[str | None]:
+        """The WKT of each place; where it has only a default geometry, that one's at once."""
+        wkt, default = self.graph.column("geo:asWKT"), self.graph.column("geo:hasDefaultGeometry")
+        several = {**self.graph.column("geo:hasGeometry"), **self.graph.more.get(_DEFAULT, {})}
+        return [
+            self.best_wkt(iri, crs)
+            if iri in several or iri not in default
+            else wkt.get(default[iri])
+            for iri in places
+        ]
 
     def best_wkt(self, iri: str, crs: CRS) -> str | None:
         """The literal in the metric CRS, else that of the default geometry, else any."""
@@ -260,31 +294,32 @@ class _Rows:
             "MultiLineString": shapely.multilinestrings,
             "MultiPolygon": shapely.multipolygons,
         }
-        for index, shape in enumerate(geometry):
-            kind = shape.geom_type
-            if f"Multi{kind}" == wanted:
-                geometry[index] = multi[wanted]([shape])
-            elif kind == f"Multi{wanted}" and len(shape.geoms) == 1:
+        single = getattr(shapely.GeometryType, wanted.removeprefix("Multi").upper())
+        for index in np.flatnonzero(shapely.get_type_id(geometry) != single).tolist():
+            kind, shape = geometry[index].geom_type, geometry[index]
+            if kind == f"Multi{wanted}" and len(shape.geoms) == 1:
                 geometry[index] = shape.geoms[0]
             elif kind != wanted:
                 raise FormatError(
                     f"<{self.subjects[index]}> is a {kind}; the layer {self.layer.layer.name!r} "
                     f"holds geometries of type {wanted}."
                 )
+        if wanted in multi:
+            for index in np.flatnonzero(shapely.get_type_id(geometry) == single).tolist():
+                geometry[index] = multi[wanted]([geometry[index]])
         return geometry
 
 
-def _number(text: str, kind: type, column: str, subject: str) -> Any:
+def _need_number(text: str, kind: type, column: str, subject: str) -> None:
     try:
-        value = kind(text)
-    except ValueError as error:
+        finite = math.isfinite(kind(text))
+    except (ValueError, OverflowError) as error:
         raise FormatError(
             f"<{subject}>: {column} is {text[:40]!r}, not a number.",
             hint="`geofield validate` lists everything that is wrong.",
         ) from error
-    if not np.isfinite(value):
+    if not finite:
         raise FormatError(f"<{subject}>: {column} is {text}, not a finite number.")
-    return value
 
 
 def _footprint_radius(data: dict[str, Any], rows: Any, pixel_m: float | None) -> Any:

@@ -13,8 +13,8 @@ from typing import Any
 
 import pyoxigraph as ox
 
+from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.namespaces import expand
-from geofield.formats.rdf.parse import Graph
 
 #: File names in the package's folder ``data``.
 ONTOLOGY, SHAPES, CONTEXT = "ontology.ttl", "shapes.ttl", "context.jsonld"
@@ -29,7 +29,8 @@ def resource(name: str) -> str:
 def ontology() -> Graph:
     """The ontology's triples, in the order of the file."""
     graph = Graph()
-    graph.add(ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE))
+    quads = ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE)
+    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
     return graph
 
 

@@ -7,8 +7,8 @@ import warnings
 from dataclasses import dataclass
 
 from geofield.errors import FormatError, FormatWarning, SeveralFieldsError
+from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import LayerMap
-from geofield.formats.rdf.parse import Graph
 
 #: The end of a plan's IRI that its content named, not a person.
 _OWN_PLAN = re.compile(r"/plan(?:/[0-9a-f]{12})?$")
@@ -31,16 +31,20 @@ class Scope:
     plan: str | None
     tracks: frozenset[str]
 
-    def holds(self, graph: Graph, layer: LayerMap, iri: str) -> bool:
-        """Whether a row belongs to the survey and plan that are meant."""
+    def rows(self, graph: Graph, layer: LayerMap, found: list[str]) -> list[str]:
+        """The rows of a layer that belong to the survey and plan that are meant."""
+        owner = self.plan if layer.in_plan else self.survey
+        if owner is None:
+            return found
+        told = graph.column("gf:inPlan" if layer.in_plan else "gf:inSurvey")
         if not layer.in_plan:
-            return self.survey is None or graph.value(iri, "gf:inSurvey") in (None, self.survey)
-        if self.plan is None:
-            return True
-        track = iri if layer.layer.name == "tracks" else track_of(graph, iri)
-        if track is not None:
-            return track in self.tracks
-        return graph.value(iri, "gf:inPlan") in (None, self.plan)
+            return [iri for iri in found if told.get(iri, owner) == owner]
+        tracks = found if layer.layer.name == "tracks" else tracks_of(graph, found)
+        return [
+            iri
+            for iri, track in zip(found, tracks, strict=True)
+            if (told.get(iri, owner) == owner if track is None else track in self.tracks)
+        ]
 
 
 def fields_of(graph: Graph) -> set[str]:
@@ -48,16 +52,15 @@ def fields_of(graph: Graph) -> set[str]:
     return {*graph.everywhere("gf:inField"), *graph.of_type("gf:Field")}
 
 
-def track_of(graph: Graph, iri: str) -> str | None:
-    """The track that a part is of: told directly, or by its segment."""
-    track = graph.value(iri, "gf:onTrack")
-    if track is not None:
-        return track
-    segment = graph.value(iri, "gf:onSegment")
-    if segment is None:
-        return None
-    head, found, _ = segment.partition("/segment/")
-    return graph.value(segment, "gf:onTrack") or (head if found else None)
+def tracks_of(graph: Graph, found: list[str]) -> list[str | None]:
+    """The track that each part is of: told directly, or by its segment."""
+    on_track, on_segment = graph.column("gf:onTrack"), graph.column("gf:onSegment")
+    by_segment: dict[str | None, str | None] = {None: None}
+    for segment in dict.fromkeys(map(on_segment.get, found)):
+        if segment is not None:
+            head, named, _ = segment.partition("/segment/")
+            by_segment[segment] = on_track.get(segment) or (head if named else None)
+    return [on_track.get(iri) or by_segment[on_segment.get(iri)] for iri in found]
 
 
 def choose(graph: Graph, plan: str | None = None) -> Scope:

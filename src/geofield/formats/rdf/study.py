@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import pandas as pd
+import numpy as np
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
@@ -141,7 +141,9 @@ def _members(root: str, iris: Iterable[str | None]) -> Group:
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
     result: list[Column] = []
     for column, (predicate, datatype) in terms.items():
-        values = [None if pd.isna(value) else value for value in frame[column].tolist()]
-        texts = [None if value is None else repr(value) for value in values]
+        values, missing = frame[column].tolist(), frame[column].isna().to_numpy()
+        texts: list[str | None] = list(map(repr, values))
+        for row in np.flatnonzero(missing).tolist():
+            texts[row] = None
         result.append((node(predicate), typed(texts, datatype)))
     return result

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain, repeat
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -25,6 +27,7 @@ Column = tuple[ox.NamedNode, Sequence[Value]]
 #: Control characters cannot stand in XML 1.0, not even escaped: they are none in any syntax.
 _NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 _DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
+_MANY_OR_NONE = {tuple, type(None)}
 _DATATYPES = {bool: BOOLEAN, int: INTEGER, float: DOUBLE}
 
 
@@ -40,18 +43,18 @@ def triples(groups: Iterable[Group]) -> Iterator[ox.Triple]:
     """The triples of groups, row by row: a feature, then its geometries, then the next."""
     triple = ox.Triple
     for group in groups:
+        columns = [(nodes.subjects, *column) for nodes in group for column in nodes.columns]
+        if not any(_MANY_OR_NONE & set(map(type, values)) for *_, values in columns):
+            # One value in every row: no step of Python for each.
+            made = (map(triple, s, repeat(p), values) for s, p, values in columns)
+            yield from chain.from_iterable(zip(*made, strict=True))
+            continue
         for index in range(len(group[0].subjects)):
-            for nodes in group:
-                subject = nodes.subjects[index]
-                for predicate, values in nodes.columns:
-                    value = values[index]
-                    if value is None:
-                        continue
-                    if type(value) is tuple:
-                        for each in value:
-                            yield triple(subject, predicate, each)
-                    else:
-                        yield triple(subject, predicate, value)
+            for subjects, predicate, values in columns:
+                value = values[index]
+                for each in value if type(value) is tuple else (value,):
+                    if each is not None:
+                        yield triple(subjects[index], predicate, each)
 
 
 def single(iri: str, types: str, **properties: Any) -> Group:
@@ -98,8 +101,10 @@ def xml_text(text: str) -> str:
 
 def typed(texts: Iterable[str | None], datatype: str) -> list[ox.Literal | None]:
     """Texts as literals of a datatype (a prefixed name or IRI)."""
-    kind = node(datatype)
-    return [None if text is None else ox.Literal(text, datatype=kind) for text in texts]
+    texts, literal = list(texts), partial(ox.Literal, datatype=node(datatype))
+    if None in texts:
+        return [None if text is None else literal(text) for text in texts]
+    return list(map(literal, texts))
 
 
 def named(iris: Iterable[str | None]) -> list[Any]:

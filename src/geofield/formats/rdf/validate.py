@@ -9,9 +9,10 @@ from pathlib import Path
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
+from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import classes, layer_maps
 from geofield.formats.rdf.namespaces import GML, STUDY_TREE
-from geofield.formats.rdf.parse import Graph, Problem, parse
+from geofield.formats.rdf.parse import Problem, parse
 from geofield.formats.rdf.shapes import shape_problems
 from geofield.formats.validation import Finding
 
@@ -42,7 +43,7 @@ def validate(path: Path) -> list[Problem]:
         place = int(line[1]) if line else None
         return [Problem(message, path.name, place, error.hint or "", "syntax").capital()]
     graph = Graph()
-    graph.add(quads)
+    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
     known = [iri for layer in layer_maps() for iri in classes(layer)]
     if not graph.of_type(*known, STUDY_TREE + "tree", GML + "point"):
         return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]

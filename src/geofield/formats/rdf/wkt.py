@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -17,13 +16,11 @@ from geofield.crs import northing_first, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.namespaces import CRS84, crs_of_iri
 
-_LITERAL = re.compile(r"\s*(?:<([^>]*)>)?\s*(.*)", re.DOTALL)
-
 
 def split_literal(text: str) -> tuple[str, str]:
     """The CRS's IRI (CRS84 where none is named, as GeoSPARQL has it) and the WKT."""
-    match = _LITERAL.fullmatch(text)
-    return ((match[1] or CRS84), match[2]) if match else (CRS84, text)
+    iri, found, wkt = text.partition(">")
+    return (iri.lstrip()[1:], wkt) if found and iri.lstrip()[:1] == "<" else (CRS84, text)
 
 
 @lru_cache(maxsize=64)
@@ -78,13 +75,14 @@ def geometries_of(
     """WKT literals as geometries in one CRS; None stays None."""
     result = np.full(len(texts), None, dtype=object)
     by_crs: dict[str, list[int]] = {}
-    for index, text in enumerate(texts):
-        if text is not None:
-            by_crs.setdefault(split_literal(text)[0], []).append(index)
+    parts = [("", "") if text is None else split_literal(text) for text in texts]
+    for index, (iri, _) in enumerate(parts):
+        if iri:
+            by_crs.setdefault(iri, []).append(index)
     for iri, rows in by_crs.items():
         try:
             crs = known_crs(iri)
-            shapes = shapely.from_wkt([split_literal(texts[row] or "")[1] for row in rows])
+            shapes = shapely.from_wkt([parts[row][1] for row in rows])
             finite = bool(np.isfinite(shapely.get_coordinates(shapes)).all())
         except (ShapelyError, FormatError):
             finite = False
@@ -94,9 +92,13 @@ def geometries_of(
             crs = known_crs(iri)
         elif northing_first(crs):
             shapes = shapely.transform(shapes, lambda c: c[:, ::-1])
-        result[rows] = (
-            shapes if crs == target else shapely.transform(shapes, _with(transformer(crs, target)))
-        )
+        if crs != target:
+            project = _with(transformer(crs, target))
+            if (shapely.get_type_id(shapes) == shapely.GeometryType.POINT).all():
+                shapes = np.asarray(shapely.points(project(shapely.get_coordinates(shapes))))
+            else:
+                shapes = shapely.transform(shapes, project)
+        result[rows] = shapes
     lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
     for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
         raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")

@@ -1,0 +1,93 @@
+"""Graph: triples as plain texts, by predicate: what the readers look things up in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from geofield.formats.rdf.namespaces import TYPE, expand
+
+
+@dataclass(slots=True)
+class Graph:
+    """Triples as columns. Classes and predicates are asked for by prefixed name or full IRI.
+
+    Attributes
+    ----------
+    columns : dict
+        Predicate to subject to its first value, in the order of the file.
+    more : dict
+        Predicate to subject to its further values, where it has any.
+    by_type : dict
+        Class to subjects, made when first asked for.
+    """
+
+    columns: dict[str, dict[str, str]] = field(default_factory=dict)
+    more: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+    by_type: dict[str, dict[str, None]] = field(default_factory=dict, repr=False)
+
+    def add(self, triples: Iterable[tuple[str, str, str]]) -> None:
+        """Take in triples: subjects, predicates and values."""
+        columns, more = self.columns, self.more
+        self.by_type.clear()
+        for subject, predicate, value in triples:
+            column = columns.get(predicate)
+            if column is None:
+                column = columns[predicate] = {}
+            if column.setdefault(subject, value) is not value:
+                more.setdefault(predicate, {}).setdefault(subject, []).append(value)
+
+    def merge(self, other: Graph) -> None:
+        """Take in another graph."""
+        self.by_type.clear()
+        for predicate, column in other.columns.items():
+            mine = self.columns.setdefault(predicate, {})
+            if mine.keys().isdisjoint(column):
+                mine.update(column)
+            else:
+                self.add((subject, predicate, value) for subject, value in column.items())
+        for predicate, further in other.more.items():
+            self.add((s, predicate, value) for s, values in further.items() for value in values)
+
+    def column(self, predicate: str) -> dict[str, str]:
+        """Each subject's first value of a predicate."""
+        return self.columns.get(expand(predicate), {})
+
+    def pairs(self, predicate: str) -> Iterator[tuple[str, str]]:
+        """Every subject with every value of a predicate."""
+        yield from self.column(predicate).items()
+        for subject, values in self.more.get(expand(predicate), {}).items():
+            yield from ((subject, value) for value in values)
+
+    def everywhere(self, predicate: str) -> Iterator[str]:
+        """The values of a predicate, whatever the subject."""
+        return (value for _, value in self.pairs(predicate))
+
+    def has(self, subject: str) -> bool:
+        """Whether anything is said of a subject."""
+        return any(subject in column for column in self.columns.values())
+
+    def of_type(self, *types: str) -> list[str]:
+        """The subjects of any of some classes, in the order of the file."""
+        if not self.by_type:
+            for iri, each in self.pairs(TYPE):
+                self.by_type.setdefault(each, {})[iri] = None
+        found = [self.by_type[name] for name in map(expand, types) if name in self.by_type]
+        if len(found) < 2:
+            return list(*found)
+        every = set().union(*found)
+        return [iri for iri in self.column(TYPE) if iri in every]
+
+    def values(self, subject: str | None, predicate: str) -> list[str]:
+        """All distinct values; none where there is nothing."""
+        name = expand(predicate)
+        first = self.columns.get(name, {}).get(subject or "")
+        if first is None:
+            return []
+        return list(dict.fromkeys([first, *self.more.get(name, {}).get(subject or "", ())]))
+
+    def value(self, subject: str | None, *predicates: str) -> str | None:
+        """The first value along a path of predicates, None where there is none."""
+        for predicate in predicates:
+            subject = self.columns.get(expand(predicate), {}).get(subject or "")
+        return subject
