@@ -331,7 +331,7 @@ class Plan:
         edge = baseline.edge
         edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)
         heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
-        table = schema.table(
+        return schema.table(
             schema.FIELD,
             {
                 "field_id": [one.field_id],
@@ -349,8 +349,8 @@ class Plan:
             },
             [one.polygon],
             one.crs,
+            {name: [value] for name, value in one.own},
         )
-        return table.assign(**{name: [value] for name, value in one.own})
 
 
 def read_plan(path: str | Path) -> Plan:

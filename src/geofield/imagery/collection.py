@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import ImagerySource
 
+#: Readers of pictures that were looked at: values without open files.
+_KNOWN: dict[Any, SceneReader] = {}
+_MOST_KNOWN = 10_000
 #: Lattices this near to each other (px) are the same.
 _SAME_PX = 1e-3
 
@@ -127,7 +131,7 @@ def open_collection(
     for path in paths:
         try:
             readers.append(
-                SceneReader.open(path, bands=bands, crs=crs, scaling=scaling, reach=reach)
+                _looked_at(path, _version(path), tuple(bands or ()), crs, scaling, reach)
             )
         except GeofieldError as error:
             notes.append(f"{display_name(path)} was left out: {error.message}")
@@ -171,6 +175,35 @@ def open_collection(
         palette=reference.palette,
         parts=tuple(parts),
     )
+
+
+def _version(path: str) -> tuple[int, int] | None:
+    """What changes when a file does; None for what is no file here."""
+    try:
+        facts = Path(path).stat()
+    except (OSError, ValueError):
+        return None
+    return facts.st_mtime_ns, facts.st_size
+
+
+def _looked_at(
+    path: str,
+    version: tuple[int, int] | None,
+    bands: tuple[str, ...],
+    crs: Any,
+    scaling: tuple[float, float] | None,
+    reach: Reach | None,
+) -> SceneReader:
+    """A picture's reader; each file is looked at once, however many fields lie in the set."""
+    options = {"bands": bands or None, "crs": crs, "scaling": scaling, "reach": reach}
+    if version is None:
+        return SceneReader.open(path, **options)
+    key = (path, version, bands, str(crs), scaling, reach)
+    if key not in _KNOWN:
+        if len(_KNOWN) >= _MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[key] = SceneReader.open(path, **options)
+    return _KNOWN[key]
 
 
 def on_grid(reader: SceneReader, grid: Grid) -> SceneReader:

@@ -79,7 +79,9 @@ class Dataset:
 
     def __post_init__(self) -> None:
         for name, table in self.tables.items():
-            if table.crs is None or CRS(table.crs) != self.crs:
+            crs = table.crs
+            # To compare two takes as long as to make a small table.
+            if crs is not self.crs and (crs is None or CRS(crs) != self.crs):
                 raise CRSMismatchError(f"Layer {name!r} is not in the dataset's {self.crs.name}.")
 
     def table(self, name: str) -> gpd.GeoDataFrame:
