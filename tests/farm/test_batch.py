@@ -344,12 +344,9 @@ def test_parcels_that_overlap_are_told(tmp_path: Path) -> None:
 
 
 def test_two_runs_do_not_write_into_one_farm(tmp_path: Path) -> None:
-    import fcntl
+    from geofield.claims import claimed
 
     places = parcels(tmp_path / "p.gpkg", 4)
-    (tmp_path / "farm").mkdir()
-    handle = os.open(tmp_path / "farm", os.O_RDONLY)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    said = batch(places, "--out", tmp_path / "farm", code=1)
+    with claimed(tmp_path / "farm"):
+        said = batch(places, "--out", tmp_path / "farm", code=1)
     assert "Another geofield" in said
-    os.close(handle)

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from geofield import schema
 from geofield.cli.main import cli
 from geofield.errors import TrackError
+from geofield.farm import read_farm
 from geofield.tracks import plan_tracks
 from geofield.tracks.fewest import candidate_angles
 
@@ -72,17 +73,61 @@ def test_one_polygon_with_trees(tmp_path: Path) -> None:
 
 def test_many_polygons_make_many_plans(tmp_path: Path) -> None:
     outlines(3).to_file(tmp_path / "parcels.shp")
-    report = run(tmp_path / "parcels.shp", "--spacing", "8", "-o", tmp_path / "plans")
+    report = run(tmp_path / "parcels.shp", "--spacing", "8", "--each", "-o", tmp_path / "plans")
     rows = report["fields"]
-    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "Field 3"]  # type: ignore[attr-defined]
-    assert [row["length_m"] for row in rows] == pytest.approx([2000.0 / 0.9996] * 3, abs=0.1)  # type: ignore[attr-defined]
+    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "Field 3"]
+    assert [row["length_m"] for row in rows] == pytest.approx([2000.0 / 0.9996] * 3, abs=0.1)
     assert sorted(p.name for p in (tmp_path / "plans").glob("*.gpkg")) == [
         "Field_1.gpkg", "Field_2.gpkg", "Field_3.gpkg",
     ]  # fmt: skip
     again = CliRunner().invoke(
-        cli, ["tracks", str(tmp_path / "parcels.shp"), "-o", str(tmp_path / "one.gpkg")]
+        cli, ["tracks", str(tmp_path / "parcels.shp"), "--each", "-o", str(tmp_path / "one.gpkg")]
     )
     assert again.exit_code != 0
+
+
+def test_many_polygons_make_one_file(tmp_path: Path) -> None:
+    frame = outlines(3).assign(crop=["rye", "oats", "rye"], spacing_m=[None, 16.0, None])
+    frame.to_file(tmp_path / "parcels.gpkg")
+    out = tmp_path / "all.gpkg"
+    rows = run(tmp_path / "parcels.gpkg", "--spacing", "8", "-o", out)["fields"]
+    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "Field 3"]
+    lengths = np.array([2000.0, 1000.0, 2000.0]) / 0.9996
+    assert [row["length_m"] for row in rows] == pytest.approx(list(lengths), abs=0.1)
+    field = gpd.read_file(out, layer="field").set_index("name").sort_index()
+    assert list(field["crop"]) == ["rye", "oats", "rye"]
+    tracks = gpd.read_file(out, layer="tracks")
+    assert set(tracks["field_id"]) == set(field["field_id"])
+    assert CRS in {tracks.crs.to_epsg(), field.crs.to_epsg()}
+    refused = CliRunner().invoke(
+        cli, ["tracks", str(tmp_path / "parcels.gpkg"), "--spacing", "9", "-o", str(out)]
+    )
+    assert "there already" in str(refused.exception)
+    # The outlines of that file are parcels again; what geofield wrote beside them is no setting.
+    again = run(out, "--spacing", "4", "-o", tmp_path / "again.gpkg")["fields"]
+    assert [row["spacing_m"] for row in again] == [4.0] * 3
+
+
+def test_many_polygons_make_a_farm(tmp_path: Path) -> None:
+    outlines(3).to_file(tmp_path / "parcels.shp")
+    rows = run(tmp_path / "parcels.shp", "--spacing", "8", "-o", tmp_path / "farm")["fields"]
+    farm = read_farm(tmp_path / "farm")
+    assert {row["field_id"] for row in rows} == set(farm.ids)
+    assert (tmp_path / "farm" / "farm.gpkg").exists()
+    assert {plan.tracks.spacing_m for plan in farm} == {8.0}
+
+
+def test_fields_that_fail_are_told_and_the_others_written(tmp_path: Path) -> None:
+    frame = outlines(3).assign(spacing_m=[None, 900.0, None])
+    frame.to_file(tmp_path / "parcels.gpkg")
+    for more in ((), ("--each",)):
+        out = tmp_path / ("each" if more else "all")
+        done = CliRunner().invoke(
+            cli, ["tracks", str(tmp_path / "parcels.gpkg"), *more, "-o", str(out)]
+        )
+        assert "1 of 3 fields could not be planned" in str(done.exception)
+        assert "larger than the field" in done.stderr
+        assert len(list(out.glob("Field_*.gpkg")) if more else read_farm(out)) == 2
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:

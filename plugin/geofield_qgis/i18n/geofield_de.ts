@@ -1280,7 +1280,17 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>GeoPackage to write, may be FILE; for several fields a folder, one file each.</source>
+      <source>GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: a farm, as of `geofield batch`.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Each</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>A GeoPackage for each of several fields, in a folder.</source>
       <translation type="unfinished" />
     </message>
     <message>

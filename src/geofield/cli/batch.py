@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from geofield.cli.claiming import claim_folder
 from geofield.cli.console import echo_json, progress_bar, say, say_note
+from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
 from geofield.cli.options import section_options, section_values, settings_option
 from geofield.cli.place_options import place_options, places_of
@@ -22,12 +24,13 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=GroupedCommand,
     epilog="""\b
 Examples (on the project's own sample):
   geofield batch sample_data/seeds.csv sample_data/field_1.tif --spacing 4 --out farm/
   geofield batch parcels.gpkg --obstacles trees.gpkg --workers 8 --out farm/
   geofield batch places.parquet ortho/ --scheduler tcp://10.0.0.5:8786 --out s3://bucket/farm
-"""
+""",
 )
 @click.argument("places", metavar="PLACES", type=click.Path(path_type=Path))
 @click.argument("imagery", required=False)
@@ -131,6 +134,8 @@ def batch(
     from geofield.farm.store import Store
     from geofield.farm.work import Job
 
+    if "://" not in out:
+        claim_folder(Path(out))
     found = places_of(places, settings, options)
     if imagery is None and not found.parcels:
         raise FieldError(
@@ -148,16 +153,17 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("Name --workers or --scheduler, not both.")
     say(f"Places     {len(found)} of {places.name}")
-    if store.folder is not None:
-        for one in put_edits(store.folder, store.folder / OVERVIEW):
-            say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
+    edited = [] if store.folder is None else put_edits(store.folder, store.folder / OVERVIEW)
+    for one in edited:
+        say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
     with progress_bar(quiet=as_json) as progress, two_interrupts() as control:
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
             imagery=about, control=control, tell=lambda at: _show(progress, at),
         )  # fmt: skip
-    files = finish(store, found, overview=overview)
+    anew = bool(edited) or count.done > count.before
+    files = finish(store, found, anew=anew, overview=overview)
     if as_json:
         echo_json({"farm": store.place, "places": count.total, **count.statuses, "files": files})
     else:
@@ -208,9 +214,8 @@ def _imagery(
 
 def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
     """Who does the work; said, with the address of a dashboard."""
-    import os
-
     from geofield.errors import GeofieldError
+    from geofield.farm.pool import Pool, cores
 
     engine: Engine
     if scheduler is not None:
@@ -223,15 +228,12 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
 
         engine = Cluster.at(scheduler, store)
     else:
-        cores = getattr(os, "sched_getaffinity", None)
-        count = workers or (len(cores(0)) if cores else os.cpu_count() or 1)
+        count = workers or cores()
         if _has_dask():
             from geofield.farm.cluster import Cluster
 
             engine = Cluster.here(count)
         else:
-            from geofield.farm.pool import Pool
-
             engine = Pool(count)
     say(f"Workers    {engine.where}")
     return engine

@@ -66,6 +66,7 @@ def put(plan_file: Path, folder: str) -> None:
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
     what a person said.
     """
+    from geofield.cli.claiming import claim_folder
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
     from geofield.farm.overview import OVERVIEW
@@ -74,13 +75,15 @@ def put(plan_file: Path, folder: str) -> None:
 
     alone, store = not is_overview(plan_file), Store.of(folder)
     place = store.folder
+    if place is not None and place.is_dir():
+        claim_folder(place)
     overview = plan_file if place is None else place / OVERVIEW
     # Edits in the overview first: it is written anew below.
     ids = [] if place is None else put_edits(place, overview if alone else plan_file)
     if alone:
         ids.append(put_back(plan_file, folder))
     if ids:
-        renew(store, overview=overview.is_file())
+        renew(store)
     for field_id in ids:
         say(f"Field      {field_id} of {folder} is now as you left it")
     if not ids:

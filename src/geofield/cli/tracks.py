@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.console import echo_json, say
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import name_option, section_options, section_values, settings_option
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
+    from geofield.farm.places import Place
+    from geofield.farm.work import Job
     from geofield.plan import Plan
 
 
@@ -24,7 +26,8 @@ Examples (the first two on the project's own sample):
   geofield tracks sample_data/field_1.gpkg --spacing 4 -o tracks.gpkg
   geofield tracks sample_data/field_1.gpkg --direction 45 --headland 8 --route shortest \\
       --turning-radius 4 -o route.gpkg
-  geofield tracks parcels.shp --obstacles trees.shp --clearance 1 --spacing 3 -o plans/
+  geofield tracks parcels.shp --obstacles trees.shp --clearance 1 --spacing 3 -o farm.gpkg
+  geofield tracks parcels.shp --spacing 3 --each -o plans/
 """,
 )
 @click.argument("file", metavar="FILE", type=click.Path(exists=True, path_type=Path))
@@ -33,8 +36,10 @@ Examples (the first two on the project's own sample):
     "--output",
     required=True,
     type=click.Path(path_type=Path),
-    help="GeoPackage to write, may be FILE; for several fields a folder, one file each.",
+    help="GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: "
+    "a farm, as of `geofield batch`.",
 )
+@click.option("--each", is_flag=True, help="A GeoPackage for each of several fields, in a folder.")
 @click.option(
     "--obstacles",
     "obstacle_file",
@@ -50,6 +55,7 @@ Examples (the first two on the project's own sample):
 def tracks(
     file: Path,
     output: Path,
+    each: bool,
     obstacle_file: Path | None,
     crs: str | None,
     name: str | None,
@@ -62,99 +68,92 @@ def tracks(
 
     FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with
     all that a person changed; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...),
-    each of which is a field.
+    each of which is a field. Their columns come along, and those named like settings (spacing_m,
+    heading_deg, ...) hold for their field.
     """
     # Before the large imports: a typo is told at once.
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
     from geofield.cli.claiming import claim_file, claim_folder
-    from geofield.cli.polygon_files import obstacles_of, plans_of, with_obstacles
-    from geofield.errors import GeofieldError, TrackError
-    from geofield.pipeline import run_tracks
-    from geofield.plan_files import save_plan
+    from geofield.cli.many_tracks import Wanted, file_name, line_of, of_many, parcels_in
+    from geofield.farm.work import Job
 
     (claim_file if output.suffix else claim_folder)(output)
-    plans, is_plan = plans_of(file, crs=crs)
-    standing = None if obstacle_file is None else obstacles_of(obstacle_file, crs=crs)
-    several = len(plans) > 1
-    if name:
-        if several:
-            raise click.UsageError("--name is one field's name: the file has several.")
-        plans = [(stem, replace(one, field=replace(one.field, name=name))) for stem, one in plans]
-    if several and output.suffix:
-        raise TrackError(
-            f"{file} holds {len(plans)} fields, and {output} is one file.",
-            hint="Give a folder: -o plans/",
-        )
-    rows: list[dict[str, Any]] = []
-    failed: list[str] = []
-    with progress_bar(quiet=as_json) as progress:
-        for done, (stem, begun) in enumerate(plans):
-            progress(done, len(plans), stem)
-            target = output / f"{stem}.gpkg" if several or not output.suffix else output
-            try:
-                plan = begun if standing is None else with_obstacles(begun, standing)
-                plan = run_tracks(plan, settings=settings)
-            except GeofieldError as error:
-                if not several:
-                    raise
-                failed.append(stem)
-                say(f"{stem}: {error.message} {error.hint or ''}")
-                continue
-            save_plan(plan, target, read_from=file if is_plan else None, overwrite=overwrite)
-            rows.append(_row(plan, target))
-            if not as_json:
-                say(_line(rows[-1]))
-                say_outdated(target)
+    job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
+    plan = _own_plan(file)
+    places = None if plan is not None else parcels_in(file, settings, crs)
+    several = places is not None and len(places) > 1
+    if name and several:
+        raise click.UsageError("--name is one field's name: the file has several.")
+    rows: list[dict[str, Any]]
+    failed: dict[str, str] = {}
+    if places is not None and several:
+        wanted = Wanted(output, each=each, overwrite=overwrite, quiet=as_json)
+        rows, failed = of_many(places, job, wanted)
+    else:
+        begun: Plan | Place
+        if plan is not None:
+            stem, begun = file.stem, plan
+            begun = replace(plan, field=replace(plan.field, name=name)) if name else plan
+        else:
+            assert places is not None  # noqa: S101 - no plan, so there are places
+            place = next(iter(places))
+            stem = file_name(place.name, set())
+            # Without an id of its own the field gets one by its shape.
+            field_id = place.field_id if places.ids_given else ""
+            begun = replace(place, name=name or place.name, field_id=field_id)
+        target = output if output.suffix else output / f"{stem}.gpkg"
+        rows = [_one(begun, job, target, file, overwrite=overwrite)]
     if as_json:
-        echo_json({"fields": rows, "failed": failed})
+        echo_json({"fields": rows, "failed": list(failed)})
+    for row in () if as_json else rows:
+        say(line_of(row))
+        say_outdated(Path(row["file"]))
     if failed:
+        from geofield.errors import TrackError
+
+        for one, reason in failed.items():
+            say(f"{one}: {reason}")
         raise TrackError(
-            f"{len(failed)} of {len(plans)} fields could not be planned: {', '.join(failed[:5])}"
-            f"{', ...' if len(failed) > 5 else ''}.",
+            f"{len(failed)} of {len(places or ())} fields could not be planned: "
+            f"{', '.join(list(failed)[:5])}{', ...' if len(failed) > 5 else ''}.",
             hint="The reasons are above; all other fields were written.",
         )
 
 
-def _row(plan: Plan, target: Path) -> dict[str, Any]:
-    """Figures of one field, plain JSON values."""
-    import math
-    from dataclasses import asdict
+def _own_plan(file: Path) -> Plan | None:
+    """The plan in a GeoPackage of geofield; None for any other file of polygons."""
+    import pyogrio
 
-    if plan.tracks is None:
-        return {}
-    figures = {
-        name: None if isinstance(value, float) and math.isnan(value) else value
-        for name, value in asdict(plan.tracks.statistics).items()
-    }
-    turns = plan.tracks.turns
-    if turns is not None:
-        figures |= {
-            "turn_count": len(turns),
-            "turn_length_m": float(turns["length_m"].sum()),
-            "turns_that_do_not_fit": int((turns["fits"] == "no").sum()),
-        }
-    return {
-        "field_id": plan.field.field_id,
-        "name": plan.field.name,
-        "file": str(target),
-        "heading_deg": plan.tracks.heading_deg,
-        "spacing_m": plan.tracks.spacing_m,
-        "direction_why": plan.tracks.direction_why,
-        **figures,
-        "notes": list(plan.tracks.notes),
-    }
+    from geofield import schema
+    from geofield.formats.foreign import layer_names
+    from geofield.plan import read_plan
+
+    layer = schema.FIELD.name
+    if file.suffix.lower() != ".gpkg" or layer not in layer_names(file):
+        return None
+    if pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"] != 1:
+        return None
+    return read_plan(file)
 
 
-def _line(row: dict[str, Any]) -> str:
-    text = (
-        f"{row['name']}: {row['track_count']} tracks, {row['segment_count']} segments, "
-        f"{row['length_m']:.0f} m, heading {row['heading_deg']:.1f} degrees, "
-        f"{row['coverage_percent']:.1f} % covered"
-    )
-    if "turn_count" in row:
-        text += f", {row['turn_count']} turns ({row['turns_that_do_not_fit']} do not fit)"
-    if row["direction_why"]:
-        text += f" ({row['direction_why']})"
-    return f"{text}; in {row['file']}"
+def _one(
+    plan: Plan | Place, job: Job, target: Path, file: Path, *, overwrite: bool
+) -> dict[str, Any]:
+    """Plan one field and write it; its figures."""
+    from geofield.cli.many_tracks import figures_of
+    from geofield.farm.standing import obstacles_of, with_obstacles
+    from geofield.farm.work import plan_place
+    from geofield.pipeline import run_tracks
+    from geofield.plan import Plan
+    from geofield.plan_files import save_plan
+
+    if not isinstance(plan, Plan):
+        done, read_from = plan_place(plan, job), None
+    else:
+        if job.obstacles is not None:
+            plan = with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
+        done, read_from = run_tracks(plan, settings=job.settings), file
+    save_plan(done, target, read_from=read_from, overwrite=overwrite)
+    return figures_of(done, target)

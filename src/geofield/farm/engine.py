@@ -12,7 +12,7 @@ from threading import Event
 from typing import Protocol
 
 from geofield.errors import GeofieldError
-from geofield.farm.chunk import Done, Orders, Task
+from geofield.farm.chunk import Done, Orders, Task, plan_chunk
 
 #: Workers are single-threaded: there is one for each core.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "GDAL_NUM_THREADS")
@@ -38,6 +38,22 @@ class Engine(Protocol):
 
     def close(self) -> None:
         """End all workers now."""
+
+
+class Here:
+    """Work in this process itself, one chunk after the other."""
+
+    where = "this process"
+
+    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+        """Plan chunks; see :class:`Engine`."""
+        for task in tasks:
+            if control.stop.is_set():
+                return
+            yield plan_chunk(task, orders)
+
+    def close(self) -> None:
+        """Nothing is to be ended."""
 
 
 @dataclass

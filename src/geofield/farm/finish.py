@@ -1,16 +1,17 @@
-"""What is written when all places have a status: files made from the whole farm."""
+"""What is written at the end of a run: files made from the whole farm."""
 
 from __future__ import annotations
 
 from geofield.farm.failed import write_failed
-from geofield.farm.overview import write_overview
+from geofield.farm.overview import OVERVIEW, write_overview
 from geofield.farm.places import Places
-from geofield.farm.stac import write_stac
+from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
+from geofield.staging import staged_folder
 
 
-def finish(store: Store, places: Places, *, overview: bool = True) -> list[str]:
+def finish(store: Store, places: Places, *, anew: bool = True, overview: bool = True) -> list[str]:
     """Write what is made from the whole farm; the names of the files.
 
     Parameters
@@ -18,17 +19,36 @@ def finish(store: Store, places: Places, *, overview: bool = True) -> list[str]:
     store : Store
     places : Places
         That were asked for.
+    anew : bool
+        Whether the farm has changed since these files were written; else only missing ones are.
     overview : bool
-        Whether ``farm.gpkg`` and ``farm.qgz`` are written, where the farm lies on a disk.
+        Write ``farm.gpkg`` and ``farm.qgz``, where the farm lies on a disk.
     """
-    return write_failed(store, places) + renew(store, overview=overview)
+    there = store.names("")
+    written = write_failed(store, places)
+    if anew or COLLECTION not in there:
+        written += _catalogue(store)
+    if overview and (anew or OVERVIEW not in there):
+        written += _overview(store)
+    return written
 
 
-def renew(store: Store, *, overview: bool) -> list[str]:
-    """Write again what shows the whole farm: its catalogue and its overview."""
-    name = store.place.rstrip("/").rsplit("/", 1)[-1]
-    files = write_stac(store, name=name)
-    if overview and store.folder is not None:
-        farm = read_farm(store.folder)
-        files += [path.name for path in write_overview(farm, store.folder, name=name)]
-    return files
+def renew(store: Store) -> None:
+    """Write anew what is there of these files, when single plans have changed."""
+    there = store.names("")
+    if COLLECTION in there:
+        _catalogue(store)
+    if OVERVIEW in there:
+        _overview(store)
+
+
+def _catalogue(store: Store) -> list[str]:
+    return write_stac(store, name=store.place.rstrip("/").rsplit("/", 1)[-1])[:1]
+
+
+def _overview(store: Store) -> list[str]:
+    if store.folder is None:
+        return []
+    with staged_folder(store.folder, overwrite=True) as staging:
+        files = write_overview(read_farm(store.place), staging, name=store.folder.name)
+    return [file.name for file in files]

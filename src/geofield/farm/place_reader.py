@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,7 @@ def read_places(
     name_column: str | None = None,
     lat_column: str | None = None,
     lon_column: str | None = None,
+    unnamed: str | None = None,
 ) -> Places:
     """Read places: points (columns lat and lon, or geometry) or parcels.
 
@@ -53,6 +55,8 @@ def read_places(
         Of coordinates that do not say theirs.
     id_column, name_column, lat_column, lon_column : str, optional
         Usual names are found when not given.
+    unnamed : str, optional
+        What places without a name are called, with their row; by their id when not given.
 
     Raises
     ------
@@ -65,6 +69,7 @@ def read_places(
     raw = read_raw(Path(path), layer=layer, texts=(*_ID, *_NAME, id_column, name_column))
     if not raw.table.num_rows:
         raise FormatError(f"{path} is empty: it holds no places.", hint="Give one row per field.")
+    raw = _without_ours(raw)
     find = _Columns(raw)
     id_name, name_name = find(id_column, _ID), find(name_column, _NAME)
     lat_name, lon_name = find(lat_column, _LAT), find(lon_column, _LON)
@@ -92,11 +97,42 @@ def read_places(
     said = raw.table.select(per_place).take(kept)
     check_settings(raw.name, said, settings)
     ids, names = _names(raw, id_name, name_name, kept, part, lat, lon)
+    if unnamed is not None:
+        names = _called(names, ids, raw, name_name, kept, unnamed)
     return Places(
         str(path), ids, names, lat, lon, kept + 1, outlines, source,
         own.rename_columns([_unlike_ours(name) for name in own.column_names]),
-        said, tuple(notes),
+        said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip
+
+
+def _without_ours(raw: RawPlaces) -> RawPlaces:
+    """Outlines of geofield itself: what it wrote beside their names is no word of the user's."""
+    ours = set(schema.FIELD.column_names)
+    shared = ours & set(raw.table.column_names)
+    if "field_id" not in shared or 2 * len(shared) < len(ours):
+        return raw
+    gone = (ours - {"field_id", "name"}) | {"utm_epsg"}
+    return replace(
+        raw, table=raw.table.select([n for n in raw.table.column_names if n not in gone])
+    )
+
+
+def _called(
+    names: pa.Array, ids: pa.Array, raw: RawPlaces, name_name: str | None, kept: Any, stem: str
+) -> pa.Array:
+    """Names of places, those without one by the file and their row."""
+    import pyarrow as pa
+
+    given = [None] * len(ids)
+    if name_name is not None:
+        given = _texts(raw.table[name_name]).take(kept).to_pylist()
+    one = raw.table.num_rows == 1
+    called = [
+        name if had else (stem if one else f"{stem}_{row + 1}")
+        for name, had, row in zip(names.to_pylist(), given, kept.tolist(), strict=True)
+    ]
+    return pa.array(called, pa.string())
 
 
 class _Columns:
@@ -256,7 +292,7 @@ def _names(
                 hint="Give each place an id of its own, or name another column: --id-column.",
             )
         ids = column.take(kept).to_pylist()
-    elif None not in names and len(set(names)) == len(names) and not part.any():
+    elif None not in names and len(set(names)) == len(names) > 1 and not part.any():
         ids = list(names)  # names that are all different do as well
     taken = {one for one in ids if one}
     for at, one in enumerate(ids):

@@ -49,7 +49,7 @@ def check_settings(file: str, said: pa.Table, settings: Settings | None) -> None
                 as_settings(settings or Settings(), {name: value})
             except SettingsError as error:
                 row = int(pc.index(said[name], value).as_py()) + 1
-                words = str(error).removeprefix("Settings are not valid: ")
+                words = error.message.removeprefix("Settings are not valid: ")
                 raise FormatError(
                     f"{file}, row {row}: column {name!r} is named like a setting, and "
                     f"{value!r} is none: {words}",

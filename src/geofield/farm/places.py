@@ -76,6 +76,8 @@ class Places:
         What the person should know of the file.
     remarks : mapping of int to str
         What is to be told of single places, by position.
+    ids_given : bool
+        Whether the file has a column of ids.
     """
 
     path: str
@@ -90,6 +92,7 @@ class Places:
     settings: pa.Table
     notes: tuple[str, ...] = ()
     remarks: Mapping[int, str] = field(default_factory=dict)
+    ids_given: bool = False
 
     def __len__(self) -> int:
         return len(self.ids)

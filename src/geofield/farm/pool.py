@@ -24,6 +24,12 @@ _FALSE_STARTS = 3
 _GONE = object()
 
 
+def cores() -> int:
+    """Cores that this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
+
+
 class Pool:
     """Processes of this machine.
 

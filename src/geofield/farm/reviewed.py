@@ -69,19 +69,18 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
     plan = read_plan(plan_file)
     field_id = plan.field.field_id
-    with store.alone():
-        for chunk in committed(store):
-            status = read_part(store, STATUS, chunk)
-            if status is not None and field_id in status["field_id"].to_pylist():
-                break
-        else:
-            raise FormatError(
-                f"{folder} has no field {field_id!r}.",
-                hint="The field's id must be that of the farm: see its status table.",
-            )
-        # First what must not be lost; the tables follow from it.
-        store.put(file_of(field_id), _file_bytes(plan_file))
-        _replace(store, chunk, plan, status)
+    for chunk in committed(store):
+        status = read_part(store, STATUS, chunk)
+        if status is not None and field_id in status["field_id"].to_pylist():
+            break
+    else:
+        raise FormatError(
+            f"{folder} has no field {field_id!r}.",
+            hint="The field's id must be that of the farm: see its status table.",
+        )
+    # First what must not be lost; the tables follow from it.
+    store.put(file_of(field_id), _file_bytes(plan_file))
+    _replace(store, chunk, plan, status)
     return field_id
 
 

@@ -119,35 +119,34 @@ def run_farm(
     FormatError
         When it cannot be written.
     """
-    with store.alone():
-        record = _prepare(places, job, store, imagery or {}, fresh=fresh)
-        done = place.committed(store)
-        if retry:
-            done = _forget_failed(store, done)
-        excuse_all(store)
-        count = Count(len(places), _statuses(store, done))
-        count.before = count.done
-        order = places.order()
-        size = record.chunk_fields
-        missing = sorted(set(range(record.chunks)) - set(done))
-        orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
+    record = _prepare(places, job, store, imagery or {}, fresh=fresh)
+    done = place.committed(store)
+    if retry:
+        done = _forget_failed(store, done)
+    excuse_all(store)
+    count = Count(len(places), _statuses(store, done))
+    count.before = count.done
+    order = places.order()
+    size = record.chunk_fields
+    missing = sorted(set(range(record.chunks)) - set(done))
+    orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
 
-        def tasks() -> Iterator[Task]:
-            for chunk in missing:
-                yield Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
+    def tasks() -> Iterator[Task]:
+        for chunk in missing:
+            yield Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
 
-        tell(count)
-        if missing:
-            hired = engine()
-            try:
-                for one in hired.run(tasks(), orders, control or Control()):
-                    count.statuses.update(one.counts)
-                    tell(count)
-            finally:
-                hired.close()
-        if count.done == count.total:
-            store.remove(WORK)
-        return count
+    tell(count)
+    if missing:
+        hired = engine()
+        try:
+            for one in hired.run(tasks(), orders, control or Control()):
+                count.statuses.update(one.counts)
+                tell(count)
+        finally:
+            hired.close()
+    if count.done == count.total:
+        store.remove(WORK)
+    return count
 
 
 def _prepare(

@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -151,41 +148,6 @@ class Store:
             system.delete_dir(info.path)
         elif info.type == fs.FileType.File:
             system.delete_file(info.path)
-
-    @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Be the only run that writes here, as far as the file system has locks.
-
-        Raises
-        ------
-        FormatError
-            When another one is at work, or the folder cannot be made.
-        """
-        if self.folder is None:
-            yield
-            return
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(self.folder, error) from error
-        if find_spec("fcntl") is None:
-            yield
-            return
-        import fcntl
-
-        handle = os.open(self.folder, os.O_RDONLY)
-        try:
-            with suppress(OSError):
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    raise FormatError(
-                        f"Another geofield is writing into {self.place}.",
-                        hint="Wait until it is done.",
-                    ) from None
-            yield
-        finally:
-            os.close(handle)
 
 
 def _short(error: OSError) -> str:

@@ -1,0 +1,216 @@
+"""Tracks of many fields: one GeoPackage with all of them, a farm, or a file for each."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from geofield.cli.console import progress_bar, say_note
+
+if TYPE_CHECKING:
+    from geofield.farm.engine import Engine
+    from geofield.farm.places import Places
+    from geofield.farm.run import Count
+    from geofield.farm.value import Farm
+    from geofield.farm.work import Job
+    from geofield.plan import Plan
+    from geofield.settings import Settings
+
+#: Figures of each field, and by name why some failed.
+Told = tuple[list[dict[str, Any]], dict[str, str]]
+#: Up to so many fields are planned in this process: workers take seconds to begin.
+_FEW = 100
+#: Up to so many fields each has a line of its own.
+_LISTED = 50
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be written.
+
+    Attributes
+    ----------
+    output : Path
+        A GeoPackage or a folder.
+    each : bool
+        A GeoPackage for each field.
+    overwrite : bool
+    quiet : bool
+        No bar, and figures of all fields.
+    """
+
+    output: Path
+    each: bool
+    overwrite: bool
+    quiet: bool
+
+
+def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
+    """The parcels of a file.
+
+    Raises
+    ------
+    TrackError
+        When it holds no polygons.
+    """
+    from geofield.errors import TrackError
+    from geofield.farm.place_reader import read_places
+
+    places = read_places(file, settings=settings, crs=crs, unnamed=file.stem)
+    if places.outlines is None:
+        raise TrackError(f"{file} holds no polygons.", hint="Give a file of field outlines.")
+    for note in places.notes:
+        say_note(note)
+    return places
+
+
+def of_many(
+    places: Places, job: Job, wanted: Wanted
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Plan all parcels and write them; the figures of each, and why some failed, by name."""
+    if wanted.each:
+        return _each(places, job, wanted)
+    from geofield.errors import FormatError
+    from geofield.farm.overview import dataset_of
+    from geofield.formats.gpkg import write as write_gpkg
+    from geofield.staging import staged_folder
+
+    output = wanted.output
+    if not output.suffix:
+        farm = _farm(places, job, output, wanted, fresh=wanted.overwrite)
+        return _figures(farm, output, wanted)
+    if output.suffix.lower() != ".gpkg":
+        raise FormatError(
+            f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg, or name a folder."
+        )
+    with (
+        tempfile.TemporaryDirectory(prefix="geofield-") as folder,
+        staged_folder(output.parent, overwrite=wanted.overwrite, inputs=[places.path]) as staging,
+    ):
+        farm = _farm(places, job, Path(folder) / "farm", wanted, fresh=False)
+        write_gpkg(dataset_of(farm, output.stem), staging, stem=output.stem, options={})
+        return _figures(farm, output, wanted)
+
+
+def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool) -> Farm:
+    from geofield.farm.engine import Here
+    from geofield.farm.finish import finish
+    from geofield.farm.pool import Pool, cores
+    from geofield.farm.run import run_farm
+    from geofield.farm.store import Store
+    from geofield.farm.value import read_farm
+
+    def engine() -> Engine:
+        return Here() if len(places) <= _FEW else Pool(cores())
+
+    store = Store.of(folder)
+    with progress_bar(quiet=wanted.quiet) as progress:
+
+        def tell(count: Count) -> None:
+            progress(count.done, count.total, "fields")
+
+        count = run_farm(places, job, store, engine, fresh=fresh, tell=tell)
+    if folder == wanted.output:
+        finish(store, places, anew=count.done > count.before)
+    return read_farm(folder)
+
+
+def _figures(farm: Farm, target: Path, wanted: Wanted) -> Told:
+    status = farm.status.sort_values(["place", "field_id"])
+    bad = status[~status["field_id"].isin(farm.ids)]
+    failed = {
+        name: f"{error} {hint}".strip()
+        for name, error, hint in zip(bad["name"], bad["error"], bad["hint"], strict=True)
+    }
+    rows = []
+    if wanted.quiet or len(farm) <= _LISTED:
+        found = {plan.field.field_id: figures_of(plan, target) for plan in farm}
+        rows = [found[one] for one in status["field_id"] if one in found]
+    else:
+        say_note(f"{len(farm)} fields are planned, in {target}.")
+    return rows, failed
+
+
+def _each(places: Places, job: Job, wanted: Wanted) -> Told:
+    """One after the other, each into a file of its own."""
+    from geofield.errors import GeofieldError, TrackError
+    from geofield.farm.work import plan_place
+    from geofield.plan_files import save_plan
+
+    if wanted.output.suffix:
+        raise TrackError(
+            f"{wanted.output} is one file, and --each writes one for each of {len(places)} fields.",
+            hint="Give a folder: --each -o plans/",
+        )
+    rows, failed, taken = [], {}, set[str]()
+    with progress_bar(quiet=wanted.quiet) as progress:
+        for done, place in enumerate(places):
+            stem = file_name(place.name, taken)
+            progress(done, len(places), stem)
+            try:
+                plan = plan_place(place, job)
+            except GeofieldError as error:
+                failed[stem] = f"{error.message} {error.hint or ''}".strip()
+                continue
+            target = wanted.output / f"{stem}.gpkg"
+            save_plan(plan, target, overwrite=wanted.overwrite)
+            rows.append(figures_of(plan, target))
+    return rows, failed
+
+
+def file_name(name: str, taken: set[str]) -> str:
+    """A name for a file, unlike all others taken."""
+    stem = re.sub(r"[^\w.-]+", "_", name).strip("._") or "field"
+    unique, number = stem, 1
+    while unique.lower() in taken:
+        number += 1
+        unique = f"{stem}_{number}"
+    taken.add(unique.lower())
+    return unique
+
+
+def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
+    """Figures of one field, plain JSON values."""
+    import math
+    from dataclasses import asdict
+
+    if plan.tracks is None:
+        return {}
+    figures = {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in asdict(plan.tracks.statistics).items()
+    }
+    turns = plan.tracks.turns
+    if turns is not None:
+        figures |= {
+            "turn_count": len(turns),
+            "turn_length_m": float(turns["length_m"].sum()),
+            "turns_that_do_not_fit": int((turns["fits"] == "no").sum()),
+        }
+    return {
+        "field_id": plan.field.field_id,
+        "name": plan.field.name,
+        "file": str(target),
+        "heading_deg": plan.tracks.heading_deg,
+        "spacing_m": plan.tracks.spacing_m,
+        "direction_why": plan.tracks.direction_why,
+        **figures,
+        "notes": list(plan.tracks.notes),
+    }
+
+
+def line_of(row: dict[str, Any]) -> str:
+    """The figures of one field as a line for people."""
+    text = (
+        f"{row['name']}: {row['track_count']} tracks, {row['segment_count']} segments, "
+        f"{row['length_m']:.0f} m, heading {row['heading_deg']:.1f} degrees, "
+        f"{row['coverage_percent']:.1f} % covered"
+    )
+    if "turn_count" in row:
+        text += f", {row['turn_count']} turns ({row['turns_that_do_not_fit']} do not fit)"
+    if row["direction_why"]:
+        text += f" ({row['direction_why']})"
+    return f"{text}; in {row['file']}"
