@@ -64,11 +64,13 @@ clean:  ## remove the environment and everything made
 	rm -rf $(VENV) out site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(UV):
-	$(PYTHON) -m venv $(VENV)
+	@echo "Making $(CURDIR)/$(VENV) with $(PYTHON) ..."
+	@$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q --disable-pip-version-check uv==$(UV_VERSION)
 
 $(VENV)/run.stamp: requirements/run.txt pyproject.toml | $(UV)
-	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/run.txt
+	@echo "Installing what geofield needs: about 300 MB are fetched, once ..."
+	$(UV) pip install --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/run.txt
 	$(UV) pip install -q --python $(BIN)/python --no-deps -e .
 	@touch $@
 

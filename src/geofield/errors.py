@@ -12,6 +12,12 @@ from geofield.wording import in_python
 class GeofieldError(Exception):
     """Base of every error that geofield raises on purpose.
 
+    >>> try:
+    ...     gf.read_plan("missing.gpkg")
+    ... except gf.GeofieldError as error:
+    ...     print(error)
+    There is no file missing.gpkg. Check the path.
+
     Parameters
     ----------
     message : str
@@ -110,7 +116,13 @@ class OutputExistsError(FormatError):
 
 
 class GeofieldWarning(UserWarning):
-    """Base of every warning that geofield gives."""
+    """Base of every warning that geofield gives.
+
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", gf.GeofieldWarning)
+    ...     scene = gf.read_scene("sample_data/field_1.tif")
+    """
 
 
 class ImageryWarning(GeofieldWarning):

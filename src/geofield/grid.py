@@ -40,6 +40,10 @@ _GEOD = Geod(ellps="WGS84")
 class Grid:
     """Shape, affine transform and CRS of a raster.
 
+    >>> grid = gf.read_scene("sample_data/field_1.tif").grid
+    >>> grid.width_px, grid.crs.to_epsg()
+    (480, 32636)
+
     Parameters
     ----------
     width_px, height_px : int

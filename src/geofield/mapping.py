@@ -19,8 +19,13 @@ from PIL import Image, ImageDraw, ImageFont
 from geofield import schema, theme
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset
-from geofield.model.frame import along_frame
-from geofield.model.obstacles import active
+from geofield.model.map_words import (
+    credit_in_words,
+    figures_in_words,
+    frame_lines,
+    length_in_words,
+    round_length_m,
+)
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
@@ -151,7 +156,7 @@ class _Canvas:
 
     def frame_lines(self) -> list[shapely.LineString]:
         """Where the outline is the picture's frame: a little inside it, to be seen."""
-        return _frame_lines(self.dataset)
+        return frame_lines(self.dataset)
 
     def pixels(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y = self.grid.from_crs(coordinates[:, 0], coordinates[:, 1], self.dataset.crs)
@@ -258,13 +263,9 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
         place = (16, top + 92 + 18 * number)
         font = ImageFont.load_default(_DOUBT_SIZE)
         draw.text(place, line, font=font, fill=theme.rgb(theme.DOUBT), anchor="ls")
-    source = dataset.provenance.source
-    credit = "  ".join(t for t in (source.attribution or source.name, source.licence) if t)
-    if source.date:
-        credit += f"  taken {source.date}"
     draw.text(
         (16, image.height - 12),
-        credit.strip(),
+        credit_in_words(dataset),
         font=ImageFont.load_default(12),
         fill=(190, 195, 200),
         anchor="ls",
@@ -286,7 +287,7 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, tuple[float, float
     statuses = list(dict.fromkeys(dataset.table("obstacles")["status"].tolist()))
     dashed: tuple[float, float] = (5.0, 5.0)
     entries: list[tuple[str, str, tuple[float, float] | None]] = [(theme.OUTLINE, "field", None)]
-    if _frame_lines(dataset):
+    if frame_lines(dataset):
         entries.append((theme.DOUBT, "goes on outside", _FRAME_DASH))
     for status, look in theme.STATUS.items():
         if status in statuses:
@@ -307,24 +308,7 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, tuple[float, float
 
 
 def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) -> None:
-    field = dataset.table("field").iloc[0]
-    obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
-    lines = [f"{dataset.name}   {field['area_ha']:.2f} ha"]
-    count = len(active(obstacles))
-    idle = {s: int((obstacles["status"] == s).sum()) for s in schema.NOT_AVOIDED}
-    others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
-    lines.append(_counted(count, "obstacle") + (f" ({others})" if others else ""))
-    if len(tracks):
-        length = tracks["length_m"].sum() / 1000
-        lines.append(
-            f"{_counted(len(tracks), 'track')}, "
-            f"{_counted(int(tracks['segment_count'].sum()), 'segment')}, "
-            f"{length:.2f} km, heading {field['heading_deg']:.1f}°"
-        )
-    certainty = field["certainty"]
-    if math.isfinite(certainty):
-        lines[0] += f"   outline {certainty:.0%} certain"
-    for index, line in enumerate(lines):
+    for index, line in enumerate(figures_in_words(dataset)):
         draw.text(
             (width - 16, top + 14 + 22 * index),
             line,
@@ -332,10 +316,6 @@ def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) 
             fill=_INK[:3],
             anchor="rm",
         )
-
-
-def _counted(number: int, thing: str) -> str:
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
@@ -354,26 +334,15 @@ def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
     return [*lines, line]
 
 
-def _frame_lines(dataset: Dataset) -> list[shapely.LineString]:
-    """Where the outline is the picture's frame; a parcel of the user's own is whole."""
-    field = dataset.table("field")
-    polygons = shapely.get_parts(field.geometry.to_numpy())
-    if not len(polygons) or field["method"].iloc[0] == "boundary":
-        return []
-    return [line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid)]
-
-
 def _scale_bar(
     draw: ImageDraw.ImageDraw, grid: Grid, scale: float, right: float, bottom: float
 ) -> None:
     metres_per_px = grid.ground_resolution_m / scale
-    wanted = 180 * metres_per_px
-    power = 10.0 ** math.floor(math.log10(wanted))
-    length = max(step * power for step in (1, 2, 5) if step * power <= wanted)
+    length = round_length_m(180 * metres_per_px)
     left = right - length / metres_per_px
     for width, colour in ((7, (0, 0, 0)), (3, _INK[:3])):
         draw.line([left, bottom, right, bottom], fill=colour, width=width)
-    label = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
+    label = length_in_words(length)
     draw.text(
         ((left + right) / 2, bottom - 7),
         label,

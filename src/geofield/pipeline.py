@@ -57,6 +57,11 @@ def plan_field(
 ) -> Plan:
     """Run all four stages.
 
+    >>> picture = "sample_data/field_1.tif"
+    >>> plan = gf.plan_field(picture, lat=35.075373, lon=33.531142, spacing_m=6, name="North")
+    >>> plan.field.name, plan.tracks.spacing_m
+    ('North', 6.0)
+
     Parameters
     ----------
     scene : Scene or path

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield import __version__, schema
-from geofield.crs import ground_areas_m2, ground_scale_of
+from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
+from geofield.field_rows import alternatives_table, field_from_row
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
 from geofield.model.dataset import Dataset, Provenance
-from geofield.model.evidence import Evidence, quality_from_json
-from geofield.model.field import Alternative, Field
+from geofield.model.evidence import Evidence
+from geofield.model.field import Field
 from geofield.model.frame import along_frame, outside_in_words
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
@@ -37,6 +38,10 @@ SOFTWARE = f"geofield {__version__}"
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """All that is known of one field; stages that have not run are None.
+
+    >>> plan = gf.read_plan("sample_data/field_1.gpkg")
+    >>> plan.obstacles["status"].unique().tolist(), plan.tracks
+    (['confirmed'], None)
 
     Attributes
     ----------
@@ -149,7 +154,7 @@ class Plan:
         """The tables of the plan, as formats write them."""
         tables = {schema.FIELD.name: self._field_table()} | self._tables()
         if self.field.alternatives:
-            tables[schema.ALTERNATIVES.name] = self._alternatives_table()
+            tables[schema.ALTERNATIVES.name] = alternatives_table(self.field)
         return Dataset(
             tables=tables,
             crs=self.field.crs,
@@ -180,7 +185,7 @@ class Plan:
         settings = (
             from_mapping(dataset.provenance.settings) if dataset.provenance.settings else None
         )
-        field = _field_from_row(rows, dataset, evidence)
+        field = field_from_row(rows, dataset, evidence)
         obstacles = dataset.tables.get(schema.OBSTACLES.name)
         tracks = None
         if schema.SEGMENTS.name in dataset.tables and "tracks" in evidence:
@@ -308,19 +313,6 @@ class Plan:
 
         return PlanPage(document(self.to_dataset(), self.scene), height_px)
 
-    def _alternatives_table(self) -> gpd.GeoDataFrame:
-        polygons = [one.polygon for one in self.field.alternatives]
-        return schema.table(
-            schema.ALTERNATIVES,
-            {
-                "alternative_no": list(range(1, len(polygons) + 1)),
-                "area_ha": ground_areas_m2(polygons, self.field.crs) / 10_000.0,
-                "certainty": [one.certainty for one in self.field.alternatives],
-            },
-            polygons,
-            self.field.crs,
-        )
-
     def _field_table(self) -> gpd.GeoDataFrame:
         from geofield.tracks.direction import find_baseline
 
@@ -356,6 +348,9 @@ class Plan:
 def read_plan(path: str | Path) -> Plan:
     """Read a plan back from a product that carries all of it.
 
+    >>> gf.read_plan("sample_data/field_1.gpkg").field.method
+    'truth'
+
     Parameters
     ----------
     path : path
@@ -370,49 +365,3 @@ def outline_digest(one: Field) -> str:
     """A fingerprint of an outline, to tell whether a person has moved it since."""
     ring = shapely.normalize(one.polygon)
     return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
-
-
-def _field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[str, Any]) -> Field:
-    row = rows.iloc[0]
-
-    def text(name: str) -> str:
-        value = row.get(name)
-        return value if isinstance(value, str) else ""
-
-    return Field(
-        polygon=_single_polygon(row.geometry),
-        crs=dataset.crs,
-        name=text("name"),
-        field_id=text("field_id"),
-        method=text("method") or "given",
-        quality=quality_from_json(evidence),
-        imagery=text("imagery"),
-        imagery_date=text("imagery_date") or None,
-        licence=text("licence"),
-        own=tuple(
-            (name, rows[name].iloc[0])
-            for name in schema.own_columns(schema.FIELD, rows)
-            if rows[name].notna().iloc[0]
-        ),
-        alternatives=_alternatives(dataset.tables.get(schema.ALTERNATIVES.name)),
-    )
-
-
-def _alternatives(rows: gpd.GeoDataFrame | None) -> tuple[Alternative, ...]:
-    """The alternatives that were written, by number."""
-    if rows is None or not len(rows):
-        return ()
-    rows = rows.sort_values("alternative_no")
-    pairs = zip(rows.geometry, rows["certainty"], strict=True)
-    return tuple(Alternative(_single_polygon(shape), float(sure)) for shape, sure in pairs)
-
-
-def _single_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
-    """The one polygon of a geometry: editors like to save multi-polygons."""
-    parts = shapely.get_parts(geometry) if geometry is not None else []
-    if len(parts) != 1 or not isinstance(parts[0], shapely.Polygon):
-        raise FormatError(
-            f"The field's outline has {len(parts)} parts; a plan needs one polygon.",
-            hint="Delete or merge parts in the field layer.",
-        )
-    return parts[0]

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geofield import schema, theme
-from geofield.errors import GeofieldError
+from geofield.crs import grid_north_deg, ground_scale_of
+from geofield.errors import FormatError, GeofieldError
 from geofield.model.dataset import Dataset
+from geofield.model.map_words import (
+    counted,
+    credit_in_words,
+    figures_in_words,
+    length_in_words,
+    round_length_m,
+)
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
@@ -35,16 +46,13 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
     GeofieldError
         When matplotlib is not installed.
     """
-    try:
-        from matplotlib import patheffects
-        from matplotlib import pyplot as plt
-        from matplotlib.lines import Line2D
-    except ImportError as error:
-        raise GeofieldError(
-            "plot() needs matplotlib.", hint="pip install 'geofield[plot]'"
-        ) from error
+    _needed()
+    from matplotlib import patheffects
+    from matplotlib.lines import Line2D
 
     if ax is None:
+        from matplotlib import pyplot as plt
+
         _, ax = plt.subplots(figsize=(8, 8), layout="constrained")
     if scene is not None:
         _draw_picture(ax, scene, dataset)
@@ -73,7 +81,7 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
             dash: Any = (0, look.dash) if look.dash else "-"
             style = {"linestyle": dash, "linewidth": 1.4, "path_effects": casing, "zorder": 4}
             rows.boundary.plot(ax=ax, color=look.color, **style)
-            text = f"{len(rows)} {status}"
+            text = f"{counted(len(rows), 'obstacle')}, {status}"
             marks.append(Line2D([], [], color=look.color, linestyle=dash, label=text))
     ax.set_aspect("equal")
     ax.set_title(dataset.name)
@@ -89,3 +97,86 @@ def _draw_picture(ax: Axes, scene: Scene, dataset: Dataset) -> None:
 
     pixels, (left, bottom, right, top) = shown_pixels(scene, dataset.crs, 2000)
     ax.imshow(np.asarray(pixels), extent=(left, right, bottom, top), zorder=1)
+
+
+def write_svg(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Draw ``map.svg``: lines stay lines, for print and for drawing programs."""
+    return [_write(dataset, folder / "map.svg", options.get("scene"), {"Date": None})]
+
+
+def write_pdf(
+    dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]
+) -> list[Path]:
+    """Draw ``map.pdf``, one page of A4."""
+    return [_write(dataset, folder / "map.pdf", options.get("scene"), {"CreationDate": None})]
+
+
+def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[str, None]) -> Path:
+    if not dataset.has(schema.FIELD.name):
+        raise FormatError("A map needs one field; there are 0.")
+    if scene is None and dataset.scene_path is not None:
+        from geofield.imagery import read_scene
+
+        scene = read_scene(dataset.scene_path)
+    _needed()
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    # Not pyplot: no window, and no state that a program of the user's may have set.
+    figure = Figure(figsize=(11.7, 8.3), layout="constrained")
+    ax = plot_dataset(dataset, scene, figure.subplots())
+    ax.set_title("")
+    ax.set_title("\n".join(figures_in_words(dataset)), loc="left", fontsize=9)
+    _scale_bar(ax, dataset)
+    doubts = dataset.table(schema.FIELD.name)["doubts"].iloc[0]
+    told = [f"Check the outline: {doubts}"] if isinstance(doubts, str) and doubts else []
+    figure.supxlabel("\n".join([*told, credit_in_words(dataset)]), fontsize=8)
+    with (
+        mpl.rc_context({"svg.hashsalt": "geofield", "svg.fonttype": "none"}),
+        warnings.catch_warnings(),
+    ):
+        # A name in a script that no font here has; the SVG has it as text all the same.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        figure.savefig(path, dpi=200, metadata=dict(undated))
+    return path
+
+
+def _scale_bar(ax: Axes, dataset: Dataset) -> None:
+    """A bar of a round length on the ground, below on the left, and where north is."""
+    scale = ground_scale_of(dataset.table(schema.FIELD.name).geometry.iloc[0], dataset.crs)
+    left, right = ax.get_xlim()
+    bottom, top = ax.get_ylim()
+    length_m = round_length_m(0.25 * (right - left) / scale)
+    x, y = left + 0.03 * (right - left), bottom + 0.04 * (top - bottom)
+    ax.plot([x, x + length_m * scale], [y, y], color="black", linewidth=4, zorder=6)
+    ax.plot([x, x + length_m * scale], [y, y], color="white", linewidth=2, zorder=7)
+    ax.text(
+        x,
+        y + 0.01 * (top - bottom),
+        f"{length_in_words(length_m)}; {_north(dataset)}",
+        zorder=7,
+        fontsize=8,
+        bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1.5},
+    )
+    ax.set_xlim(left, right)
+    ax.set_ylim(bottom, top)
+
+
+def _north(dataset: Dataset) -> str:
+    """Where true north lies on the sheet, which is drawn in the zone."""
+    centre = dataset.table(schema.FIELD.name).geometry.iloc[0].centroid
+    turned_deg = grid_north_deg(dataset.crs, centre.x, centre.y)
+    if abs(turned_deg) < 0.05:
+        return "north is up"
+    side = "left" if turned_deg > 0 else "right"
+    return f"true north {abs(turned_deg):.1f}\N{DEGREE SIGN} to the {side} of up"
+
+
+def _needed() -> None:
+    """Refuse in words where matplotlib is not installed."""
+    from importlib.util import find_spec
+
+    if find_spec("matplotlib") is None:
+        raise GeofieldError("Drawing this needs matplotlib.", hint="pip install 'geofield[plot]'")

@@ -22,7 +22,7 @@ PRODUCTS: list[tuple[str, dict[str, str]]] = [
 ]
 PRODUCTS += [("shapefile", {"profile": profile}) for profile in PROFILES]
 #: A terminal's files and AgOpenGPS's are of one field, or none.
-ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "report", "html")
+ONE_FIELD = ("isoxml", "isoxml-v3", "agopengps", "map", "map-svg", "map-pdf", "report", "html")
 
 
 def without(case):

@@ -111,3 +111,20 @@ def test_the_release_builds_for_every_python_that_is_promised() -> None:
         assert f'"{version}"' in workflow
     assert "id-token: write" in workflow
     assert "password" not in workflow.replace("no password", "")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        # Versions of Debian's packages are not pinned: their security updates are wanted.
+        ["hadolint", "--ignore", "DL3008", "Containerfile"],
+        ["zizmor", "--offline", "--quiet", "--no-progress", ".github/workflows/release.yml"],
+    ],
+    ids=["Containerfile", "workflow"],
+)
+def test_linters_are_content(command: list[str]) -> None:
+    program = Path(sys.executable).with_name(command[0])
+    done = subprocess.run(
+        [program, *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -202,6 +202,10 @@ def evaluate(
 ) -> Evaluation:
     """Compare detected obstacles with a truth.
 
+    >>> truth = gf.read_plan("sample_data/field_1.gpkg").obstacles
+    >>> gf.evaluate(truth, truth).pooled.f1
+    1.0
+
     Parameters
     ----------
     detected : GeoDataFrame, or mapping of picture name to GeoDataFrame

@@ -29,6 +29,9 @@ def plan_fields(
 ) -> Iterator[Plan]:
     """Plan many fields; each plan is handed out as soon as it is ready.
 
+    >>> for plan in gf.plan_fields("parcels.gpkg", spacing_m=4):      # doctest: +SKIP
+    ...     print(plan.field.name, plan.tracks.statistics.length_m)
+
     A place that cannot be planned gives a warning with the reason, and the others go on.
 
     Parameters
@@ -51,11 +54,6 @@ def plan_fields(
     ------
     Plan
         With the place's `field_id`, name and columns.
-
-    Examples
-    --------
-    >>> for plan in gf.plan_fields("parcels.gpkg", spacing_m=4):      # doctest: +SKIP
-    ...     print(plan.field.name, plan.tracks.statistics.length_m)
     """
     settings = with_values(settings, **by_name)
     found = places if isinstance(places, Places) else read_places(places, settings=settings)

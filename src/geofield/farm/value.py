@@ -39,6 +39,10 @@ class Source(Protocol):
 class Farm:
     """Many plans: a mapping of `field_id` to plan, and tables over all of them.
 
+    >>> farm = gf.read_farm("farm/")                                  # doctest: +SKIP
+    >>> farm.tracks.groupby("field_id")["length_m"].sum()             # doctest: +SKIP
+    >>> farm["7"].write("one/")                                       # doctest: +SKIP
+
     Tables are GeoDataFrames with `field_id` and `utm_epsg` in every row: in the metric CRS where
     all fields share one, else in WGS 84. Lengths (m) and areas (ha) in their columns are true.
 
@@ -46,12 +50,6 @@ class Farm:
     ----------
     plans : iterable of Plan
         Each with a `field_id` of its own.
-
-    Examples
-    --------
-    >>> farm = gf.read_farm("farm/")                                  # doctest: +SKIP
-    >>> farm.tracks.groupby("field_id")["length_m"].sum()             # doctest: +SKIP
-    >>> farm["7"].write("one/")                                       # doctest: +SKIP
     """
 
     def __init__(self, plans: Iterable[Plan] = ()) -> None:
@@ -345,6 +343,8 @@ def is_farm(folder: str | Path) -> bool:
 
 def read_farm(folder: str | Path) -> Farm:
     """Read a farm that ``geofield batch`` or :meth:`Farm.write` wrote, finished or not.
+
+    >>> farm = gf.read_farm("FARM/")  # doctest: +SKIP
 
     Parameters
     ----------

@@ -45,6 +45,11 @@ def extract_field(
 ) -> Field:
     """Find the outline of the field around a point.
 
+    >>> scene = gf.read_scene("sample_data/field_1.tif")
+    >>> field = gf.extract_field(scene, lat=35.075373, lon=33.531142)
+    >>> 3.0 < field.area_ha < 4.0
+    True
+
     Parameters
     ----------
     scene : Scene
@@ -155,6 +160,11 @@ def extract_field(
 
 def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     """What `extract_field` can keep between points; it can be pickled.
+
+    >>> scene = gf.read_scene("sample_data/field_1.tif")
+    >>> point = {"lat": 35.075373, "lon": 33.531142}
+    >>> search = gf.prepare_field(scene, **point)
+    >>> field = gf.extract_field(scene, **point, search=search, exclude=[(33.5325, 35.0743)])
 
     Parameters
     ----------

@@ -31,6 +31,10 @@ def read_scene(
 ) -> Scene:
     """Read the picture around a point.
 
+    >>> scene = gf.read_scene("sample_data/field_1.tif", lat=35.0754, lon=33.5311, size_m=150)
+    >>> scene.grid.shape
+    (250, 250)
+
     Any CRS and rotation is kept; only a picture whose pixels are not square on the ground is
     reprojected. 16 bit and floating point values are scaled to 0..255 by percentiles of the
     window. All of this is told in the scene's `notes`.
@@ -67,10 +71,6 @@ def read_scene(
         No CRS or no position.
     PointOutsideError
         The point lies outside, or on no data.
-
-    Examples
-    --------
-    >>> scene = read_scene("sample_data/field_1.tif", lat=35.0754, lon=33.5311)  # doctest: +SKIP
     """
     if (lat is None) != (lon is None):
         raise ImageryError("A point needs both lat and lon.", hint="Give both, or neither.")

@@ -43,6 +43,9 @@ _INTERPRETATION = {
 def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a scene as a COG with overviews, mask, provenance and its exact position.
 
+    >>> scene = gf.read_scene("sample_data/field_1.tif")
+    >>> gf.write_scene(scene, "copy.tif")  # doctest: +SKIP
+
     512 px blocks, DEFLATE with predictor 2, an internal mask only where the scene has pixels
     without data. Written beside the target and moved into place.
 

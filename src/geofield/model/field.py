@@ -68,6 +68,12 @@ class Alternative:
 class Field:
     """A field.
 
+    >>> import shapely
+    >>> box = shapely.box(500000, 3900000, 500200, 3900100)
+    >>> gf.Field(box, "EPSG:32636", name="North")
+    <Field 'North'
+      area 2.00 ha, perimeter 600 m, found by given, CRS EPSG:32636>
+
     Parameters
     ----------
     polygon : shapely.Polygon

@@ -53,6 +53,10 @@ class ImagerySource:
 class Scene:
     """A georeferenced picture in memory.
 
+    >>> scene = gf.read_scene("sample_data/field_1.tif")
+    >>> scene.rgb.shape, scene.source.licence
+    ((480, 480, 3), 'CC0-1.0')
+
     Attributes
     ----------
     grid : Grid

@@ -35,6 +35,11 @@ def points_per_segment(length_m: NDArray[np.float64], step_m: float) -> NDArray[
 class Tracks:
     """Planned tracks of one field.
 
+    >>> field = gf.read_plan("sample_data/field_1.gpkg").field
+    >>> tracks = gf.plan_tracks(field, spacing_m=6)
+    >>> len(tracks.lines), tracks.statistics.coverage_percent > 95
+    (31, True)
+
     Attributes
     ----------
     lines, segments, gaps : GeoDataFrame

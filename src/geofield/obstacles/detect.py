@@ -68,6 +68,11 @@ def detect_obstacles(
 ) -> gpd.GeoDataFrame:
     """Find the obstacles in a field.
 
+    >>> scene = gf.read_scene("sample_data/field_1.tif")
+    >>> field = gf.read_plan("sample_data/field_1.gpkg").field
+    >>> len(gf.detect_obstacles(scene, field)) > 10
+    True
+
     Parameters
     ----------
     scene : Scene or reader

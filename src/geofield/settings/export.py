@@ -31,6 +31,8 @@ FormatName = Literal[
     "study-xml",
     "scene",
     "map",
+    "map-svg",
+    "map-pdf",
     "report",
     "html",
 ]

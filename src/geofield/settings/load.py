@@ -23,6 +23,9 @@ def load_settings(
 ) -> Settings:
     """Settings from a TOML file, the environment and explicit values, the last one winning.
 
+    >>> gf.load_settings(None, {"tracks": {"spacing_m": 6}}).tracks.spacing_m
+    6.0
+
     Parameters
     ----------
     path : path, optional

@@ -53,6 +53,10 @@ class SimulatedField:
 def simulate_field(seed: int, settings: SimulationSettings | None = None) -> SimulatedField:
     """Draw one field from a seed.
 
+    >>> made = gf.simulate_field(7)
+    >>> len(made.obstacles) > 0
+    True
+
     Parameters
     ----------
     seed : int
@@ -91,6 +95,9 @@ def simulate_fields(
     equal_brightness_every: int = 3,
 ) -> Iterator[SimulatedField]:
     """Draw several fields, one at a time; every third has neighbours of its own grey level.
+
+    >>> [made.scene.grid.shape for made in gf.simulate_fields(2, seed=7)]
+    [(640, 640), (640, 640)]
 
     Parameters
     ----------

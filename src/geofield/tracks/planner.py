@@ -58,6 +58,12 @@ def plan_tracks(
 ) -> Tracks:
     """Plan parallel tracks through a field, around what stands in it.
 
+    >>> import shapely
+    >>> box = shapely.box(500000, 3900000, 500200, 3900100)
+    >>> tracks = gf.plan_tracks(box, crs="EPSG:32636", spacing_m=10, direction=90)
+    >>> len(tracks.lines)
+    10
+
     Parameters
     ----------
     polygon : shapely.Polygon or Field

@@ -39,6 +39,12 @@ def plan_route(
 ) -> Tracks:
     """Put the segments of planned tracks into an order, and find the ways between them.
 
+    >>> field = gf.read_plan("sample_data/field_1.gpkg").field
+    >>> tracks = gf.plan_tracks(field, spacing_m=20, headland_m=10)
+    >>> routed = gf.plan_route(tracks, pattern="boustrophedon", turning_radius_m=5)
+    >>> len(routed.turns) == len(tracks.segments) - 1
+    True
+
     Parameters
     ----------
     tracks : Tracks

@@ -1,0 +1,65 @@
+"""What stands on a map besides its lines: figures, credit, scale, and where a field goes on."""
+
+from __future__ import annotations
+
+import math
+
+import shapely
+
+from geofield import schema
+from geofield.model.dataset import Dataset
+from geofield.model.frame import along_frame
+from geofield.model.obstacles import active
+
+
+def figures_in_words(dataset: Dataset) -> list[str]:
+    """Name and area, obstacles, tracks: one line each."""
+    field = dataset.table("field").iloc[0]
+    obstacles, tracks = dataset.table("obstacles"), dataset.table("tracks")
+    lines = [f"{dataset.name}   {field['area_ha']:.2f} ha"]
+    certainty = field["certainty"]
+    if math.isfinite(certainty):
+        lines[0] += f"   outline {certainty:.0%} certain"
+    idle = {s: int((obstacles["status"] == s).sum()) for s in schema.NOT_AVOIDED}
+    others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
+    lines.append(counted(len(active(obstacles)), "obstacle") + (f" ({others})" if others else ""))
+    if len(tracks):
+        heading = field["heading_deg"]
+        lines.append(
+            f"{counted(len(tracks), 'track')}, "
+            f"{counted(int(tracks['segment_count'].sum()), 'segment')}, "
+            f"{tracks['length_m'].sum() / 1000:.2f} km, heading {heading:.1f}\N{DEGREE SIGN}"
+        )
+    return lines
+
+
+def credit_in_words(dataset: Dataset) -> str:
+    """Whose picture it is, under which licence, and when it was taken."""
+    source = dataset.provenance.source
+    credit = "  ".join(t for t in (source.attribution or source.name, source.licence) if t)
+    return f"{credit}  taken {source.date}".strip() if source.date else credit.strip()
+
+
+def frame_lines(dataset: Dataset) -> list[shapely.LineString]:
+    """Where the outline is the picture's frame; a parcel of the user's own is whole."""
+    field = dataset.table("field")
+    polygons = shapely.get_parts(field.geometry.to_numpy())
+    if not len(polygons) or field["method"].iloc[0] == "boundary":
+        return []
+    return [line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid)]
+
+
+def round_length_m(longest_m: float) -> float:
+    """The largest round length, 1, 2 or 5 times a power of ten, that is not longer."""
+    power = 10.0 ** math.floor(math.log10(longest_m))
+    return max(step * power for step in (1, 2, 5) if step * power <= longest_m)
+
+
+def length_in_words(length_m: float) -> str:
+    """Metres, or kilometres from 1000 on."""
+    return f"{length_m:g} m" if length_m < 1000 else f"{length_m / 1000:g} km"
+
+
+def counted(number: int, thing: str) -> str:
+    """``1 track``, ``2 tracks``."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

@@ -1,0 +1,68 @@
+"""The map as SVG and PDF: drawn as lines, with words that are words."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+import geofield as gf
+from geofield.simulate import SimulatedField
+
+pytest.importorskip("matplotlib")
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def maps(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("maps")
+    plan = gf.plan_field(
+        simulated.scene, lat=simulated.lat, lon=simulated.lon, spacing_m=10, name="Hill & Dale"
+    )
+    plan.write(folder, formats=["gpkg"])
+    geofield, plan_file = Path(sys.executable).with_name("geofield"), folder / "field.gpkg"
+    subprocess.run(
+        [geofield, "export", plan_file, "-f", "map-svg", "-f", "map-pdf", "--out", folder],
+        check=True,
+        capture_output=True,
+    )
+    return folder
+
+
+def test_the_svg_holds_lines_and_words(maps: Path) -> None:
+    plan = gf.read_plan(maps / "field.gpkg")
+    root = ET.parse(maps / "map.svg").getroot()
+    words = " ".join("".join(each.itertext()) for each in root.iter(f"{SVG}text"))
+    assert "Hill & Dale" in words
+    assert f"{len(plan.tracks.lines)} tracks, {len(plan.tracks.segments)} segments" in words
+    assert "true north" in words or "north is up" in words
+    assert "simulate" in words  # whose picture it is
+    drawn = [each.get("d", "") for each in root.iter(f"{SVG}path")]
+    assert len(drawn) > len(plan.tracks.segments)
+    assert len(list(root.iter(f"{SVG}image"))) == 1
+
+
+def test_the_pdf_is_one_page_of_a4(maps: Path) -> None:
+    data = (maps / "map.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", data)) == 1
+    (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", data)
+    long_mm, short_mm = (float(side) / 72 * 25.4 for side in box)
+    assert (long_mm, short_mm) == pytest.approx((297, 210), abs=1.5)
+    assert b"CreationDate" not in data
+
+
+def test_they_are_renewed_with_the_plan(maps: Path) -> None:
+    geofield = Path(sys.executable).with_name("geofield")
+    plan = maps / "field.gpkg"
+    subprocess.run([geofield, "tracks", plan, "--spacing", "20", "-o", plan], check=True)
+    before = (maps / "map.svg").read_text(encoding="utf-8")
+    subprocess.run([geofield, "refresh", plan], check=True)
+    after = (maps / "map.svg").read_text(encoding="utf-8")
+    assert after != before
+    assert f"{len(gf.read_plan(plan).tracks.lines)} tracks" in after
