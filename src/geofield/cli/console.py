@@ -25,6 +25,8 @@ import click
 Progress = Callable[..., None]
 
 _PROGRAM_WATCHES = False
+#: Signals that asked this command to stop.
+_STOPS: list[int] = []
 _LOG = logging.getLogger("geofield.cli")
 _LOG.addHandler(logging.NullHandler())
 
@@ -77,8 +79,20 @@ def progress_option() -> click.Option:
 def stop_cleanly() -> None:
     """Let SIGTERM end the work as Ctrl+C does: files half written are taken away first."""
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        _STOPS.clear()
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(kind, _stop)
         atexit.register(_stop_no_more)
+
+
+def _stop(number: int, _: Any) -> None:
+    _STOPS.append(number)
+    raise KeyboardInterrupt
+
+
+def was_stopped() -> bool:
+    """Whether a stop came: a library that was calling back may have made another error of it."""
+    return bool(_STOPS)
 
 
 def _stop_no_more() -> None:

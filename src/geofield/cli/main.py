@@ -8,12 +8,12 @@ from __future__ import annotations
 import importlib
 import sys
 import warnings
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from geofield import __version__
-from geofield.cli.console import progress_option, say_error, say_note, stop_cleanly
+from geofield.cli.console import progress_option, say_error, say_note, stop_cleanly, was_stopped
 from geofield.cli.log import end_log, log_options
 from geofield.errors import GeofieldError, GeofieldWarning
 
@@ -104,6 +104,11 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
         say_note(str(message))
 
 
+def _end_stopped() -> NoReturn:
+    click.echo("Stopped; nothing half-written is left.", err=True)
+    sys.exit(1)
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage."""
     with warnings.catch_warnings():
@@ -121,14 +126,20 @@ def main(args: list[str] | None = None) -> None:
             error.show()
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt):
-            click.echo("Stopped; nothing half-written is left.", err=True)
-            sys.exit(1)
+            _end_stopped()
         except GeofieldError as error:
+            if was_stopped():
+                _end_stopped()
             say_error(error.message, error.hint)
             sys.exit(error.exit_code)
         except BrokenPipeError:
             # The reader of our output (head, less) has gone: not our failure.
             sys.stderr.close()
             sys.exit(0)
+        except Exception:
+            # A library that was calling back makes an error of its own of a stop.
+            if not was_stopped():
+                raise
+            _end_stopped()
         finally:
             end_log()

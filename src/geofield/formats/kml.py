@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,7 +64,9 @@ def write(
     alone = len(datasets) == 1
     ET.SubElement(document, "name").text = datasets[0].name if alone else stem
     told = list(dict.fromkeys(map(lineage, datasets)))
-    ET.SubElement(document, "description").text = "\n".join(told)
+    # Programs show a description as HTML.
+    description = html.escape("\n".join(told), quote=False)
+    ET.SubElement(document, "description").text = description
     for name, (colour, width, fill) in _STYLES.items():
         _add_style(document, name, colour, width, fill)
     for layer in LAYERS:

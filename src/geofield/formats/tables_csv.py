@@ -22,6 +22,15 @@ if TYPE_CHECKING:
 DECIMALS = {"deg": 9, "px": 3, "m": 3, "1": 4}
 
 
+#: A spreadsheet takes a cell that begins so for a formula, and may run a program by it (OWASP).
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+
+
+def harmless(text: str) -> str:
+    """A text that no spreadsheet computes: with an apostrophe before what would be a formula."""
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``csv/track_points.csv`` and ``csv/obstacles.csv``: UTF-8, comma, decimal point."""
     points = folder / "csv" / "track_points.csv"
@@ -51,5 +60,7 @@ def _rounded(layer: Layer, chunk: gpd.GeoDataFrame, fields: pa.Schema) -> pa.Tab
         if column.type == "float":
             series = series.astype("float64")
             series = np.round(series, DECIMALS[column.unit])
+        elif column.type == "str":
+            series = series.map(harmless, na_action="ignore")
         arrays.append(arrow_values(column, series))
     return pa.table(arrays, schema=fields)

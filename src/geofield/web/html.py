@@ -85,6 +85,8 @@ def document(dataset: Dataset, scene: Scene | None = None) -> str:
     """
     values = plan_values(dataset, scene)
     data = json.dumps(values, ensure_ascii=False, separators=(",", ":"))
+    # No name can then end the script that holds it, or open a comment in it.
+    data = data.replace("<", "\\u003c")
     source = dataset.provenance.source
     credit = " · ".join(text for text in (source.attribution, source.licence, source.date) if text)
     style = page_file("vendor/ol.css").decode() + page_file("standalone.css").decode()
@@ -103,7 +105,7 @@ def document(dataset: Dataset, scene: Scene | None = None) -> str:
 <small id="place"></small>
 <small>{html.escape(credit)}</small><small>{html.escape(dataset.provenance.software)}</small></aside>
 <div id="popup"></div>
-<script type="application/json" id="plan">{_in_script(data)}</script>
+<script type="application/json" id="plan">{data}</script>
 <script type="module">
 {_in_script(script)}
 </script>

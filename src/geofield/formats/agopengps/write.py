@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,8 @@ def _field(name: str, plane: LocalPlane, day: str | None) -> list[str]:
         # The program passes over this line.
         f"{day} 00:00:00" if day else "imagery undated",
         "$FieldDir",
-        name,
+        # One line, whatever is in it: the next one would be taken for the offsets.
+        " ".join(re.split(r"[\x00-\x20\x7f\x85\u2028\u2029]+", name)).strip(),
         "$Offsets",
         "0,0",
         "Convergence",

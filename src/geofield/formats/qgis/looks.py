@@ -62,6 +62,11 @@ class Look:
     tip: str = ""
 
 
+def _shown(column: str) -> str:
+    """An expression for a column's text in a map tip, which is HTML: no tag of it counts."""
+    return f"replace(\"{column}\", map('&', '&amp;', '<', '&lt;'))"
+
+
 def _is(status: str) -> str:
     return f"\"status\" = '{status}'"
 
@@ -152,11 +157,13 @@ LOOKS: dict[str, Look] = {
                 above=True,
             ),
         ),
-        tip='<b>[% "name" %]</b><br>[% format_number("area_ha", 2) %] ha, '
+        tip=f"<b>[% {_shown('name')} %]</b><br>"
+        '[% format_number("area_ha", 2) %] ha, '
         '[% format_number("perimeter_m", 0) %] m around, imagery of [% "imagery_date" %]'
         "[% if(\"certainty\" IS NULL, '', "
         "'<br>outline ' || round(100 * \"certainty\") || ' % certain') %]"
-        "[% if(\"doubts\" IS NULL, '', '<br><b>Check the outline:</b> ' || \"doubts\") %]",
+        "[% if(\"doubts\" IS NULL, '', '<br><b>Check the outline:</b> ' || "
+        f"{_shown('doubts')}) %]",
     ),
     "obstacles": Look(
         tuple(_obstacle_rule(label, status) for label, status in OBSTACLE_RULES.items()),
@@ -172,7 +179,8 @@ LOOKS: dict[str, Look] = {
             ),
         ),
         max_scale=REGION_SCALE,
-        tip='<b>Obstacle [% "obstacle_no" %]</b>: [% "kind" %], [% "status" %]'
+        tip='<b>Obstacle [% "obstacle_no" %]</b>: '
+        f"[% {_shown('kind')} %], [% {_shown('status')} %]"
         "[% if(\"confidence\" IS NULL, '', ', confidence ' || round(\"confidence\", 2)) %]"
         "<br>[% if(\"radius_m\" IS NULL, '', 'radius ' || round(\"radius_m\", 1) || ' m + ') %]"
         'margin [% round("buffer_m", 1) %] m',
