@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -35,7 +36,7 @@ def build(folder: Path) -> Path:
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
     locked = (ROOT / "requirements" / "run.txt").read_text(encoding="utf-8")
     requirements = f"{locked}\ngeofield=={version} \\\n    --hash=sha256:{digest}\n"
-    metadata = (PLUGIN / "metadata.txt").read_text(encoding="utf-8")
+    metadata = (PLUGIN / "metadata.txt").read_text(encoding="utf-8") + _addresses()
     if f"\nversion={version}\n" not in metadata:
         raise SystemExit(f"metadata.txt does not say version={version}")
     target = folder / f"geofield_qgis-{version}.zip"
@@ -43,9 +44,24 @@ def build(folder: Path) -> Path:
         for file in sorted(PLUGIN.rglob("*")):
             name = file.relative_to(PLUGIN.parent)
             if file.is_file() and file.suffix in SUFFIXES and "__pycache__" not in name.parts:
-                _add(archive, str(name), file.read_bytes())
+                whole = metadata.encode() if file.name == "metadata.txt" else file.read_bytes()
+                _add(archive, str(name), whole)
         _add(archive, "geofield_qgis/requirements.txt", requirements.encode())
     return target
+
+
+def _addresses() -> str:
+    """Who to ask and where, as `pyproject.toml` says it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    author, urls = project["authors"][0], project["urls"]
+    lines = {
+        "author": author["name"],
+        "email": author["email"],
+        "homepage": urls["Homepage"],
+        "repository": urls["Repository"],
+        "tracker": urls["Issues"],
+    }
+    return "".join(f"{name}={value}\n" for name, value in lines.items())
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:

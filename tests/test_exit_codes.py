@@ -152,6 +152,7 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
         ("review", "review out/field.gpkg --port x"),
     ),
     "live": (("live",), (), ("live all",)),
+    "ready": (("ready",), (), ("ready now",)),
     "settings": (("settings", "settings --json"), (), ("settings tracks",)),
     "formats": (("formats", "formats --json"), (), ("formats gpkg",)),
     "sources": (("sources --json",), (), ("sources naip",)),

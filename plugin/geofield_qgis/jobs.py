@@ -11,6 +11,41 @@ from . import engine
 from .words import tr
 
 
+class Awake:
+    """A command line that has its libraries loaded already, for the next job.
+
+    Finding an outline takes about as long as loading what that needs.
+    """
+
+    def __init__(self) -> None:
+        self._process: QProcess | None = None
+
+    def wake(self) -> None:
+        """Have one; nothing happens where there is one, or no engine."""
+        if self._process is not None and self._process.state() != QProcess.ProcessState.NotRunning:
+            return
+        try:
+            command = engine.require_engine()
+        except engine.EngineError:
+            return  # the job itself says so
+        self._process = QProcess()
+        self._process.setProcessEnvironment(engine.clean_environment())
+        self._process.start(command, ["ready"])
+
+    def take(self) -> QProcess | None:
+        """The one that waits, if it still does; it belongs to the caller."""
+        process, self._process = self._process, None
+        if process is None or process.state() != QProcess.ProcessState.Running:
+            return None
+        return process
+
+    def sleep(self) -> None:
+        """Let it go."""
+        process, self._process = self._process, None
+        if process is not None:
+            engine.stop(process)
+
+
 class Job(QObject):
     """One command; tells how far it is, and ends in `done` or `failed`."""
 
@@ -18,17 +53,30 @@ class Job(QObject):
     done = pyqtSignal(object)
     failed = pyqtSignal(str)
 
-    def __init__(self, words: list[str], environment: dict[str, str], parent: QObject) -> None:
+    def __init__(
+        self,
+        words: list[str],
+        environment: dict[str, str],
+        parent: QObject,
+        awake: Awake | None = None,
+    ) -> None:
         super().__init__(parent)
         self._stopped = False
         self._reader = engine.Reader(self.progressed.emit, lambda line: None)
-        self._process = QProcess(self)
-        self._process.setProcessEnvironment(engine.clean_environment(environment))
+        words = [*words, "--progress", "json"]
+        # One that is awake already has the plain environment.
+        waiting = None if awake is None or environment else awake.take()
+        self._process = waiting or QProcess()
+        self._process.setParent(self)
         self._process.readyReadStandardError.connect(self._read)
         self._process.readyReadStandardOutput.connect(self._read)
         self._process.finished.connect(self._finish)
         self._process.errorOccurred.connect(self._fail_to_start)
-        self._process.start(engine.require_engine(), [*words, "--progress", "json"])
+        if waiting is not None:
+            waiting.write(json.dumps(words).encode() + b"\n")
+            return
+        self._process.setProcessEnvironment(engine.clean_environment(environment))
+        self._process.start(engine.require_engine(), words)
 
     def stop(self) -> None:
         """End the command; neither `done` nor `failed` follows."""

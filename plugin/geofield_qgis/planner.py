@@ -21,7 +21,7 @@ from qgis.PyQt.QtCore import QObject, QSettings, QStandardPaths, pyqtSignal
 from qgis.PyQt.QtWidgets import QProgressBar, QPushButton
 
 from . import description, engine, plan_files, results, sources
-from .jobs import Job
+from .jobs import Awake, Job
 from .map_tools import band
 from .words import tr
 
@@ -51,6 +51,8 @@ class Planner(QObject):
         }
         self._points = band(canvas, QgsWkbTypes.GeometryType.PointGeometry, "#00c853", 6)
         self._job: Job | None = None
+        #: The next command line, loading its libraries while a person looks where to click.
+        self.awake = Awake()
         self._item: Any = None
         self._bar: QProgressBar | None = None
         self._target: Path | None = None
@@ -98,8 +100,9 @@ class Planner(QObject):
         self._here = None
 
     def remove(self) -> None:
-        """Leave nothing on the map."""
+        """Leave nothing on the map, and no process."""
         self.clear()
+        self.awake.sleep()
         scene = self.iface.mapCanvas().scene()
         for each in (*self._sketch.values(), self._points):
             scene.removeItem(each)
@@ -151,7 +154,7 @@ class Planner(QObject):
         self._clear_message()
         self._show_progress(titles[stage])
         try:
-            job = Job(words, self._environment, self)
+            job = Job(words, self._environment, self, self.awake)
         except engine.EngineError as error:
             self._fail(str(error))
             return
@@ -159,6 +162,7 @@ class Planner(QObject):
         job.failed.connect(self._fail)
         job.done.connect(lambda result: self._done(stage, result))
         self._job = job
+        self.awake.wake()
 
     def _done(self, stage: str, result: engine.Result) -> None:
         target = str(self._target)

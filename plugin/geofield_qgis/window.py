@@ -50,6 +50,7 @@ class Window:
         self.dialog: EngineDialog | None = None
         self.planner.finished.connect(self._planned)
         self.planner.engine_missing.connect(self._offer_engine)
+        self.tool.deactivated.connect(self.planner.awake.sleep)
 
     def close(self) -> None:
         """Leave the window as it was before."""
@@ -83,6 +84,7 @@ class Window:
 
     def _take_tool(self) -> None:
         self.iface.mapCanvas().setMapTool(self.tool)
+        self.planner.awake.wake()
 
     def _offer_engine(self, why: str) -> None:
         """Say what is missing, with the way to it."""

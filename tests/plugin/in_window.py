@@ -18,6 +18,7 @@ from qgis.core import (
     QgsProject,
     QgsRasterLayer,
     QgsRectangle,
+    QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QPoint, Qt, QTimer
 from qgis.PyQt.QtTest import QTest
@@ -105,6 +106,9 @@ def work():
     until(lambda: finished, 200, "tracks")
     ANSWER["outline_s"] = ours.planner.outline_s
     ANSWER["plan"] = finished[0]
+    outline = QgsVectorLayer(f"{finished[0]}|layername=field", "outline", "ogr")
+    ANSWER["area_ha"] = next(outline.getFeatures())["area_ha"]
+    del outline
     ANSWER["project_crs"] = project.crs().authid()
     ANSWER["groups"] = {
         group.name(): [node.name() for node in group.findLayers()]
@@ -219,6 +223,19 @@ def work():
         [each for each in project.mapLayers().values() if each.name() == "Obstacles"]
     )
 
+    # Ground taken away with Alt.
+    finished.clear()
+    west = pixel_of(ASKED["lon"] - 0.0009, ASKED["lat"])
+    ANSWER["west"] = [ASKED["lon"] - 0.0009, ASKED["lat"]]
+    QTest.mouseClick(
+        canvas.viewport(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.AltModifier, west
+    )
+    until(lambda: finished, 200, "planned with less ground")
+    ANSWER["without"] = finished[0]
+    ANSWER["outline_again_s"] = ours.planner.outline_s
+    until(lambda: not dock.live.busy, 60, "figures without")
+    ANSWER["waiting"] = ours.planner.awake._process.processId()
+
     # The dialogues, for a person to look at.
     import processing
 
@@ -244,7 +261,8 @@ def work():
     ANSWER["after_reload"] = [len(names(QDockWidget)), len(names(QToolBar))]
     plugins["geofield_qgis"].unload()
     QTest.qWait(300)
-    ANSWER["engine_left"] = Path(f"/proc/{awake}").exists()
+    left = [Path(f"/proc/{each}").exists() for each in (awake, ANSWER["waiting"])]
+    ANSWER["engine_left"] = any(left)
     ANSWER["after_unload"] = [len(names(QDockWidget)), len(names(QToolBar))]
 
 

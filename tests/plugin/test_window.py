@@ -9,8 +9,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import shapely
 from plugin_place import CLIENT, SAMPLE
 
+from geofield.crs import LONLAT, transformer
 from geofield.formats import read_dataset
 from geofield.plan import read_plan
 
@@ -60,8 +62,7 @@ def seen(qgis_environment, tmp_path_factory):
 
 def test_a_click_plans_the_field(seen):
     assert seen["project_crs"] == "EPSG:3857"
-    plan = read_dataset(Path(seen["plan"]))
-    assert 3.5 < plan.table("field")["area_ha"].iloc[0] < 3.8
+    assert 3.5 < seen["area_ha"] < 3.8
     (layers,) = seen["groups"].values()
     assert layers.index("Obstacles") < layers.index("Tracks") < layers.index("Field")
     # Four seconds on a machine that has nothing else to do.
@@ -112,6 +113,17 @@ def test_shift_adds_ground_and_keeps_what_was_said(seen):
     assert place == pytest.approx((33.531442, 35.075673), abs=1e-5)
     # What stands where a person saw it stays; the outline may have brought others in.
     assert set(plan.obstacles["status"]) >= {"confirmed", "rejected", "added"}
+
+
+def test_alt_takes_ground_away(seen):
+    assert seen["without"] == seen["plan"]
+    plan = read_plan(Path(seen["without"]))
+    (place,) = plan.settings.field.exclude
+    assert place == pytest.approx(seen["west"], abs=1e-5)
+    crs = plan.field.crs
+    west = shapely.Point(transformer(LONLAT, crs).transform(*seen["west"]))
+    assert not plan.field.polygon.contains(west)
+    assert seen["outline_again_s"] < 60.0
 
 
 def test_nothing_is_left_after_unloading(seen):

@@ -1451,7 +1451,7 @@
     <message>
       <location filename="description.py" />
       <source>Plan files</source>
-      <translation type="unfinished" />
+      <translation>Plan-Dateien</translation>
     </message>
     <message>
       <location filename="description.json" />

@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "review": ("geofield.cli.review:review", "Correct a plan on a page in the browser."),
     "undo": ("geofield.cli.undo:undo", "Bring back the plan before the last run."),
     "live": ("geofield.cli.live:live", ""),  # for programs: not in the list that people see
+    "ready": ("geofield.cli.ready:ready", ""),
     "refresh": ("geofield.cli.refresh:refresh", "Write all products beside a plan anew."),
     "export": ("geofield.cli.export:export", "Write other formats from a plan."),
     "import": ("geofield.cli.import_:import_", "Read other programs' boundaries and lines."),
