@@ -20,6 +20,7 @@ from geofield.settings import (
     load_settings,
     with_values,
 )
+from geofield.settings.whole import names_of
 
 
 @pytest.fixture(autouse=True)
@@ -144,19 +145,72 @@ def test_what_a_product_records_opens_no_way() -> None:
     assert from_mapping(recorded).fetch.allow == ()
 
 
-def test_settings_and_stages_agree_on_defaults() -> None:
-    from geofield.obstacles import detect_obstacles
-    from geofield.tracks import plan_tracks
+def defaults() -> dict[str, list[Any]]:
+    """Every setting of a section with its default: "none" is what Python calls None."""
+    known: dict[str, list[Any]] = {}
+    for section in SECTIONS:
+        values = getattr(Settings(), section)
+        for name in names_of(section):
+            value = getattr(values, name)
+            known.setdefault(name, []).append(None if value == "none" else value)
+    return known
 
-    for section, stage in (("obstacles", detect_obstacles), ("tracks", plan_tracks)):
-        own = dict(getattr(Settings(), section))
-        given = inspect.signature(stage).parameters
-        shared = {
-            name for name in own if name in given and given[name].default is not given[name].empty
-        }
-        assert len(shared) > 5
-        own = {name: None if value == "none" else value for name, value in own.items()}
-        assert {n: own[n] for n in shared} == {n: given[n].default for n in shared}
+
+def test_no_function_has_another_default_than_the_settings() -> None:
+    import geofield as gf
+
+    known, met = defaults(), 0
+    public: list[Any] = [getattr(gf, name) for name in gf.__all__]
+    methods: list[Any] = [gf.Plan.write, gf.Plan.to_graph, gf.Plan.plot, gf.Plan.explore]
+    for function in (*filter(inspect.isfunction, public), *methods):
+        for name, parameter in inspect.signature(function).parameters.items():
+            own = None if parameter.default == "none" else parameter.default
+            if name not in known or own is inspect.Parameter.empty:
+                continue
+            met += 1
+            # None where there is another default: as the settings say.
+            assert own is None or own in known[name], f"{function.__name__}({name}=)"
+    assert met > 40
+
+
+def test_no_option_has_a_default_of_its_own() -> None:
+    import click
+
+    from geofield.cli.main import cli
+
+    known, met = defaults(), 0
+    waiting: list[click.Command] = [cli]
+    for command in waiting:
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            found = (command.get_command(context, name) for name in command.list_commands(context))
+            waiting += [each for each in found if each is not None]
+        unsaid = command.make_context("it", [], resilient_parsing=True).params
+        for option, value in unsaid.items():
+            name = option.rpartition("__")[2]
+            if name in known:
+                met += 1
+                assert value in (None, (), *known[name]), f"{command.name}: {name}"
+    assert met > 150
+
+
+def test_fetching_has_the_defaults_of_the_settings_and_of_the_command() -> None:
+    import click
+
+    from geofield.cli.main import cli
+    from geofield.imagery import FetchOptions, Where
+
+    own, fetch = FetchOptions(), Settings().fetch
+    assert (own.threads, own.allow) == (fetch.threads, fetch.allow)
+    assert own.cache_max_bytes == fetch.cache_max_mb * 2**20
+    assert own.cache_max_age_s == fetch.cache_max_days * 86400
+    tiles = cli.get_command(click.Context(cli), "tiles")
+    said = tiles.make_context("tiles", [], resilient_parsing=True).params
+    for name in ("resolution_m", "missing"):
+        stage = inspect.signature(
+            Where if name in inspect.signature(Where).parameters else FetchOptions
+        )
+        assert said[name] == stage.parameters[name].default, name
 
 
 MACHINES = """

@@ -94,6 +94,20 @@ def test_two_names_swapped_in_the_table_are_noticed(several, monkeypatch, tmp_pa
         assert not np.array_equal(again, scores), (one, other)
 
 
+def test_two_names_swapped_in_the_calibration_are_noticed(figures, monkeypatch, tmp_path):
+    evidence = {**figures, "expected_overlap": 1.3, "belief_alike": 0.6, "belief_same": 0.4}
+    for what, weights in trained().calibration.items():
+        right = trained().certainty(what, evidence)
+        for one, other in itertools.combinations(weights.keys() - {"constant"}, 2):
+
+            def swap(known, what=what, one=one, other=other):
+                told = known["calibration"]["all"][what]
+                told[one], told[other] = told[other], told[one]
+
+            again = table(monkeypatch, tmp_path, swap).certainty(what, evidence)
+            assert abs(again - right) > 1e-6, (what, one, other)
+
+
 def test_a_table_of_another_version_is_refused(monkeypatch, tmp_path):
     with pytest.raises(FieldError, match=r"outline_ranking\.json"):
         table(monkeypatch, tmp_path, lambda known: known.pop("calibration"))

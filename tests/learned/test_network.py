@@ -1,15 +1,19 @@
 """Networks of the package: loaded once, named channels, any thread, other processes."""
 
+import itertools
 import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pytest
 
 from geofield.errors import GeofieldError
+from geofield.field.network import points_maps, seen
 from geofield.learned import network
+from geofield.obstacles.crowns import answers, centres
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,60 @@ def test_outputs_are_what_their_names_say(crowns, picture, simulated):
         assert named["centre"][near].max() > named["centre"].mean() + 3
         assert named["cover"][at] > 0
         assert np.exp(named["log_radius"][at]) == pytest.approx(radius, rel=0.35)
+
+
+def noticed(named, trees):
+    """How far from the truth answers are: votes missing, places, radii, cover and other things."""
+    found = centres(named)
+    far = np.hypot(found.x_px[:, None] - trees[:, 0], found.y_px[:, None] - trees[:, 1])
+    nearest = far.argmin(axis=0)
+    row, column = (trees[:, 1] // 2).astype(int), (trees[:, 0] // 2).astype(int)
+    return np.array(
+        [
+            far.min(axis=0),
+            np.log(found.radius_px[nearest] / trees[:, 2]),
+            np.log(found.strength[nearest]),
+            named["cover"][row, column],
+            named["other"][row, column],
+        ]
+    )
+
+
+def test_every_output_of_the_network_has_a_part(crowns, picture, simulated, monkeypatch):
+    """Two outputs swapped in the model's description change what is found, whichever they are."""
+    trees = simulated.obstacles[["x_px", "y_px", "radius_px"]].to_numpy() - [80, 80, 0]
+    trees = trees[((trees[:, :2] > 8) & (trees[:, :2] < 152)).all(axis=1)]
+    right = noticed(answers(picture), trees)
+    assert (right[0] < 3).all()
+    assert (np.abs(right[1]) < 0.35).all()
+    assert (right[3] > 0.5).all()
+    assert (right[4] < 0.5).all()
+    for one, other in itertools.combinations(crowns.outputs, 2):
+        order = [{one: other, other: one}.get(name, name) for name in crowns.outputs]
+        model = replace(crowns, outputs=tuple(order))
+        monkeypatch.setattr("geofield.obstacles.crowns.network", lambda _, model=model: model)
+        try:
+            change = np.abs(noticed(answers(picture), trees) - right)
+        except (ValueError, IndexError):
+            continue  # nothing is found any more
+        assert not change.max() < 0.1, (one, other)
+
+
+def test_every_channel_of_the_outlines_network_has_a_part(simulated):
+    """Two inputs swapped change the answer, whichever they are."""
+    outlines = network("outline")
+    bands = seen(simulated.scene).bands
+    points = points_maps([(128.5, 120.5), (90.5, 150.5)], [(10.5, 20.5)])
+    often = bands.shape[1] // points.shape[1]
+    large = points.repeat(often, axis=1).repeat(often, axis=2)
+    batch = np.concatenate([bands, large])[None]
+    assert batch.shape[1] == len(outlines.inputs)
+    right = outlines(batch)
+    for i, j in itertools.combinations(range(batch.shape[1]), 2):
+        order = np.arange(batch.shape[1])
+        order[[i, j]] = j, i
+        change = np.abs(outlines(batch[:, order]) - right).max()
+        assert change > 0.05, (outlines.inputs[i], outlines.inputs[j])
 
 
 def test_threads_and_pickles_get_the_same_answer(crowns, picture):
