@@ -73,3 +73,37 @@ def test_the_map_is_the_same_twice_and_needs_no_picture(
 def test_a_field_alone_is_drawn_too(simulated: SimulatedField) -> None:
     picture = draw_map(Plan(simulated.field).to_dataset(), long_side_px=400)
     assert picture.mode == "RGB"
+
+
+def test_no_number_is_cut_or_lies_on_another() -> None:
+    from geofield.map_labels import OBSTACLE_LOOK, TRACK_LOOK, Label, draw_labels
+
+    image = Image.new("RGB", (200, 100))
+    labels = [Label(-4, 50, "128", OBSTACLE_LOOK), Label(199, 99, "7", OBSTACLE_LOOK)]
+    labels += [Label(80 + 4 * k, 40, str(k), TRACK_LOOK) for k in range(12)]
+    boxes = draw_labels(image, labels)
+    assert len(labels) > len(boxes) > 4
+    for number, (left, top, right, bottom) in enumerate(boxes):
+        assert min(left, top) >= 0
+        assert right <= 200
+        assert bottom <= 100
+        for other in boxes[number + 1 :]:
+            assert not (
+                left < other[2] and other[0] < right and top < other[3] and other[1] < bottom
+            )
+
+
+def test_tracks_show_on_white_ground(plan: Plan, simulated: SimulatedField) -> None:
+    from dataclasses import replace
+
+    white = replace(simulated.scene, bands=np.full_like(simulated.scene.bands, 255))
+    picture = draw_map(plan.to_dataset(), white, long_side_px=1000)
+    assert plan.tracks is not None
+    scale = 1000 / white.grid.width_px
+    middles = plan.tracks.segments.geometry.interpolate(0.5, normalized=True)
+    x, y = white.grid.from_crs(middles.x.to_numpy(), middles.y.to_numpy(), plan.field.crs)
+    dark = [
+        np.asarray(picture)[int(b) - 9 : int(b) + 10, int(a) - 9 : int(a) + 10].min() < 130
+        for a, b in zip(x * scale, y * scale, strict=True)
+    ]
+    assert np.mean(dark) > 0.95

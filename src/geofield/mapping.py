@@ -18,6 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from geofield import schema, theme
 from geofield.grid import Grid
+from geofield.map_labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw_labels
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
     credit_in_words,
@@ -119,9 +120,9 @@ class _Canvas:
         self.grid, self.size, self.dataset = grid, size, dataset
         self.large = (size[0] * _OVERSAMPLING, size[1] * _OVERSAMPLING)
         self.factor = self.large[0] / grid.width_px
-        self.image = Image.new("RGBA", self.large, (70, 74, 70, 255))
+        self.image = Image.new("RGB", self.large, (70, 74, 70))
         self.draw = ImageDraw.Draw(self.image, "RGBA")
-        self.labels: list[tuple[float, float, str]] = []
+        self.labels: list[Label] = []
 
     def picture(self, scene: Scene, margin_px: int) -> None:
         rgb = scene.rgb.copy()
@@ -134,7 +135,7 @@ class _Canvas:
         self.image.paste(picture, (corner, corner))
 
     def tables(self) -> None:
-        line = 1.1 * _OVERSAMPLING
+        line = 1.4 * _OVERSAMPLING
         segments = self.dataset.table("segments")
         gaps, around = self.dataset.table("gaps"), self.dataset.table("headland_tracks")
         turns, route = self.dataset.table("turns"), self.dataset.table("route")
@@ -172,11 +173,16 @@ class _Canvas:
         colour = theme.rgb(color)
         for part in shapely.get_parts(np.array(list(shapes), dtype=object)):
             points = self.pixels(shapely.get_coordinates(part))
-            if dash is None:
-                self.draw.line(points.ravel().tolist(), fill=colour, width=round(width))
-                continue
-            for a, b in _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING):
-                self.draw.line([*a, *b], fill=colour, width=round(width))
+            strokes = (
+                [points.ravel().tolist()]
+                if dash is None
+                else [[*a, *b] for a, b in _dashes(points, *(n * _OVERSAMPLING for n in dash))]
+            )
+            # Dark below, so that a light line shows on light ground, too.
+            for stroke in strokes:
+                self.draw.line(stroke, fill=_CASING, width=round(width + 1.0 * _OVERSAMPLING))
+            for stroke in strokes:
+                self.draw.line(stroke, fill=colour, width=round(width))
 
     def outlines(
         self,
@@ -204,27 +210,20 @@ class _Canvas:
             for number, shape in zip(obstacles["obstacle_no"], obstacles.geometry, strict=True):
                 x0, _, x1, y1 = shape.bounds
                 corner = self.pixels(np.array([[(x0 + x1) / 2 + 0.38 * (x1 - x0), y1]]))[0]
-                self.labels.append((corner[0], corner[1], str(number)))
+                self.label(corner, number, OBSTACLE_LOOK)
         first = segments.drop_duplicates("track_no")
         step = max(1, math.ceil(len(first) / _MAX_LABELS))
         for number, shape in zip(first["track_no"][::step], first.geometry[::step], strict=True):
             start = self.pixels(shapely.get_coordinates(shape)[:1])[0]
-            self.labels.append((start[0], start[1], str(number)))
+            self.label(start, number, TRACK_LOOK)
+
+    def label(self, at: NDArray[np.float64], number: int, look: Look) -> None:
+        x, y = (at / _OVERSAMPLING).tolist()
+        self.labels.append(Label(x, y, str(number), look))
 
     def finish(self) -> Image.Image:
-        image = self.image.resize(self.size, Image.Resampling.LANCZOS).convert("RGB")
-        draw = ImageDraw.Draw(image)
-        font = ImageFont.load_default(12)
-        for x, y, text in self.labels:
-            draw.text(
-                (x / _OVERSAMPLING, y / _OVERSAMPLING),
-                text,
-                font=font,
-                fill=_INK[:3],
-                anchor="mm",
-                stroke_width=2,
-                stroke_fill=(0, 0, 0),
-            )
+        image = self.image.reduce(_OVERSAMPLING)
+        draw_labels(image, self.labels)
         return image
 
 

@@ -1,0 +1,71 @@
+"""Numbers on the map picture: how they look, and that none is cut or lies on another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from PIL import Image, ImageDraw, ImageFont
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a number is written."""
+
+    size_px: int
+    ink: tuple[int, int, int]
+    around: tuple[int, int, int]
+
+
+#: Of different look, so that nobody takes the one for the other.
+OBSTACLE_LOOK = Look(13, (255, 255, 255), (0, 0, 0))
+TRACK_LOOK = Look(11, (20, 24, 28), (235, 238, 240))
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A number and the place of its middle, pixels."""
+
+    x_px: float
+    y_px: float
+    text: str
+    look: Look
+
+
+def draw_labels(image: Image.Image, labels: Iterable[Label]) -> list[Box]:
+    """Write numbers into a picture, the first ones first; what would lie on one is left out.
+
+    Returns
+    -------
+    list of (left, top, right, bottom)
+        Where they are, pixels.
+    """
+    draw = ImageDraw.Draw(image)
+    taken: list[Box] = []
+    for each in labels:
+        look = each.look
+        font = ImageFont.load_default(look.size_px)
+        half, rise = font.getlength(each.text) / 2 + 3, look.size_px / 2 + 2
+        x = min(max(each.x_px, half), image.width - half)
+        y = min(max(each.y_px, rise), image.height - rise)
+        box = (x - half, y - rise, x + half, y + rise)
+        if any(_overlap(box, other) for other in taken):
+            continue
+        taken.append(box)
+        draw.text(
+            (x, y),
+            each.text,
+            font=font,
+            fill=look.ink,
+            anchor="mm",
+            stroke_width=2,
+            stroke_fill=look.around,
+        )
+    return taken
+
+
+def _overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes share ground."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
