@@ -12,6 +12,7 @@ TARGET = Path(__file__).parent / "geofield_qgis" / "description.json"
 #: Commands that the plugin has a tool for.
 COMMANDS = (
     "run", "field", "obstacles", "tracks", "tiles", "export", "import", "validate", "evaluate",
+    "batch",
 )  # fmt: skip
 
 

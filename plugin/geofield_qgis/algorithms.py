@@ -68,6 +68,62 @@ class PlanAlgorithm(GeofieldAlgorithm):
         }
 
 
+class ManyFieldsAlgorithm(GeofieldAlgorithm):
+    """Any number of fields into one farm."""
+
+    identifier, title, section, command = "batch", "Plan many fields", FIELD, "batch"
+    own = GeofieldAlgorithm.own | {
+        "places", "imagery", "out", "obstacle_file", "layer", "places_crs", "lat_column",
+        "lon_column", "overview", "scheduler",
+    }  # fmt: skip
+    makes_plan = True
+
+    def add_inputs(self) -> None:
+        """Points or parcels, picture and folder."""
+        self.addParameter(
+            QgsProcessingParameterFeatureSource(
+                "PLACES", tr("Points in the fields, or parcels"), [compat.VECTORS]
+            )
+        )
+        self.add_picture()
+        self.addParameter(
+            QgsProcessingParameterFeatureSource(
+                "OBSTACLES_TO_AVOID",
+                tr("Obstacles to avoid: polygons, points with radius_m, lines"),
+                [compat.VECTORS],
+                optional=True,
+            )
+        )
+        self.addParameter(
+            QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder of the farm"))
+        )
+        self.addOutput(QgsProcessingOutputNumber("FIELDS", tr("Fields planned")))
+
+    def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
+        """See GeofieldAlgorithm."""
+        words = self.source_words("PLACES", "", values, context, feedback, folder)
+        environment: dict[str, str] = {}
+        if values.get("IMAGERY") or values.get("SOURCE"):
+            picture, environment = self.picture_words(values, context)
+            words += picture
+        words += self.source_words(
+            "OBSTACLES_TO_AVOID", "--obstacles", values, context, feedback, folder
+        )
+        return [*words, "--out", self.parameterAsString(values, "OUTPUT", context), "--json"], (
+            environment
+        )
+
+    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
+        """See GeofieldAlgorithm."""
+        folder = self.parameterAsString(values, "OUTPUT", context)
+        counts = result.data or {}
+        return {
+            "OUTPUT": folder,
+            "FIELDS": sum(counts.get(name, 0) for name in ("done", "doubtful")),
+            **self.plan_outputs(Path(folder) / "farm.gpkg", values, context),
+        }
+
+
 class OutlineAlgorithm(GeofieldAlgorithm):
     """The outline of the field around a point."""
 
@@ -125,7 +181,7 @@ class TracksAlgorithm(GeofieldAlgorithm):
     """Tracks on any polygons, or on a plan with all that a person changed in it."""
 
     identifier, title, section, command = "tracks", "Plan the tracks", STAGES, "tracks"
-    own = GeofieldAlgorithm.own | {"file", "output", "obstacle_file", "crs"}
+    own = GeofieldAlgorithm.own | {"file", "output", "obstacle_file", "crs", "each"}
     makes_plan = True
 
     def add_inputs(self) -> None:
@@ -163,7 +219,7 @@ class TracksAlgorithm(GeofieldAlgorithm):
         )
         output = self.parameterAsString(values, "OUTPUT", context)
         Path(output).mkdir(parents=True, exist_ok=True)
-        return [*words, "-o", output, *obstacles, "--json"], {}
+        return [*words, "-o", output, "--each", *obstacles, "--json"], {}
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""
@@ -375,6 +431,7 @@ ALGORITHMS = (
     ObstaclesAlgorithm,
     TracksAlgorithm,
     RouteAlgorithm,
+    ManyFieldsAlgorithm,
     ImageryAlgorithm,
     ExportAlgorithm,
     ImportAlgorithm,

@@ -12,6 +12,7 @@ import rasterio
 from plugin_place import POINT, ROOT, SAMPLE
 from rasterio.warp import transform
 
+import geofield as gf
 from geofield.formats import read_dataset
 
 COMMAND = "/usr/bin/qgis_process.bin"  # Debian's wrapper around it is broken
@@ -99,3 +100,21 @@ def _middle(chip):
         x, y = data.xy(data.height // 2, data.width // 2)
         (lon,), (lat,) = transform(data.crs, "EPSG:4326", [x], [y])
     return round(lon, 7), round(lat, 7)
+
+
+def test_many_fields_at_once(process, tmp_path):
+    shapes = [
+        {"type": "Feature", "properties": {"name": name},
+         "geometry": {"type": "Point", "coordinates": [lon, 35.075373]}}
+        for name, lon in (("field", 33.531142),)
+    ]  # fmt: skip
+    places = tmp_path / "places.geojson"
+    places.write_text(json.dumps({"type": "FeatureCollection", "features": shapes}))
+    farm = process(
+        "batch", PLACES=places, IMAGERY=SAMPLE, SPACING_M=6, WORKERS=1, OUTPUT=tmp_path / "farm"
+    )
+    assert farm["FIELDS"] == 1
+    made = gf.read_farm(tmp_path / "farm")
+    assert len(made) == 1
+    assert 3.5 < made.fields["area_ha"].iloc[0] < 3.8
+    assert farm["FIELD"] == f"{tmp_path}/farm/farm.gpkg|layername=field"

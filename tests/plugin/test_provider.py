@@ -65,7 +65,7 @@ def test_algorithms_have_all_that_a_dialogue_shows(known):
         f"geofield:{name}"
         for name in (
             "plan", "outline", "obstacles", "tracks", "route", "imagery", "export", "import",
-            "validate", "evaluate",
+            "validate", "evaluate", "batch",
         )
     }  # fmt: skip
     for name, algorithm in known["algorithms"].items():

@@ -60,6 +60,11 @@
     </message>
     <message>
       <location filename="algorithms.py" />
+      <source>Plan many fields</source>
+      <translation>Viele Felder planen</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
       <source>Find the outline</source>
       <translation>Umriss finden</translation>
     </message>
@@ -125,8 +130,8 @@
     </message>
     <message>
       <location filename="algorithms.py" />
-      <source>Fields</source>
-      <translation>Felder</translation>
+      <source>Points in the fields, or parcels</source>
+      <translation>Punkte in den Feldern, oder Schläge</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
@@ -135,13 +140,23 @@
     </message>
     <message>
       <location filename="algorithms.py" />
-      <source>Folder for the plans</source>
-      <translation>Ordner für die Pläne</translation>
+      <source>Folder of the farm</source>
+      <translation>Ordner des Betriebs</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
       <source>Fields planned</source>
       <translation>Geplante Felder</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Fields</source>
+      <translation>Felder</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
+      <source>Folder for the plans</source>
+      <translation>Ordner für die Pläne</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
@@ -1286,7 +1301,7 @@
     <message>
       <location filename="description.py" />
       <source>Each</source>
-      <translation type="unfinished" />
+      <translation>Einzeln</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1631,6 +1646,131 @@
     <message>
       <location filename="description.json" />
       <source>Picture to draw them on.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Places</source>
+      <translation>Orte</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Folder of the farm, or s3://BUCKET/FOLDER; where it is begun already, only what is missing is done.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Workers</source>
+      <translation>Arbeiter</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Worker processes on this machine; one per core by default.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Scheduler</source>
+      <translation>Verteiler</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of a Dask cluster: tcp://HOST:8786.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Plan all anew where the farm is of other work; what a person reviewed stays.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Overview</source>
+      <translation>Übersicht</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Write farm.gpkg and farm.qgz for QGIS at the end.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Retry</source>
+      <translation>Noch einmal versuchen</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Try places again that failed or were lost.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Time limit s</source>
+      <translation>Zeitgrenze (s)</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of one field, seconds.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Memory limit (MB)</source>
+      <translation>Speichergrenze (MB)</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Of a worker, megabytes.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Layer of PLACES, where it has several.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Places crs</source>
+      <translation>KBS der Orte</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Id column</source>
+      <translation>Spalte der Kennung</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Column of PLACES with the id; usual names are found.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Name column</source>
+      <translation>Spalte des Namens</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Column of PLACES with the name; usual names are found.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Lat column</source>
+      <translation>Spalte der Breite</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Column of PLACES with the lat; usual names are found.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.py" />
+      <source>Lon column</source>
+      <translation>Spalte der Länge</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Column of PLACES with the lon; usual names are found.</source>
       <translation type="unfinished" />
     </message>
   </context>
