@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import http.server
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -350,3 +352,83 @@ def test_two_runs_do_not_write_into_one_farm(tmp_path: Path) -> None:
     with claimed(tmp_path / "farm"):
         said = batch(places, "--out", tmp_path / "farm", code=1)
     assert "Another geofield" in said
+
+
+def test_a_store_that_may_not_be_written_is_told_without_its_key(tmp_path: Path) -> None:
+    class Denying(http.server.BaseHTTPRequestHandler):
+        def answer(self) -> None:
+            self.rfile.read(int(self.headers.get("Content-Length") or 0))
+            writes = self.command in ("PUT", "POST")
+            body = b"<ListBucketResult><KeyCount>0</KeyCount></ListBucketResult>"
+            if writes:
+                body = b"<Error><Code>AccessDenied</Code><Message>Denied</Message></Error>"
+            self.send_response(403 if writes else 404 if self.command == "HEAD" else 200)
+            self.send_header("Content-Type", "application/xml")
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            if self.command != "HEAD":
+                self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None: ...
+
+    for verb in ("GET", "PUT", "HEAD", "POST", "DELETE"):
+        setattr(Denying, f"do_{verb}", Denying.answer)
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Denying)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    place = f"127.0.0.1:{server.server_port}"
+    said = batch(
+        parcels(tmp_path / "p.gpkg", 4), "--out",
+        f"s3://key:secret@bucket/farm?scheme=http&endpoint_override={place}", code=1,
+    )  # fmt: skip
+    server.shutdown()
+    server.server_close()
+    assert "s3://bucket/farm cannot be written" in said
+    assert "permissions" in said
+    assert "secret" not in said
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"tcp://a": ("9.9.9", True)}, "has geofield 9.9.9; here it is"),
+        ({"tcp://a": (gf.__version__, False)}, "does not see"),
+        ({"tcp://a": ModuleNotFoundError("No module named 'geofield'")}, "has no geofield"),
+    ],
+)
+def test_workers_that_cannot_do_the_work_are_refused(
+    answers: dict[str, object], words: str, tmp_path: Path
+) -> None:
+    from geofield.farm.cluster import Cluster
+    from geofield.farm.store import Store
+
+    class Client:
+        def nthreads(self) -> dict[str, int]:
+            return {"tcp://a": 1}
+
+        def run(self, *_: object, **__: object) -> dict[str, object]:
+            return answers
+
+    with pytest.raises(gf.GeofieldError, match=words):
+        Cluster(Client()).check(Store.of(tmp_path))
+    assert not list(tmp_path.rglob("probe*"))
+
+
+def test_workers_that_are_killed_do_no_harm(farm: Path, tmp_path: Path) -> None:
+    import psutil
+
+    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+            str(tmp_path / "farm"), "--workers", "2"]  # fmt: skip
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
+    killed = 0
+    while process.poll() is None and killed < 3:
+        if list((tmp_path / "farm" / ".work").glob("*.marks")):
+            children = psutil.Process(process.pid).children()
+            if children:
+                children[killed % len(children)].kill()
+                killed += 1
+                time.sleep(1.0)
+        time.sleep(0.005)
+    process.communicate(timeout=200)
+    assert process.returncode == 0
+    assert killed
+    assert layers_of(tmp_path / "farm") == layers_of(farm)

@@ -165,9 +165,9 @@ def batch(
     anew = bool(edited) or count.done > count.before
     files = finish(store, found, anew=anew, overview=overview)
     if as_json:
-        echo_json({"farm": store.place, "places": count.total, **count.statuses, "files": files})
+        echo_json({"farm": store.shown, "places": count.total, **count.statuses, "files": files})
     else:
-        _summarise(count, store.place, files)
+        _summarise(count, store.shown, files)
     if count.done < count.total:
         raise GeofieldError(
             f"Stopped: {count.done} of {count.total} places are done.",

@@ -10,7 +10,7 @@ import contextlib
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from geofield import __version__
@@ -32,14 +32,22 @@ class Cluster:
     client : distributed.Client
     own : list
         What is closed with the engine: nothing of a cluster that was given.
+    work : callable
+        What workers do with a chunk, for measuring the scheduler alone.
     """
 
-    def __init__(self, client: Any, own: list[Any] | None = None) -> None:
+    def __init__(
+        self,
+        client: Any,
+        own: list[Any] | None = None,
+        work: Callable[[Task, Orders], Done] | None = None,
+    ) -> None:
         self._client = client
         self._own = own or []
+        self._work = work or _work
 
     @classmethod
-    def here(cls, workers: int) -> Cluster:
+    def here(cls, workers: int, work: Callable[[Task, Orders], Done] | None = None) -> Cluster:
         """A cluster of processes on this machine."""
         import dask
         from distributed import Client, LocalCluster
@@ -56,7 +64,7 @@ class Cluster:
             silence_logs=50,
         )
         client = Client(cluster, set_as_default=False)
-        return cls(client, [client, cluster])
+        return cls(client, [client, cluster], work)
 
     @classmethod
     def at(cls, address: str, store: Store) -> Cluster:
@@ -131,7 +139,7 @@ class Cluster:
                 )
             if not sees:
                 raise GeofieldError(
-                    f"The worker {worker} does not see {store.place}.",
+                    f"The worker {worker} does not see {store.shown}.",
                     hint="Write to a folder that all machines share, or to an object store.",
                 )
 
@@ -149,7 +157,7 @@ class Cluster:
                     task = again.pop() if again else next(tasks, None)
                     if task is None:
                         break
-                    running[self._client.submit(_work, task, orders, pure=False)] = task
+                    running[self._client.submit(self._work, task, orders, pure=False)] = task
                 if not running:
                     return
                 try:

@@ -43,7 +43,7 @@ def renew(store: Store) -> None:
 
 
 def _catalogue(store: Store) -> list[str]:
-    return write_stac(store, name=store.place.rstrip("/").rsplit("/", 1)[-1])[:1]
+    return write_stac(store, name=store.shown.rstrip("/").rsplit("/", 1)[-1])[:1]
 
 
 def _overview(store: Store) -> list[str]:

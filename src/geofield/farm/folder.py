@@ -91,7 +91,7 @@ class Record:
             content = json.loads(data)
             if content["version"] > VERSION:
                 raise FormatError(
-                    f"{store.place} was written by a later version of geofield.",
+                    f"{store.shown} was written by a later version of geofield.",
                     hint="Update geofield.",
                 )
             return cls(
@@ -103,7 +103,7 @@ class Record:
                 int(content["chunks"]),
             )
         except (KeyError, TypeError, ValueError) as error:
-            raise FormatError(f"{store.place}/{RECORD} is damaged: {error!r}.") from None
+            raise FormatError(f"{store.shown}/{RECORD} is damaged: {error!r}.") from None
 
 
 def file_of(layer: str, chunk: int) -> str:
@@ -197,7 +197,7 @@ def read_part(
         table = pq.read_table(pa.BufferReader(data), columns=columns)
     except (pa.ArrowInvalid, OSError) as error:
         raise FormatError(
-            f"{store.place}/{file_of(layer, chunk)} is damaged: {error}.",
+            f"{store.shown}/{file_of(layer, chunk)} is damaged: {error}.",
             hint="Remove that chunk's file in status/, and run geofield batch again.",
         ) from None
     return table.drop_columns("bbox") if "bbox" in table.column_names else table

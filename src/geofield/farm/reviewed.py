@@ -42,7 +42,7 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
         return read_plan(store.folder / file_of(field_id))
     data = store.get(file_of(field_id))
     if data is None:
-        raise FormatError(f"The reviewed plan of {field_id} is gone from {store.place}.")
+        raise FormatError(f"The reviewed plan of {field_id} is gone from {store.shown}.")
     with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
         path = Path(folder) / "field.gpkg"
         path.write_bytes(data)

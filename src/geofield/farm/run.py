@@ -158,11 +158,11 @@ def _prepare(
     there = place.Record.read(store)
     if there is None and store.names(""):
         raise OutputExistsError(
-            f"{store.place} is not empty, and no farm.", hint="Choose another folder with --out."
+            f"{store.shown} is not empty, and no farm.", hint="Choose another folder with --out."
         )
     if there is not None and there.digest != wanted.digest and not fresh:
         raise OutputExistsError(
-            f"{store.place} is a farm of other work: {difference(there, wanted)}.",
+            f"{store.shown} is a farm of other work: {difference(there, wanted)}.",
             hint="Choose another folder, or --fresh: all is planned anew, what you reviewed stays.",
         )
     if there is not None and fresh:

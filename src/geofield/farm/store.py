@@ -6,6 +6,7 @@ Every file comes into place whole: by a rename on a disk, by its upload in an ob
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from dataclasses import dataclass
 from functools import cached_property
@@ -48,10 +49,15 @@ class Store:
             system, prefix = fs.FileSystem.from_uri(self.place)
         except (ArrowInvalid, OSError) as error:
             raise FormatError(
-                f"{self.place} is no object store that can be reached: {error}.",
+                f"{self.shown} is no object store that can be reached: {error}.",
                 hint="Give a folder, s3://BUCKET/FOLDER or gs://BUCKET/FOLDER.",
             ) from None
         return system, prefix
+
+    @property
+    def shown(self) -> str:
+        """The place for people: an address without keys in it."""
+        return re.sub(r"//[^/@]*@", "//", self.place.partition("?")[0])
 
     def __getstate__(self) -> dict[str, str]:
         return {"place": self.place}
@@ -78,7 +84,7 @@ class Store:
                     stream.write(data)
             except OSError as error:
                 raise FormatError(
-                    f"{self.place} cannot be written: {_short(error)}",
+                    f"{self.shown} cannot be written: {_short(error)}",
                     hint="Look at the permissions of the store, and at the key you gave it.",
                 ) from None
             return
@@ -112,7 +118,7 @@ class Store:
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise FormatError(f"{self.place}/{name} cannot be read: {_short(error)}") from None
+            raise FormatError(f"{self.shown}/{name} cannot be read: {_short(error)}") from None
 
     def names(self, folder: str) -> list[str]:
         """The names in a folder, sorted; none where there is no such folder."""
@@ -127,7 +133,7 @@ class Store:
         try:
             return sorted(info.base_name for info in system.get_file_info(where))
         except OSError as error:
-            raise FormatError(f"{self.place} cannot be read: {_short(error)}") from None
+            raise FormatError(f"{self.shown} cannot be read: {_short(error)}") from None
 
     def remove(self, name: str) -> None:
         """Remove a file or a folder with all that is in it; none is none."""
