@@ -180,7 +180,7 @@ class _Canvas:
             )
             # Dark below, so that a light line shows on light ground, too.
             for stroke in strokes:
-                self.draw.line(stroke, fill=_CASING, width=round(width + 1.0 * _OVERSAMPLING))
+                self.draw.line(stroke, fill=_CASING, width=round(width + 1.6 * _OVERSAMPLING))
             for stroke in strokes:
                 self.draw.line(stroke, fill=colour, width=round(width))
 
