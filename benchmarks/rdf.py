@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "rdf")
 STUDY_POINTS = 46_027
 NOTE = (
     "Medians of three runs; the million points and rdflib once. MB is the size of what was written "
-    "(for `read` and the rdflib rows, of their input and output together). "
+    "(for the reading and the rdflib rows, of their input and output together). "
     "Where other work keeps the cores busy, compare CPU seconds and ratios."
 )
 #: Name, points, profile.
@@ -42,7 +42,12 @@ CASES = (
     ("write_turtle", STUDY_POINTS, "geosparql"),
     ("write_jsonld", STUDY_POINTS, "geosparql"),
     ("write_ntriples", STUDY_POINTS, "geosparql"),
-    ("read", STUDY_POINTS, "geosparql"),
+    ("write_jsonld", STUDY_POINTS, "study"),
+    ("read rdfxml", STUDY_POINTS, "geosparql"),
+    ("read rdfxml", STUDY_POINTS, "study"),
+    ("read turtle", STUDY_POINTS, "geosparql"),
+    ("read jsonld", STUDY_POINTS, "geosparql"),
+    ("read ntriples", STUDY_POINTS, "geosparql"),
     ("rdflib nt", STUDY_POINTS, "geosparql"),
     ("rdflib parse", STUDY_POINTS, "geosparql"),
 )
@@ -63,7 +68,8 @@ def measure(name: str, points: int, profile: str, folder: Path) -> dict[str, flo
         def work() -> None:
             writer(plan, folder, options=options)
     else:
-        paths = write.write_rdfxml(plan, folder, options=options)
+        syntax = name.split()[1] if name.startswith("read") else "rdfxml"
+        paths = getattr(write, f"write_{syntax}")(plan, folder, options=options)
         work = _other(name, paths)
     before = _peak()
     start, cpu = time.perf_counter(), time.process_time()
@@ -74,7 +80,7 @@ def measure(name: str, points: int, profile: str, folder: Path) -> dict[str, flo
 
 
 def _other(name: str, paths: list[Path]) -> Any:
-    if name == "read":
+    if name.startswith("read"):
         from geofield.formats.rdf.read import read
 
         return lambda: read(paths[0])

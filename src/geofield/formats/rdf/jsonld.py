@@ -7,7 +7,9 @@ each file, so that readers need no network.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+from json.encoder import encode_basestring as _quoted
 from pathlib import Path
 from typing import IO, Any
 
@@ -24,7 +26,10 @@ from geofield.formats.rdf.namespaces import (
     expand,
 )
 from geofield.formats.rdf.resources import context
-from geofield.formats.rdf.triples import Column, Group
+from geofield.formats.rdf.triples import Group, Nodes
+
+#: Short names by predicate and kind of value.
+Terms = dict[tuple[str, str], str]
 
 
 def write_jsonld(groups: Iterable[Group], file: IO[bytes], prefixes: dict[str, str]) -> None:
@@ -38,14 +43,11 @@ def write_jsonld(groups: Iterable[Group], file: IO[bytes], prefixes: dict[str, s
     file.write(f'{{\n"@context": {whole},\n"@graph": ['.encode())
     separator = "\n"
     for group in groups:
-        written = [[_entries(column, terms) for column in nodes.columns] for nodes in group]
-        for index in range(len(group[0].subjects)):
-            for nodes, columns in zip(group, written, strict=True):
-                node: dict[str, Any] = {"@id": nodes.subjects[index].value}
-                for column in columns:
-                    node |= column[index]
-                file.write((separator + json.dumps(node, ensure_ascii=False)).encode())
-                separator = ",\n"
+        told = [_lines(nodes, terms) for nodes in group]
+        if told[0]:
+            rows = chain.from_iterable(zip(*told, strict=True))
+            file.write((separator + ",\n".join(rows)).encode())
+            separator = ",\n"
     file.write(b"\n]\n}\n")
 
 
@@ -53,38 +55,58 @@ def _kind(text: str) -> str:
     return text if text in ("", "@id") else expand(text)
 
 
-def _entries(column: Column, terms: dict[tuple[str, str], str]) -> list[dict[str, Any]]:
-    """For each row, the predicate's short name with its value or values; empty for none."""
-    predicate, values = column
-    iri = predicate.value
-    result: list[dict[str, Any]] = []
-    for value in values:
-        entry: dict[str, Any] = {}
-        if isinstance(value, tuple) and value:
-            shown = [_shown(iri, each, terms) for each in value]
-            entry[shown[0][0]] = [text for _, text in shown]
-        elif value is not None and value != ():
-            name, text = _shown(iri, value, terms)
-            entry[name] = text
-        result.append(entry)
-    return result
+def _lines(nodes: Nodes, terms: Terms) -> list[str]:
+    """Each node as a line of JSON."""
+    names = [f'"@id": "{subject.value}"' for subject in nodes.subjects]
+    columns = [_told(predicate.value, values, terms) for predicate, values in nodes.columns]
+    return [f"{{{', '.join(filter(None, row))}}}" for row in zip(names, *columns, strict=True)]
 
 
-def _shown(iri: str, value: Any, terms: dict[tuple[str, str], str]) -> tuple[str, Any]:
-    """A predicate's short name and the value as it is written under it."""
-    text = value.value
-    if isinstance(value, ox.NamedNode):
-        if iri == TYPE:
-            return "@type", compact(text)
-        text = compact(text) if text.startswith(GF) else text
-        name = terms.get((iri, "@id"))
-        return (name, text) if name else (compact(iri), {"@id": text})
-    kind = value.datatype.value
+def _told(iri: str, values: Sequence[Any], terms: Terms) -> list[str]:
+    """Of each row the predicate's short name with its value or values; empty for none."""
+    if len(types := set(map(type, values))) == 1 and not types & {tuple, type(None)}:
+        kinds = {_kind_of(values[0])} if ox.NamedNode in types else set(map(_kind_of, values))
+        if len(kinds) == 1:
+            # All alike: one look-up for the column.
+            name, before, after = _frame(iri, kinds.pop(), terms)
+            head = f'"{name}": {before}'
+            if ox.NamedNode in types:
+                return [f"{head}{_short(iri, each.value)}{after}" for each in values]
+            return [f"{head}{_quoted(each.value)}{after}" for each in values]
+    return ["" if value is None else _entry(iri, value, terms) for value in values]
+
+
+def _entry(iri: str, value: Any, terms: Terms) -> str:
+    """A predicate's short name with a value, or with a list of them."""
+    name, told = "", []
+    for each in value if isinstance(value, tuple) else (value,):
+        kind = _kind_of(each)
+        name, before, after = _frame(iri, kind, terms)
+        text = _short(iri, each.value) if kind == "@id" else _quoted(each.value)
+        told.append(f"{before}{text}{after}")
+    listed = f"[{', '.join(told)}]" if isinstance(value, tuple) else told[0]
+    return f'"{name}": {listed}' if told else ""
+
+
+def _kind_of(term: Any) -> str:
+    return "@id" if isinstance(term, ox.NamedNode) else term.datatype.value
+
+
+def _short(iri: str, text: str) -> str:
+    return f'"{compact(text) if iri == TYPE or text.startswith(GF) else text}"'
+
+
+def _frame(iri: str, kind: str, terms: Terms) -> tuple[str, str, str]:
+    """A predicate's short name, and what stands around a value of a kind."""
+    if iri == TYPE:
+        return "@type", "", ""
     name = terms.get((iri, "" if kind == STRING else kind))
     if name:
-        return name, text
-    typed = {} if kind == STRING else {"@type": compact(kind)}
-    return compact(iri), {**typed, "@value": text}
+        return name, "", ""
+    if kind == "@id":
+        return compact(iri), '{"@id": ', "}"
+    typed = "" if kind == STRING else f'"@type": "{compact(kind)}", '
+    return compact(iri), f'{{{typed}"@value": ', "}"
 
 
 def flat_triples(path: Path) -> list[tuple[str, str, str]] | None:
