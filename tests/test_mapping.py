@@ -103,7 +103,7 @@ def test_tracks_show_on_white_ground(plan: Plan, simulated: SimulatedField) -> N
     middles = plan.tracks.segments.geometry.interpolate(0.5, normalized=True)
     x, y = white.grid.from_crs(middles.x.to_numpy(), middles.y.to_numpy(), plan.field.crs)
     dark = [
-        np.asarray(picture)[int(b) - 9 : int(b) + 10, int(a) - 9 : int(a) + 10].min() < 160
+        np.asarray(picture)[int(b) - 9 : int(b) + 10, int(a) - 9 : int(a) + 10].min() < 200
         for a, b in zip(x * scale, y * scale, strict=True)
     ]
     assert np.mean(dark) > 0.95
