@@ -125,12 +125,16 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
         if file.is_file() and file.stat().st_size == 0:
             raise ImageryError(f"The picture {path} is empty (0 bytes).", hint="Copy it again.")
     try:
-        dataset = DatasetReader(path, driver=_drivers_for(path, reach))
+        drivers = _drivers_for(path, reach)
+        if is_remote(path) or drivers == ["VRT"]:
+            _through_gateway(reach.of(path))
+        dataset = DatasetReader(path, driver=drivers)
         if "OVERVIEW_FILE" in dataset.tags(ns="OVERVIEWS"):
             dataset.close()
             raise ImageryError(f"The picture {name} names overviews in another file.")
         return dataset
     except RasterioIOError as error:
+        _tell_refused(path, reach)
         raise ImageryError(
             f"The picture {name} cannot be opened: {reason(error, path)}.",
             hint=(
@@ -140,6 +144,25 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
                 "`gdalinfo` tells more."
             ),
         ) from None
+
+
+def _through_gateway(reach: Reach) -> None:
+    from geofield.imagery.gateway import gateway
+
+    rasterio.env.setenv(**gateway().options(reach))
+
+
+def _tell_refused(path: str, reach: Reach = OWN_FOLDER) -> None:
+    """Say which host a picture's server sends on to, where that is why it could not be read."""
+    if not is_remote(path) and not path.lower().endswith(".vrt"):
+        return
+    from geofield.imagery.gateway import gateway
+
+    refused = gateway().refused
+    if refused:
+        address = refused.pop()
+        refused.clear()
+        reach.of(path).require(address, f"The picture {display_name(path)}")
 
 
 def _drivers_for(path: str, reach: Reach) -> list[str]:
@@ -167,6 +190,7 @@ def reading(path: str) -> Iterator[None]:
     try:
         yield
     except (RasterioError, OSError) as error:
+        _tell_refused(path)
         raise ImageryError(
             f"The picture {display_name(path)} cannot be read to its end: {reason(error, path)}.",
             hint="The file is truncated or damaged: copy or download it again.",

@@ -1,0 +1,162 @@
+"""The way out for GDAL: it follows redirects by itself, so all that it asks for goes through here.
+
+GDAL has no switch against redirects. Its requests are sent through a small proxy on this machine
+that opens connections to hosts within reach only; a redirect to any other is a request like all
+others here, and refused. What is encrypted stays so: the proxy sees the host's name, no more.
+"""
+
+from __future__ import annotations
+
+import http.client
+import os
+import select
+import socket
+import threading
+from functools import cache
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import getproxies, proxy_bypass
+
+from geofield.imagery.reach import Reach
+
+_TIMEOUT_S = 120.0
+_BLOCK = 1 << 16
+#: Of one connection, not of the message (RFC 9110, 7.6.1).
+_HOP = frozenset(
+    ("connection", "proxy-connection", "keep-alive", "te", "trailer", "transfer-encoding")
+)
+
+
+class Gateway(ThreadingHTTPServer):
+    """A proxy for this process.
+
+    Attributes
+    ----------
+    refused : list of str
+        Addresses out of reach that were asked for.
+    """
+
+    daemon_threads = True
+    request_queue_size = 64
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.refused: list[str] = []
+        self._reaches: set[Reach] = set()
+        self._proxies = getproxies()
+        # curl would pass the gateway by for the hosts named there; Python still knows them.
+        for name in ("no_proxy", "NO_PROXY"):
+            os.unsetenv(name)
+        threading.Thread(target=self.serve_forever, name="gateway", daemon=True).start()
+
+    def options(self, reach: Reach) -> dict[str, str]:
+        """GDAL's options for pictures with this reach."""
+        self._reaches.add(reach)
+        here = f"http://127.0.0.1:{self.server_port}"
+        return {"GDAL_HTTP_PROXY": here, "GDAL_HTTPS_PROXY": here}
+
+    def may(self, address: str) -> bool:
+        """Whether an address is within reach; one that is not is remembered."""
+        if any(reach.holds(address) for reach in self._reaches):
+            return True
+        self.refused.append(address)
+        return False
+
+    def connection(self, scheme: str, host: str, port: int) -> http.client.HTTPConnection:
+        """A connection to a host, through the user's own proxy where there is one."""
+        proxy = self._proxies.get(scheme)
+        if not proxy or proxy_bypass(host):
+            return http.client.HTTPConnection(host, port, timeout=_TIMEOUT_S)
+        parts = urlsplit(proxy if "://" in proxy else f"http://{proxy}")
+        through = http.client.HTTPConnection(
+            parts.hostname or "", parts.port or 80, timeout=_TIMEOUT_S
+        )
+        through.set_tunnel(host, port)
+        return through
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """GDAL closes connections as it likes."""
+
+
+@cache
+def gateway() -> Gateway:
+    """The one of this process."""
+    return Gateway()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    server: Gateway
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing."""
+
+    def do_CONNECT(self) -> None:
+        """A tunnel: what is in it is between GDAL and the host."""
+        host, _, port = self.path.rpartition(":")
+        host = host.strip("[]")
+        if not self.server.may(f"https://{self.path}"):
+            self._refuse()
+            return
+        connection = self.server.connection("https", host, int(port))
+        try:
+            connection.connect()
+        except OSError:
+            self.send_error(502)
+            return
+        self.send_response(200)
+        self.end_headers()
+        self.close_connection = True
+        try:
+            _pump(self.connection, connection.sock)
+        finally:
+            connection.close()
+
+    def do_GET(self) -> None:
+        """One request, answered as it comes, a redirect too: the next request shows where to."""
+        parts = urlsplit(self.path)
+        if parts.scheme != "http" or not parts.hostname or not self.server.may(self.path):
+            self._refuse()
+            return
+        connection = self.server.connection("http", parts.hostname, parts.port or 80)
+        headers = {name: value for name, value in self.headers.items() if name.lower() not in _HOP}
+        path = parts._replace(scheme="", netloc="").geturl() or "/"
+        try:
+            connection.request(self.command, path, headers=headers)
+            answer = connection.getresponse()
+        except (OSError, http.client.HTTPException):
+            self.send_error(502)
+            return
+        self.send_response_only(answer.status, answer.reason)
+        for name, value in answer.getheaders():
+            if name.lower() not in _HOP:
+                self.send_header(name, value)
+        if answer.getheader("Content-Length") is None:
+            self.send_header("Connection", "close")
+            self.close_connection = True
+        self.end_headers()
+        if self.command != "HEAD":
+            while block := answer.read1(_BLOCK):
+                self.wfile.write(block)
+        connection.close()
+
+    do_HEAD = do_GET  # noqa: N815
+
+    def _refuse(self) -> None:
+        self.send_response(403)
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+
+def _pump(one: socket.socket, other: socket.socket) -> None:
+    """Carry bytes both ways until an end closes or nothing comes for long."""
+    while True:
+        ready, _, _ = select.select([one, other], [], [], _TIMEOUT_S)
+        if not ready:
+            return
+        for end in ready:
+            data = end.recv(_BLOCK)
+            if not data:
+                return
+            (other if end is one else one).sendall(data)

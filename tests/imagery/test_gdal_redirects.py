@@ -1,0 +1,80 @@
+"""GDAL follows redirects by itself: none of them leads to a host that the user did not name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .test_reach import Stranger, cut, folder, refused, stranger, vrt  # noqa: F401  (fixtures)
+from .tile_server import Handler, TileServer, serving
+
+
+@pytest.fixture
+def server(folder: Path) -> Iterator[TileServer]:  # noqa: F811
+    with serving() as found:
+        found.routes["/own.tif"] = lambda handler, _: handler.file(folder / "own.tif")
+        yield found
+
+
+def sent_on(server: TileServer, location: str) -> str:
+    """An address that sends on to another."""
+
+    def answer(handler: Handler, _: dict[str, str]) -> None:
+        handler.reply(302, b"", "text/plain", Location=location)
+
+    server.routes["/moved.tif"] = answer
+    return f"{server.address}/moved.tif"
+
+
+def test_a_remote_picture_is_read(folder: Path, server: TileServer) -> None:  # noqa: F811
+    for address in (f"{server.address}/own.tif", sent_on(server, f"{server.address}/own.tif")):
+        out = folder / "out.tif"
+        done = cut(address, "--overwrite", "-o", out)
+        assert done.returncode == 0, done.stderr
+        assert out.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("way", ["picture", "file", "vrt", "later"])
+def test_its_server_sends_on_to_nobody_else(
+    folder: Path,  # noqa: F811
+    server: TileServer,
+    stranger: Stranger,  # noqa: F811
+    way: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Not even to one that the user's proxy is passed by for.
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1,localhost")
+    target = "file:///etc/hostname" if way == "file" else f"{stranger.url}/own.tif"
+    picture: object = sent_on(server, target)
+    if way == "vrt":
+        picture = folder / "a.vrt"
+        picture.write_text(vrt(f"/vsicurl/{sent_on(server, target)}"))
+    if way == "later":
+
+        def answer(handler: Handler, _: dict[str, str]) -> None:
+            if len(server.paths) > 2:
+                handler.reply(302, b"", "text/plain", Location=target)
+            else:
+                handler.file(folder / "own.tif")
+
+        server.routes["/own.tif"] = answer
+        picture = f"{server.address}/own.tif"
+    out = folder / "out.tif"
+    words = ["--allow", server.address] if way == "vrt" else []
+    told = refused(cut(picture, *words, "-o", out), out)
+    assert not stranger.was_called
+    if way in ("picture", "vrt"):
+        assert f"leads to {stranger.url}, which you did not name" in told
+        assert f"--allow {stranger.url}" in told
+
+
+def test_it_may_where_the_user_says_so(
+    folder: Path,  # noqa: F811
+    server: TileServer,
+    stranger: Stranger,  # noqa: F811
+) -> None:
+    address = sent_on(server, f"{stranger.url}/own.tif")
+    cut(address, "--allow", stranger.url, "-o", folder / "out.tif")
+    assert stranger.was_called
