@@ -103,7 +103,8 @@ def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
     command.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m geofield "$@"\n')
     command.chmod(0o755)
     environment = dict(os.environ)
-    environment["PATH"] = f"{programs}{os.pathsep}{environment['PATH']}"
+    beside = Path(sys.executable).parent  # programs of what is installed with geofield
+    environment["PATH"] = os.pathsep.join([str(programs), environment["PATH"], str(beside)])
     environment["PYTHONPATH"] = str(ROOT / "src")
     environment["COLUMNS"] = "100"
     # Tiles of the how-to are kept for the page alone.
