@@ -7,7 +7,5 @@ from pathlib import Path
 CLIENT = Path(__file__).with_name("client.py")
 ROOT = Path(__file__).parents[2]
 PLUGINS = ROOT / "plugin"
-#: QGIS belongs to Debian's Python, never to the environment of the tests.
-PYTHON = "/usr/bin/python3"
 SAMPLE = ROOT / "sample_data" / "field_1.tif"
 POINT = "33.531142,35.075373 [EPSG:4326]"

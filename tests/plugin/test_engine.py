@@ -10,7 +10,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from plugin_place import CLIENT, POINT, PYTHON, SAMPLE
+from plugin_place import CLIENT, POINT, SAMPLE
+
+from real_qgis import PYTHON
 
 HEAD = "#!/bin/sh\nif [ \"$1\" = --version ]; then echo 'geofield, version {version}'; exit 0; fi\n"
 
@@ -42,7 +44,7 @@ def planned(qgis, tmp_path):
 
 def test_no_engine(planned, tmp_path):
     answer, known = planned(str(tmp_path / "nothing"))
-    assert len(known["algorithms"]) == 10
+    assert len(known["algorithms"]) == 11
     for algorithm in known["algorithms"].values():
         assert algorithm["can"][0] is False
         assert "install it or name it under Plugins" in algorithm["can"][1]
