@@ -54,12 +54,11 @@ def row_iris(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[str
     if not layer.path:
         return [owner] * len(frame)
     keys = re.findall(r"\{(\w+)\}", layer.path)
-    path = f"{owner}/{layer.path}".format
-    columns = [frame[key].tolist() for key in keys]
-    return [
-        None if any(map(pd.isna, row)) else path(**dict(zip(keys, row, strict=True)))
-        for row in zip(*columns, strict=True)
-    ]
+    path = f"{owner}/{re.sub(r'{.*?}', '{}', layer.path)}".format
+    iris: list[str | None] = list(map(path, *(frame[key].tolist() for key in keys)))
+    for row in np.flatnonzero(frame[keys].isna().any(axis=1)).tolist():
+        iris[row] = None
+    return iris
 
 
 def feature_group(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from functools import cache, lru_cache
+from importlib.resources import files
 from typing import Final
 
 import pyoxigraph as ox
@@ -15,23 +17,10 @@ GF: Final = "https://w3id.org/geofield#"
 #: belongs to nobody: whoever publishes data sets a base they control.
 DEFAULT_BASE: Final = "https://example.org/geofield/"
 
-#: Prefixes of every product, by name.
-PREFIXES: Final[dict[str, str]] = {
-    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
-    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
-    "xsd": "http://www.w3.org/2001/XMLSchema#",
-    "dc": "http://purl.org/dc/elements/1.1/",
-    "dcterms": "http://purl.org/dc/terms/",
-    "dcat": "http://www.w3.org/ns/dcat#",
-    "prov": "http://www.w3.org/ns/prov#",
-    "geo": "http://www.opengis.net/ont/geosparql#",
-    "sf": "http://www.opengis.net/ont/sf#",
-    "sosa": "http://www.w3.org/ns/sosa/",
-    "s4agri": "https://saref.etsi.org/saref4agri/",
-    "wgs84": "http://www.w3.org/2003/01/geo/wgs84_pos#",
-    "cc": "http://creativecommons.org/ns#",
-    "gf": GF,
-}
+_DATA: Final = files(__package__) / "data"
+_CONTEXT: Final = json.loads((_DATA / "context.jsonld").read_text("utf-8"))["@context"]
+#: Prefixes of every product, by name: those of the context.
+PREFIXES: Final = {name: iri for name, iri in _CONTEXT.items() if isinstance(iri, str)}
 # The source study's vocabulary (METHOD.md, section 5).
 STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
 STUDY_TRAJECTORY: Final = "http://www.DLC.org/Trajectory#"
@@ -48,17 +37,11 @@ STUDY_PREFIXES: Final[dict[str, str]] = {
     "obstacle": STUDY_OBSTACLE,
     "trajectory": STUDY_POINT,
 }
-#: Further prefixes that the ontology, the shapes and the queries need.
-SCHEMA_PREFIXES: Final[dict[str, str]] = {
-    **PREFIXES,
-    "owl": "http://www.w3.org/2002/07/owl#",
-    "skos": "http://www.w3.org/2004/02/skos/core#",
-    "qudt": "http://qudt.org/schema/qudt/",
-    "unit": "http://qudt.org/vocab/unit/",
-    "po": "http://purl.obolibrary.org/obo/PO_",
-    "sh": "http://www.w3.org/ns/shacl#",
-    "geof": "http://www.opengis.net/def/function/geosparql/",
-}
+_TURTLE_PREFIX: Final = re.compile(r"^@prefix (\w+): <(.*)> \.$", re.MULTILINE)
+#: Also those that the ontology, the shapes and the queries need.
+SCHEMA_PREFIXES: Final[dict[str, str]] = dict(
+    _TURTLE_PREFIX.findall((_DATA / "ontology.ttl").read_text("utf-8"))
+)
 
 RDF: Final = PREFIXES["rdf"]
 XSD: Final = PREFIXES["xsd"]

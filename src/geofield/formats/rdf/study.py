@@ -45,7 +45,7 @@ from geofield.formats.rdf.namespaces import (
     expand,
     node,
 )
-from geofield.formats.rdf.triples import Column, Group, Nodes, named, text_term, typed
+from geofield.formats.rdf.triples import Column, Group, Nodes, named, typed
 
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
@@ -102,7 +102,7 @@ class StudyDescription(Description):
         ]
         iris = row_iris(layer, frame, self.names)
         avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
-        yield _members(STUDY_OBSTACLE, avoided)
+        yield _members(STUDY_OBSTACLE, named(avoided))
         study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
         taken = {predicate for predicate, _ in study}
         own = [each for each in column_properties(layer, frame) if each[0] not in taken]
@@ -126,16 +126,17 @@ class StudyDescription(Description):
         columns: list[Column] = [
             (node("rdf:type"), [node(GML + "point")] * len(frame)),
             *_study_columns(rounded, STUDY_POINT_TERMS),
-            (node(GML + "pos"), [text_term(f"{lat!r}, {lon!r}") for lat, lon in places]),
+            (node(GML + "pos"), typed([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
             (node("gf:segmentNo"), typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
-        yield _members(STUDY_TRAJECTORY, iris)
-        yield (Nodes(named(iris), columns),)
+        points = named(iris)
+        yield _members(STUDY_TRAJECTORY, points)
+        yield (Nodes(points, columns),)
 
 
-def _members(root: str, iris: Iterable[str | None]) -> Group:
+def _members(root: str, members: Iterable[Any]) -> Group:
     """The study's root description holds its nodes."""
-    return (Nodes([node(root)], [(node("rdfs:member"), [tuple(named(iris))])]),)
+    return (Nodes([node(root)], [(node("rdfs:member"), [tuple(members)])]),)
 
 
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
