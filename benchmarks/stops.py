@@ -11,6 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections import Counter, defaultdict
+from contextlib import suppress
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -37,16 +38,17 @@ def main() -> None:
         write_scene(made.scene, folder / "picture.tif")
         point = ["--lat", str(made.lat), "--lon", str(made.lon)]
         works = make_works(folder, folder / "picture.tif", point)
-        for number in range(given.stops):
-            work = works[number % len(works)]
-            kind = STOPS[number // len(works) % len(STOPS)]
-            # A fifth while files are moved: few moments of chance fall into that.
-            aimed = number % 5 == 4 and len(work.written) > 1
-            out = folder / str(number)
-            found.append(stop(work, kind, dice, out, aimed=aimed))
-            shutil.rmtree(out)
-            if found[-1].faults:
-                print(found[-1], flush=True)
+        with suppress(KeyboardInterrupt):  # Ctrl+C: the page tells of those that were
+            for number in range(given.stops):
+                work = works[number % len(works)]
+                kind = STOPS[number // len(works) % len(STOPS)]
+                # A fifth while files are moved: few moments of chance fall into that.
+                aimed = number % 5 == 4 and len(work.written) > 1
+                out = folder / str(number)
+                found.append(stop(work, kind, dice, out, aimed=aimed))
+                shutil.rmtree(out)
+                if found[-1].faults:
+                    print(found[-1], flush=True)
     write_page("stops", "Stops at random moments", _page(found, given.seed))
 
 
