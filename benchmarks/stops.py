@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import random
 import shutil
+import signal
 import sys
 import tempfile
 from collections import Counter, defaultdict
@@ -30,6 +31,8 @@ def main() -> None:
     parser.add_argument("--stops", type=int, default=200)
     parser.add_argument("--seed", type=int, default=7)
     given = parser.parse_args()
+    # A shell's background work ignores SIGINT, and so would the commands that it starts.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     dice = random.Random(given.seed)
     found: list[Stop] = []
     with tempfile.TemporaryDirectory() as name:
