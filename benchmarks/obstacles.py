@@ -101,7 +101,7 @@ def phase_code(scene: Scene) -> Circles:
     return np.column_stack([found.x_px, found.y_px]), found.radius_px
 
 
-BALANCED = 0.2
+BALANCED = 0.25
 """Confidence at which a miss and a false alarm weigh alike: that of the best F1."""
 
 

@@ -53,7 +53,7 @@ class Pictures:
     def weights(self) -> np.ndarray:
         """Return how often each picture is drawn: open and green land more often."""
         count = np.array([len(t) for t in self.trees])
-        weight = np.where(count < 40, 1.8, 1.0)
+        weight = np.where(count < 40, 1.6, 1.0)
         green = zip(self.bands, self.trees, strict=True)
         weight += 2 * np.array([green_ground(bands, trees) for bands, trees in green])
         weight[self.simulated] = 0.5
@@ -204,7 +204,7 @@ def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
         noise = rng.standard_normal(image.shape, dtype=np.float32)
         image = image + noise * np.float32(rng.uniform(0.5, 7))
     image = np.clip(image, 0, 255)
-    if rng.random() < 0.5:
+    if rng.random() < 0.35:
         image = jpeg(rng, image)
     return np.ascontiguousarray(np.rint(image), dtype=np.float32)
 

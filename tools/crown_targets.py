@@ -10,8 +10,8 @@ import numpy as np
 CELL_PX = 2
 SPREAD_CELLS = 1.1
 """Of the slope around a centre: how much less wrong an answer beside it is."""
-NEAR_CELLS = 3.0
-"""Offsets and radius are asked for this near to a centre, for so far cells vote for it."""
+NEAR_CELLS = 1.6
+"""Offsets and radius are asked for this near to a centre."""
 
 
 def targets(

@@ -7,6 +7,13 @@ Needs PyTorch and ONNX (dependency group `train`); one core is enough. The sched
 clock: the learning rate falls to nothing at the end of the time given. Seeded, yet sums on
 another machine may round differently. Every few minutes the figures on the sites left out are
 printed and the averaged weights are written, so that the best so far can always be used.
+
+The file that is shipped was trained by PyTorch 2.15 in three runs of 4, 16 and 70 minutes, each
+with ``--start`` from the one before, when yards and two-coloured trucks were not yet painted.
+What was tried on top and left out, for F1 on the sites left out did not rise: 49 minutes more
+(3 200 steps) with half of the spoiled samples stored with losses and offsets asked for within
+three cells; the mean of those weights and the shipped ones; and 24 minutes in which the network
+itself chose the cell of each centre near its label.
 """
 
 from __future__ import annotations

@@ -254,7 +254,7 @@ def test_the_cost_of_a_miss_moves_the_line(simulated):
         assert told["possible_from"] <= told["threshold"]
         counts.append((len(active(found)), len(found)))
     assert counts == sorted(counts)
-    assert thresholds(30) == pytest.approx((1 / 11, 1 / 21))
+    assert thresholds(30) == pytest.approx((1 / 6, 1 / 21))
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,14 @@
 
 import json
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
 import shapely
 
 import geofield as gf
-from geofield.evaluation import match_points, reliability
+from geofield.evaluation import Driving, driving, match_points, reliability
 from geofield.imagery import read_scene
 from geofield.model.scene import Scene
 
@@ -23,7 +24,7 @@ def detections(shared, bands):
         scene = read_scene(folder / f"{row.image}.tif")
         assert scene.roles == ("red", "green", "blue", "nir")
         scene = Scene(scene.grid, scene.bands[:bands], scene.roles[:bands], scene.valid)
-        found = gf.detect_obstacles(scene, min_confidence=0.2)
+        found = gf.detect_obstacles(scene, min_confidence=0.25)
         area = shapely.Polygon(json.loads(str(row.area_px)))
         xy = found[["x_px", "y_px"]].to_numpy(float)
         # Labels are pixel indices: half a pixel from the corner-based coordinates.
@@ -34,7 +35,7 @@ def detections(shared, bands):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.77, 0.73), (3, 0.75, 0.72)])
+@pytest.mark.parametrize(("bands", "least_10", "least_6"), [(4, 0.82, 0.77), (3, 0.8, 0.75)])
 def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
     hits = {6: 0, 10: 0}
     found = labelled = 0
@@ -49,8 +50,29 @@ def test_trees_are_found_on_unseen_sites(shared, bands, least_10, least_6):
         good.append(np.isin(np.arange(len(xy)), match.detected_index))
     assert 2 * hits[10] / (found + labelled) > least_10
     assert 2 * hits[6] / (found + labelled) > least_6
-    # The curve was fitted on open land in cities: in fields it errs on the safe side, by less
-    # than a fifth.
+    # The curve was fitted on open land in cities: in fields it errs on the safe side.
     p, hit = np.concatenate(confidences), np.concatenate(good)
-    assert reliability(p, hit)[3] < 0.2
+    assert reliability(p, hit)[3] < 0.15
     assert p.mean() < hit.mean()
+
+
+@pytest.mark.slow
+def test_few_trees_of_open_land_are_driven_through(shared):
+    folder = shared / "data" / "trees"
+    labels = pd.read_csv(folder / "trees.csv")
+    total = Driving()
+    for row in pd.read_csv(folder / "areas.csv").itertuples():
+        scene = read_scene(folder / f"{row.image}.tif")
+        grid = scene.grid
+        area = shapely.transform(
+            shapely.Polygon(json.loads(str(row.area_px))), grid.to_metric_array
+        )
+        found = gf.detect_obstacles(scene, gf.Field(area, grid.metric_crs))
+        tracks = gf.plan_tracks(area, found, crs=grid.metric_crs, spacing_m=3)
+        xy = labels[labels.image == row.image][["x_px", "y_px"]].to_numpy(float) + 0.5
+        points = shapely.points(grid.to_metric_array(xy))
+        truth = gpd.GeoDataFrame(geometry=points, crs=grid.metric_crs)
+        total += driving(tracks.segments, found, truth, area)
+    assert total.things == 340
+    assert total.share_driven_through < 0.15
+    assert total.share_lost < 0.04

@@ -129,7 +129,10 @@ def detect_by_default(
         shapes = [shapely.transform(shapes[i], lambda c: c * factor) for i in likely]
         shape_confidence = shape_confidence[likely]
     measured_m = crowns.radius_px * factor * resolution
-    radius = np.clip(measured_m, *radius_m) / resolution
+    # A doubtful crown is measured too small, and its centre less well: its disc reaches farther.
+    surest = facts["calibration"][tone.bands]["probability"][-1]
+    wider_m = measured_m + facts["doubt_m"] * (1 - p / surest)
+    radius = np.clip(wider_m, *radius_m) / resolution
     trees = Circles(crowns.x_px * factor, crowns.y_px * factor, radius, p)
     keep = (measured_m >= _BELOW * radius_m[0]) & (measured_m <= _ABOVE * radius_m[1])
     if ring is not None:
