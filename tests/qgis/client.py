@@ -13,6 +13,8 @@ from qgis.core import (
     Qgis,
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsExpression,
+    QgsExpressionContext,
     QgsFeature,
     QgsGeometry,
     QgsMapRendererParallelJob,
@@ -24,6 +26,16 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
+
+
+def tip_shown(layer):
+    """The HTML of the first row's map tip."""
+    context = QgsExpressionContext()
+    for feature in layer.getFeatures():
+        context.setFeature(feature)
+        context.setFields(layer.fields())
+        return QgsExpression.replaceExpressionText(layer.mapTipTemplate(), context)
+    return ""
 
 
 def layer_facts(layer):
@@ -44,6 +56,7 @@ def layer_facts(layer):
             "rules": [item.label() for item in renderer.legendSymbolItems()] if renderer else [],
             "labels": layer.labelsEnabled() and layer.labeling() is not None,
             "tip": layer.mapTipTemplate(),
+            "tip_shown": tip_shown(layer),
             "actions": [action.name() for action in layer.actions().actions()],
             "scales": [layer.hasScaleBasedVisibility(), layer.minimumScale()],
             "widgets": {

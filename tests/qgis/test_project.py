@@ -91,6 +91,18 @@ def test_the_outlines_doubt_stands_in_the_map_tip(opened):
     assert "certainty" in tip
 
 
+def test_no_tag_of_a_name_counts_in_the_map_tip(qgis, tmp_path):
+    dataset = make_dataset()
+    dataset.tables["field"]["name"] = "<script>alert(1)</script>[% 1+1 %]"
+    dataset.tables["field"]["doubts"] = "<img src=x onerror=alert(2)> & more"
+    write_dataset(dataset, tmp_path, ["gpkg"], options={"project": False}, tell_drops=False)
+    tip = qgis("vector", uri=f"{tmp_path / 'field.gpkg'}|layername=field")["tip_shown"]
+    assert "<script" not in tip
+    assert "<img" not in tip
+    assert "&lt;script>alert(1)&lt;/script>[% 1+1 %]" in tip
+    assert "&lt;img src=x onerror=alert(2)> &amp; more" in tip
+
+
 def test_points_appear_from_a_readable_scale_on(opened):
     limited, scale = opened["layers"]["geofield_track_points"]["scales"]
     assert limited
