@@ -87,9 +87,10 @@ def refuse_claimed(folder: Path, names: Collection[str] | None) -> None:
     ------
     OutputExistsError
     """
-    mine = {claim.sign for claim in _MINE}
+    # By name, which is drawn by lot: the same folder may be written in several ways.
+    mine = {claim.sign.name for claim in _MINE}
     for sign in folder.glob(PREFIX + "*"):
-        if sign in mine:
+        if sign.name in mine:
             continue
         try:
             said = json.loads((sign / _CLAIM).read_text(encoding="utf-8"))

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from geofield.claims import claimed
 from geofield.plan import read_plan
 from geofield.simulate import SimulatedField
+from geofield.staging import staged_folder
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="claims need flock")
@@ -138,6 +140,18 @@ def test_the_claim_of_a_killed_run_holds_nobody_up(
     done = geofield(*line)
     assert done.returncode == 0, done.stderr
     assert leftovers(out) == []
+
+
+def test_a_claim_is_ones_own_however_the_folder_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "link").symlink_to(tmp_path / "out")
+    with claimed(Path("out")):
+        for place in (tmp_path / "out", Path("out"), tmp_path / "link"):
+            with staged_folder(place, overwrite=True) as folder:
+                (folder / "product.txt").write_text(str(place))
+    assert leftovers(tmp_path) == []
 
 
 def test_a_folder_made_for_a_run_that_fails_is_gone(tmp_path: Path, simulated_tif: Path) -> None:

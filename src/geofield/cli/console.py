@@ -87,12 +87,30 @@ def stop_cleanly() -> None:
 
 def _stop(number: int, _: Any) -> None:
     _STOPS.append(number)
+    sys.unraisablehook = _stop_again
     raise KeyboardInterrupt
+
+
+def _stop_again(unheard: Any) -> None:
+    """A stop that came where Python passes over it, as in a destructor, comes once more."""
+    if not issubclass(unheard.exc_type, KeyboardInterrupt):
+        return
+    again = threading.Timer(0.05, _interrupt)
+    again.daemon = True
+    again.start()
 
 
 def was_stopped() -> bool:
     """Whether a stop came: a library that was calling back may have made another error of it."""
     return bool(_STOPS)
+
+
+def _interrupt() -> None:
+    """Ctrl+C for the main thread itself, so that it also wakes from waiting for a server."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _stop_no_more() -> None:
@@ -120,11 +138,7 @@ def _watch_stdin() -> None:
     def wait() -> None:
         while os.read(0, 4096):
             pass
-        if hasattr(signal, "pthread_kill"):
-            # To the main thread itself, so that it also wakes from waiting for a server.
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-        else:
-            signal.raise_signal(signal.SIGINT)
+        _interrupt()
 
     threading.Thread(target=wait, name="stdin", daemon=True).start()
 
