@@ -18,6 +18,7 @@ def read(*_, **__):
     try:
         signal.raise_signal(getattr(signal, sys.argv[1]))
     except BaseException:
+        sys.excepthook(*sys.exc_info())  # as numpy's C code does while it is loaded
         raise {error}("Error while accessing batch from stream.") from None
 geofield.formats.read_dataset = read
 main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])

@@ -88,7 +88,14 @@ def stop_cleanly() -> None:
 def _stop(number: int, _: Any) -> None:
     _STOPS.append(number)
     sys.unraisablehook = _stop_again
+    sys.excepthook = _say_no_stop
     raise KeyboardInterrupt
+
+
+def _say_no_stop(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    """A library's C code that is loaded while a stop comes prints it, then fails to load."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
 
 
 def _stop_again(unheard: Any) -> None:
