@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from formats_plan import NAME, make_dataset
+from formats_plan import NAME, UTM, make_dataset
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
@@ -16,6 +17,7 @@ from geofield.errors import FormatError
 from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane, densified, ring_headings
 from geofield.formats.arrow import to_lonlat
+from geofield.model.obstacles import circle_polygons
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 
@@ -162,3 +164,21 @@ def test_positions_are_those_of_the_plan(folder):
     a = to_lonlat(ours.table("field").geometry.to_numpy(), ours.crs)[0]
     b = to_lonlat(back.table("field").geometry.to_numpy(), back.crs)[0]
     assert shapely.hausdorff_distance(a, b) < 5e-8
+
+
+def test_a_crown_that_leans_in_from_outside_is_an_obstacle_again(tmp_path):
+    """Its ring ends at the border, its centre lies beyond: without a flag it was a hole."""
+    dataset = make_dataset()
+    table = dataset.table("obstacles")
+    west = dataset.table("field").total_bounds[0]
+    leaning = circle_polygons(
+        np.array([west - 1.0]), np.array([table.geometry.centroid.y[0]]), 3.0, UTM
+    )
+    shapes = [*leaning, *table.geometry.to_numpy()[1:]]
+    dataset.tables["obstacles"] = table.set_geometry(gpd.GeoSeries(shapes, crs=UTM))
+    write_dataset(dataset, tmp_path, ["agopengps"])
+    back = read_dataset(tmp_path / "agopengps")
+    assert back.table("field").geometry.is_valid.all()
+    first = back.table("obstacles").set_index("obstacle_no").geometry[1]
+    assert first.area > 5
+    assert back.table("field").geometry.iloc[0].buffer(0.05).covers(first)

@@ -22,8 +22,8 @@ def _committed(source: Path) -> Any:
     return nbformat.read(source.with_suffix(".ipynb"), as_version=4)
 
 
-def test_there_are_six() -> None:
-    assert [path.stem[:2] for path in SOURCES] == ["01", "02", "03", "04", "05", "06"]
+def test_all_are_there_with_their_outputs() -> None:
+    assert [path.stem[:2] for path in SOURCES] == ["01", "02", "03", "04", "05", "06", "07"]
     assert {path.stem for path in (ROOT / "notebooks").glob("*.ipynb")} == {
         path.stem for path in SOURCES
     }

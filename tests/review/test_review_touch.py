@@ -111,3 +111,5 @@ def test_corners_of_the_outline_by_fingers(page: Page) -> None:
     fingers.tap(*page.pixel(*moved[at]))
     page.run("document.getElementById('remove').click()")
     page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring) - 1)
+    left = {tuple(corner) for corner in page.state()["field"]["rings"][0]}
+    assert tuple(moved[at]) not in left

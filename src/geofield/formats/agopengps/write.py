@@ -150,12 +150,20 @@ def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
 
 
 def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
-    """One flag per obstacle that is to be avoided, at its centre."""
+    """One flag per obstacle that is to be avoided: at its centre, or in its part in the field.
+
+    By its flag a ring is known as an obstacle, and rings end at the field's border.
+    """
     obstacles = avoided(dataset)
     lines = ["$Flags", str(len(obstacles))]
-    centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
-    if not len(centres):
+    shapes = np.asarray(obstacles.geometry.to_numpy(), dtype=object)
+    if not len(shapes):
         return lines
+    centres = shapely.centroid(shapes)
+    field = shapely.union_all(dataset.table(schema.FIELD.name).geometry.to_numpy())
+    inside = shapely.intersection(shapes, field)
+    leaning = ~shapely.covers(inside, centres) & ~shapely.is_empty(inside)
+    centres[leaning] = shapely.point_on_surface(inside[leaning])
     lonlat = shapely.get_coordinates(to_lonlat(centres, dataset.crs))
     placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
     for (lon, lat), (east, north), number, radius in zip(
