@@ -75,6 +75,32 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path: 
     assert leftovers(tmp_path) == []
 
 
+@pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM", "SIGINT"])
+def test_a_stop_before_the_lock_is_taken_leaves_nothing_for_longer_than_the_next_start(
+    tmp_path: Path, kind: str
+) -> None:
+    code = WRITER.replace(
+        "try:",
+        "import os, signal, tempfile\nmake = tempfile.mkdtemp\n"
+        "def stop(*_):\n    raise KeyboardInterrupt\n"
+        "signal.signal(signal.SIGTERM, stop)\n"
+        f"def stopped(**given):\n    made = make(**given)\n"
+        f"    os.kill(os.getpid(), signal.{kind})\n    return made\n"
+        "tempfile.mkdtemp = stopped\ntry:",
+        1,
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, tmp_path, "n", "0"], check=False, capture_output=True
+    )
+    assert done.returncode != 0
+    assert not (tmp_path / "a.txt").exists()
+    # A stop that can be held back leaves nothing at all.
+    assert len(leftovers(tmp_path)) == (1 if kind == "SIGKILL" else 0)
+    with staged_folder(tmp_path):
+        pass
+    assert leftovers(tmp_path) == []
+
+
 def test_a_move_that_a_kill_cut_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

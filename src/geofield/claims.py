@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import stat
-import tempfile
 import time
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -21,7 +20,7 @@ from pathlib import Path
 
 from geofield.errors import OutputExistsError
 from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import PREFIX, alive, alone, discard, is_living, sweep
+from geofield.leftovers import PREFIX, alone, is_living, sweep, working_folder
 
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
@@ -64,13 +63,11 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
     chosen = None if names is None else frozenset(names)
     with ExitStack() as held:
         held.enter_context(made_folder(target))
-        sweep(target)
-        with alone(target):
+        with alone(target) as certain:
+            sweep(target, certain=certain)
             refuse_claimed(target, chosen)
             try:
-                sign = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
-                held.callback(discard, sign)
-                held.enter_context(alive(sign))
+                sign = held.enter_context(working_folder(target))
                 claim = _Claim(target.resolve(), sign, seen(target))
                 _write(sign, chosen)
             except OSError as error:

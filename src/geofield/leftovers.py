@@ -1,17 +1,21 @@
-"""Staging folders of other processes: which of them live, and what becomes of the dead.
+"""Hidden folders in a folder of products: which of them live, and what becomes of the dead.
 
-A process holds a lock on a file in its staging folder for as long as it lives; the operating
+A process holds a lock on a file in its hidden folder for as long as it lives; the operating
 system takes the lock away however it ends. Where it died while its products were moved into
-place, the move is finished, so that no mixture stays; else its folder is removed.
+place, the move is finished, so that no mixture stays; else its folder is removed. Folders are made
+and swept by one process at a time, so that one without a lock is known to be dead as well.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
+import signal
+import tempfile
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -23,7 +27,7 @@ MOVING = "moving"
 _LOCK = "lock"
 #: What is left of a folder that was being removed, without a lock perhaps.
 _GONE = PREFIX + "gone-"
-#: A folder without a lock is another version's, or was made this moment.
+#: A folder without a lock is another version's, or lies where there are no locks.
 _OLD_S = 3600.0
 _PATIENCE_S = 30.0
 _SWEEPING_S = 0.5
@@ -32,19 +36,54 @@ _LOCKS = find_spec("fcntl") is not None
 
 
 @contextmanager
-def alive(staging: Path) -> Iterator[None]:
-    """Hold the lock that says that a staging folder is in use."""
-    with (staging / _LOCK).open("w") as lock:
-        _hold(lock.fileno())
-        # Only a lock with something in it counts: there is a moment between open and flock.
-        lock.write(f"{os.getpid()}\n")
-        lock.flush()
-        yield
+def working_folder(target: Path) -> Iterator[Path]:
+    """A hidden folder that others leave alone until the block ends, or its process does.
+
+    To be entered by who is :func:`alone` with the target.
+
+    Yields
+    ------
+    Path
+    """
+    with ExitStack() as held:
+        with unstopped():
+            folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
+            held.callback(discard, folder)
+            lock = held.enter_context((folder / _LOCK).open("w"))
+            with suppress(OSError):  # a file system without locks
+                _hold(lock.fileno())
+            lock.write(f"{os.getpid()}\n")
+            lock.flush()
+        yield folder
 
 
 @contextmanager
-def alone(target: Path) -> Iterator[None]:
-    """Be the only process that moves products into a folder.
+def unstopped() -> Iterator[None]:
+    """Let a stop wait until the block ends, which must take milliseconds."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python handles signals in the main thread alone
+        return
+    came: list[int] = []
+    usual = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    for kind in usual:
+        signal.signal(kind, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for kind, handler in usual.items():
+            signal.signal(kind, handler or signal.SIG_DFL)
+        if came:
+            signal.raise_signal(came[0])
+
+
+@contextmanager
+def alone(target: Path) -> Iterator[bool]:
+    """Be the only process that makes, moves or sweeps in a folder; never inside itself.
+
+    Yields
+    ------
+    bool
+        Whether that is certain: not on Windows, nor on a file system without locks.
 
     Raises
     ------
@@ -52,8 +91,9 @@ def alone(target: Path) -> Iterator[None]:
         When another one does not finish.
     """
     if not _LOCKS:
-        yield
+        yield False
         return
+    certain = True
     folder = os.open(target, os.O_RDONLY)
     try:
         until = time.monotonic() + _PATIENCE_S
@@ -68,33 +108,51 @@ def alone(target: Path) -> Iterator[None]:
                     ) from None
                 time.sleep(0.02)
             except OSError:
-                break  # a file system without locks
-        yield
+                certain = False
+                break
+        yield certain
     finally:
         os.close(folder)
 
 
-def sweep(target: Path) -> None:
-    """Remove the staging folders of processes that are dead; those of living ones stay."""
-    for staging in target.glob(PREFIX + "*"):
-        if staging.is_symlink() or not staging.is_dir():
+def sweep(target: Path, *, certain: bool) -> None:
+    """Remove the hidden folders of processes that are dead; those of living ones stay.
+
+    Parameters
+    ----------
+    target : Path
+    certain : bool
+        What :func:`alone`, inside which this is called, has yielded.
+    """
+    for folder in target.glob(PREFIX + "*"):
+        if folder.is_symlink() or not folder.is_dir():
             continue
-        if staging.name.startswith(_GONE):
-            shutil.rmtree(staging, ignore_errors=True)
+        if folder.name.startswith(_GONE):
+            shutil.rmtree(folder, ignore_errors=True)
             continue
         try:
-            with (staging / _LOCK).open("r+") as lock:
-                if not _LOCKS or not lock.read(1):
-                    _sweep_old(staging)
+            with (folder / _LOCK).open("r+") as lock:
+                if not _LOCKS:
+                    _sweep_old(folder)
                     continue
                 _hold(lock.fileno())
-                if (staging / MOVING).exists():
-                    _finish(staging, target)
-                discard(staging)
+                if (folder / MOVING).exists():
+                    _finish(folder, target)
+                discard(folder)
         except FileNotFoundError:
-            _sweep_old(staging)
+            if not (certain and _is_removed(folder)):
+                _sweep_old(folder)
         except OSError:
             continue  # locked by the living, or not ours to remove
+
+
+def _is_removed(folder: Path) -> bool:
+    """Whether a folder was empty, and is no more: its process died before it came to its lock."""
+    try:
+        folder.rmdir()
+    except OSError:
+        return False
+    return True
 
 
 def discard(staging: Path) -> None:

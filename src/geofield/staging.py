@@ -10,19 +10,16 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import sqlite3
-import tempfile
-import threading
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from geofield.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.errors import FormatError, OutputExistsError
 from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import MOVING, PREFIX, alive, alone, discard, sweep
+from geofield.leftovers import MOVING, alone, sweep, unstopped, working_folder
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
 
@@ -56,26 +53,24 @@ def staged_folder(
         program. The previous products are then as they were.
     """
     target, inputs = Path(folder), tuple(inputs)
-    with made_folder(target):
-        sweep(target)
-        refuse_claimed(target, ())
-        before = before_work(target)
+    with ExitStack() as held:
+        held.enter_context(made_folder(target))
+        with alone(target) as certain:
+            sweep(target, certain=certain)
+            refuse_claimed(target, ())
+            before = before_work(target)
+            try:
+                staging = held.enter_context(working_folder(target))
+            except OSError as error:
+                raise cannot_write(target, error) from error
         try:
-            staging = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target))
+            work = staging / "new"
+            work.mkdir()
+            yield work
+            with alone(target), unstopped():
+                _publish(work, target, staging, overwrite, inputs, before)
         except OSError as error:
             raise cannot_write(target, error) from error
-        try:
-            with alive(staging):
-                work = staging / "new"
-                work.mkdir()
-                try:
-                    yield work
-                    with alone(target), _unstopped():
-                        _publish(work, target, staging, overwrite, inputs, before)
-                except OSError as error:
-                    raise cannot_write(target, error) from error
-        finally:
-            discard(staging)
 
 
 @contextmanager
@@ -92,25 +87,6 @@ def staged_file(
     _refuse(target, overwrite, inputs)
     with staged_folder(target.parent, overwrite=overwrite, inputs=inputs) as folder:
         yield folder / target.name
-
-
-@contextmanager
-def _unstopped() -> Iterator[None]:
-    """Let a stop wait until the files are in place: it takes milliseconds, and none is between."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python handles signals in the main thread alone
-        return
-    came: list[int] = []
-    usual = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
-    for kind in usual:
-        signal.signal(kind, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        for kind, handler in usual.items():
-            signal.signal(kind, handler or signal.SIG_DFL)
-        if came:
-            signal.raise_signal(came[0])
 
 
 def _publish(

@@ -61,10 +61,7 @@ class Stop:
     products: str = ""
     #: The same before the next start, which finishes what a kill cut.
     at_once: str = ""
-    #: Of the products.
     faults: list[str] = field(default_factory=list)
-    #: Of how the command ended and what it said.
-    words: list[str] = field(default_factory=list)
 
 
 def make_works(folder: Path, picture: Path, point: list[str]) -> list[Work]:
@@ -146,14 +143,10 @@ def stop(work: Work, kind: signal.Signals, dice: random.Random, out: Path, *, ai
     began = found.at_once != "old" or "in main" in told or "Traceback" not in told[:10]
     silent = found.at_once == "old" and not told
     if not (process.returncode == -kind and (silent or not began)):
-        found.words = _said(process.returncode, told, kind)
+        found.faults = _said(process.returncode, told, kind)
     if kind != signal.SIGKILL and found.at_once not in ("old", "new"):
         found.faults.append(f"after {kind.name}: {found.at_once}")
     next_start(out)
-    if any(out.rglob(HIDDEN + "*")):
-        # A lock may outlive its process by a moment: the start after that sweeps.
-        time.sleep(1.0)
-        next_start(out)
     found.products = _products(work, out, was)
     if found.products not in ("old", "new"):
         found.faults.append(found.products)
