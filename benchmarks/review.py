@@ -5,6 +5,7 @@ Needs Chromium and its driver (Debian: chromium chromium-driver). Times are medi
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import json
 import os
@@ -219,6 +220,7 @@ def large_picture(folder: Path, plan: Path, side_px: int = 20_000) -> Path:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1280,860"):

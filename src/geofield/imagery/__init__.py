@@ -1,12 +1,37 @@
-"""Stage 1: from a GPS point to a georeferenced picture."""
+"""Stage 1: from a GPS point to a georeferenced picture.
 
-from geofield.imagery.acquire import Acquired, FetchOptions, Where, acquire, with_provenance
-from geofield.imagery.at_place import is_own_picture, picture_at
-from geofield.imagery.pictures import open_reader
-from geofield.imagery.reader import SceneReader
-from geofield.imagery.scene import read_scene
-from geofield.imagery.sources import find_source
-from geofield.imagery.write import write_scene
+The names below load their modules when they are first used: who opens a picture that lies here
+needs nothing of what fetches one from a server.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from geofield.imagery.acquisition import Acquired, FetchOptions, Where, acquire, with_provenance
+    from geofield.imagery.at_place import is_own_picture, picture_at
+    from geofield.imagery.pictures import open_reader
+    from geofield.imagery.reader import SceneReader
+    from geofield.imagery.scene import read_scene
+    from geofield.imagery.sources import find_source
+    from geofield.imagery.write import write_scene
+
+_HOME = {
+    "Acquired": "acquisition",
+    "FetchOptions": "acquisition",
+    "SceneReader": "reader",
+    "Where": "acquisition",
+    "acquire": "acquisition",
+    "find_source": "sources",
+    "is_own_picture": "at_place",
+    "open_reader": "pictures",
+    "picture_at": "at_place",
+    "read_scene": "scene",
+    "with_provenance": "acquisition",
+    "write_scene": "write",
+}
 
 __all__ = [
     "Acquired",
@@ -22,3 +47,15 @@ __all__ = [
     "with_provenance",
     "write_scene",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from geofield.imagery.acquire import FetchOptions, Where, acquire, with_provenance
+from geofield.imagery.acquisition import FetchOptions, Where, acquire, with_provenance
 from geofield.imagery.scene import read_scene
 from geofield.imagery.sources import PictureSource, Source
 from geofield.imagery.write import write_scene

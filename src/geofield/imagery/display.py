@@ -26,8 +26,8 @@ from rasterio.warp import reproject, transform_bounds
 
 from geofield.errors import ImageryError
 from geofield.grid import Grid
-from geofield.imagery import SceneReader
 from geofield.imagery.gdal import to_rasterio
+from geofield.imagery.reader import SceneReader
 from geofield.model.scene import Scene
 
 TILE_PX = 512
