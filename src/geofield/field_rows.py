@@ -13,15 +13,16 @@ from geofield.errors import FormatError
 from geofield.model.dataset import Dataset
 from geofield.model.evidence import quality_from_json
 from geofield.model.field import Alternative, Field
+from geofield.model.rows import Rows
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
 
-def alternatives_table(field: Field) -> gpd.GeoDataFrame:
+def alternatives_rows(field: Field) -> Rows:
     """Layer `alternatives`: the outlines that may be meant."""
     polygons = [one.polygon for one in field.alternatives]
-    return schema.table(
+    return Rows(
         schema.ALTERNATIVES,
         {
             "alternative_no": list(range(1, len(polygons) + 1)),

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from pyproj import Geod
 
+from geofield import schema
 from geofield.earlier import (
     holds,
     keeps_outline,
@@ -324,7 +325,7 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
     tracks = plan_with_settings(
         field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid
     )
-    if not len(tracks.lines) and not tracks.blocked_count:
+    if not len(tracks.rows()[schema.TRACKS.name]) and not tracks.blocked_count:
         raise TrackError(
             f"The field of {field.area_ha:.4f} ha is smaller than one track.",
             hint="Choose a smaller spacing or headland, or check the outline.",

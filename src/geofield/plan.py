@@ -14,13 +14,14 @@ import shapely
 from geofield import __version__, schema
 from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
-from geofield.field_rows import alternatives_table, field_from_row
+from geofield.field_rows import alternatives_rows, field_from_row
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence
 from geofield.model.field import Field
 from geofield.model.frame import along_frame, outside_in_words
+from geofield.model.rows import Rows
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
 
@@ -120,14 +121,16 @@ class Plan:
         one = self.field
         words = (one.name, one.field_id, one.method, one.imagery, one.imagery_date, one.licence)
         outline = None if self.tracks is None else self.tracks.outline
-        return (one.crs, one.polygon, words, one.own, outline, self._provenance(), self.grid)
+        return (one.crs, one.polygon, words, one.own, outline, self.provenance, self.grid)
 
     def _tables(self) -> dict[str, gpd.GeoDataFrame]:
         """All tables but the field's own and its alternatives, which are proposals."""
         tables = {} if self.obstacles is None else {schema.OBSTACLES.name: self.obstacles}
         return tables if self.tracks is None else tables | self.tracks.tables()
 
-    def _provenance(self) -> Provenance:
+    @property
+    def provenance(self) -> Provenance:
+        """Where the plan comes from: software, picture, settings, and what the stages recorded."""
         tracks = None if self.tracks is None else self.tracks.evidence()
         evidence = self.evidence.to_json(self.field, tracks)
         settings = self.settings.model_dump(mode="json") if self.settings else {}
@@ -152,17 +155,25 @@ class Plan:
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
-        tables = {schema.FIELD.name: self._field_table()} | self._tables()
-        if self.field.alternatives:
-            tables[schema.ALTERNATIVES.name] = alternatives_table(self.field)
         return Dataset(
-            tables=tables,
+            tables={name: rows.frame for name, rows in self.rows().items()},
             crs=self.field.crs,
             name=self.field.name,
-            provenance=self._provenance(),
+            provenance=self.provenance,
             grid=self.grid,
             points=None if self.tracks is None else self.tracks.point_chunks,
         )
+
+    def rows(self) -> dict[str, Rows]:
+        """All layers but the track points, by name, without making tables of them."""
+        rows = {schema.FIELD.name: self._field_rows()}
+        if self.obstacles is not None:
+            rows[schema.OBSTACLES.name] = Rows.of(schema.OBSTACLES, self.obstacles)
+        if self.tracks is not None:
+            rows |= self.tracks.rows()
+        if self.field.alternatives:
+            rows[schema.ALTERNATIVES.name] = alternatives_rows(self.field)
+        return rows
 
     @classmethod
     def from_dataset(cls, dataset: Dataset) -> Plan:
@@ -313,7 +324,7 @@ class Plan:
 
         return PlanPage(document(self.to_dataset(), self.scene), height_px)
 
-    def _field_table(self) -> gpd.GeoDataFrame:
+    def _field_rows(self) -> Rows:
         from geofield.tracks.direction import find_baseline
 
         one = self.field
@@ -323,7 +334,7 @@ class Plan:
         edge = baseline.edge
         edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)
         heading = baseline.heading_deg if self.tracks is None else self.tracks.heading_deg
-        return schema.table(
+        return Rows(
             schema.FIELD,
             {
                 "field_id": [one.field_id],

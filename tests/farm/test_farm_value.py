@@ -186,3 +186,18 @@ def test_what_is_no_farm_is_refused(tmp_path: Path) -> None:
     (tmp_path / "farm.json").write_text('{"version": 99}')
     with pytest.raises(FormatError, match="later version"):
         read_farm(tmp_path)
+
+
+def test_what_is_changed_in_a_plans_tables_is_in_the_farm(tmp_path: Path) -> None:
+    plan = plan_at(500_000.0, 5_500_000.0, 32632, "one")
+    assert plan.tracks is not None
+    lengths_m = plan.tracks.segments["length_m"].to_numpy().copy()
+    # Columns that nobody looked at, and a table that was made and changed since.
+    plan.tracks.segments["length_m"] = lengths_m + 1.0
+    plan.tracks.segments["driver"] = "Ayşe"
+    Farm([plan]).write(tmp_path / "farm")
+    found = gpd.read_parquet(tmp_path / "farm" / "segments")
+    assert np.array_equal(found["length_m"], lengths_m + 1.0)
+    assert set(found["driver"]) == {"Ayşe"}
+    assert len(gpd.read_parquet(tmp_path / "farm" / "gaps")) == len(plan.tracks.gaps)
+    assert read_farm(tmp_path / "farm")["one"] == plan

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,8 @@ from geofield.formats import origin
 from geofield.formats.antimeridian import split
 from geofield.formats.arrow import arrow_type, arrow_values
 from geofield.model import Dataset
+from geofield.model.dataset import refuse_other_crs
+from geofield.model.rows import Rows
 from geofield.plan import Plan
 
 if TYPE_CHECKING:
@@ -59,57 +62,50 @@ def tables_of(plans: Iterable[Plan], own: pa.Schema | None = None) -> Tables:
     dict of str to pa.Table
         By layer name, with `plan`; optional layers only where they have rows.
     """
-    sets = [plan.to_dataset() for plan in plans]
-    ids = [str(one.tables[schema.FIELD.name][FIELD_ID].iloc[0]) for one in sets]
+    plans = list(plans)
+    rows = [plan.rows() for plan in plans]
+    crs = [plan.field.crs for plan in plans]
+    for each, its in zip(rows, crs, strict=True):
+        refuse_other_crs(each, its)
+    ids = [plan.field.field_id for plan in plans]
     tables: Tables = {}
     for layer in LAYERS:
         parts = [
-            (at, one.tables[layer.name])
-            for at, one in enumerate(sets)
-            if layer.name in one.tables and len(one.tables[layer.name])
+            (at, one[layer.name])
+            for at, one in enumerate(rows)
+            if layer.name in one and len(one[layer.name])
         ]
         if parts or layer.name in ALWAYS:
             given = own if layer.name == schema.FIELD.name else None
-            tables[layer.name] = _layer(layer, parts, sets, ids, given)
-    tables[PLAN] = _records(sets, ids)
+            tables[layer.name] = _layer(layer, parts, crs, ids, given)
+    tables[PLAN] = _records(plans, rows, ids)
     return tables
 
 
 def _layer(
     of: schema.Layer,
-    parts: Sequence[tuple[int, gpd.GeoDataFrame]],
-    sets: Sequence[Dataset],
+    parts: Sequence[tuple[int, Rows]],
+    crs: Sequence[CRS],
     ids: Sequence[str],
     own: pa.Schema | None,
 ) -> pa.Table:
-    import pandas as pd
     import pyarrow as pa
 
-    counts = [len(frame) for _, frame in parts]
+    counts = [len(rows) for _, rows in parts]
     mine = [ids[at] for at, _ in parts]
-    zones = [epsg_of(sets[at].crs) for at, _ in parts]
+    zones = [epsg_of(crs[at]) for at, _ in parts]
     columns: dict[str, Any] = {
         FIELD_ID: pa.array(np.repeat(np.array(mine, dtype=object), counts), pa.string()),
         EPSG: pa.array(np.repeat(np.array(zones, dtype=object), counts), pa.int32()),
     }
     for column in of.columns:
-        if column.name == FIELD_ID:
-            continue
-        if not parts:
-            columns[column.name] = pa.array([], arrow_type(column))
-            continue
-        series = [frame[column.name] for _, frame in parts]
-        if column.type == "float":
-            series = [pd.Series(np.concatenate([each.to_numpy() for each in series]))]
-        elif column.type != "int":
-            values = np.concatenate([each.to_numpy(dtype=object) for each in series])
-            series = [pd.Series(values, dtype=object)]
-        whole = series[0] if len(series) == 1 else pd.concat(series, ignore_index=True)
-        columns[column.name] = arrow_values(column, whole)
-    columns |= _own(of, [frame for _, frame in parts], own)
-    shapes = [np.asarray(frame.geometry.array, dtype=object) for _, frame in parts]
+        if column.name != FIELD_ID:
+            values = [rows.column(column.name) for _, rows in parts]
+            columns[column.name] = _joined(column, values)
+    columns |= _own(of, [rows for _, rows in parts], own)
+    shapes = [rows.geometry for _, rows in parts]
     lonlat = [np.empty(0, dtype=object)]
-    for zone, group in _grouped([sets[at].crs for at, _ in parts], shapes):
+    for zone, group in _grouped([crs[at] for at, _ in parts], shapes):
         lonlat.append(_lonlat(np.concatenate(group), zone))
     exact = np.concatenate([np.empty(0, dtype=object), *shapes])
     columns[GEOMETRY] = pa.array(shapely.to_wkb(np.concatenate(lonlat), flavor="iso"), pa.binary())
@@ -117,24 +113,35 @@ def _layer(
     return pa.table(columns)
 
 
-def _own(
-    of: schema.Layer, frames: Sequence[gpd.GeoDataFrame], own: pa.Schema | None
-) -> dict[str, Any]:
+def _joined(column: schema.Column, parts: Sequence[Any]) -> pa.Array:
+    """A column of several fields, of which some may be tables that a person has changed."""
+    import pandas as pd
+    import pyarrow as pa
+
+    kind = arrow_type(column)
+    if not parts:
+        return pa.array([], kind)
+    wanted = {"int": "i", "float": "f"}.get(column.type)
+    if wanted and all(isinstance(one, np.ndarray) and one.dtype.kind == wanted for one in parts):
+        return pa.array(np.concatenate(parts), kind, from_pandas=True)
+    return pa.concat_arrays(
+        arrow_values(column, one) if column.type == "date" or isinstance(one, pd.Series)
+        else pa.array(one, kind, from_pandas=True)
+        for one in parts
+    )  # fmt: skip
+
+
+def _own(of: schema.Layer, parts: Sequence[Rows], own: pa.Schema | None) -> dict[str, Any]:
     """The user's own columns, by name; of given types where they are known before."""
     import pyarrow as pa
 
     names = list(own.names) if own is not None else []
-    names += [
-        name
-        for frame in frames
-        for name in schema.own_columns(of, frame)
-        if name not in (EPSG, EXACT, FIELD_ID)
-    ]
+    names += [name for rows in parts for name in rows.own if name not in (EPSG, EXACT, FIELD_ID)]
     columns = {}
     for name in dict.fromkeys(names):
         values: list[Any] = []
-        for frame in frames:
-            values += _plain(frame[name]) if name in frame.columns else [None] * len(frame)
+        for rows in parts:
+            values += rows.own_values(name)
         kind = None if own is None or name not in own.names else own.field(name).type
         try:
             found = pa.array(values, kind, from_pandas=True)
@@ -144,12 +151,6 @@ def _own(
             found = pa.array(texts, pa.string())
         columns[name] = found.cast(pa.string()) if pa.types.is_null(found.type) else found
     return columns
-
-
-def _plain(series: Any) -> list[Any]:
-    import pandas as pd
-
-    return [None if pd.isna(value) else value for value in series.tolist()]
 
 
 def _grouped(zones: Sequence[CRS], shapes: Sequence[Any]) -> list[tuple[CRS, list[Any]]]:
@@ -175,33 +176,40 @@ def _lonlat(shapes: Any, crs: CRS) -> Any:
     return shapely.orient_polygons(moved)
 
 
-def _records(sets: Sequence[Dataset], ids: Sequence[str]) -> pa.Table:
+def _records(
+    plans: Sequence[Plan], rows: Sequence[Mapping[str, Rows]], ids: Sequence[str]
+) -> pa.Table:
     """What is no layer, as text; the same texts for many fields take no room."""
     import pyarrow as pa
 
-    rows = [_record(one) for one in sets]
+    settings: dict[int, str] = {}
+    records = []
+    for plan, layers in zip(plans, rows, strict=True):
+        if id(plan.settings) not in settings:
+            settings[id(plan.settings)] = _json(plan.provenance.settings)
+        records.append(_record(plan, layers) | {"settings": settings[id(plan.settings)]})
     names = ("name", "crs", "tables", "software", "settings", "source", "evidence", "grid")
     columns: dict[str, Any] = {
         FIELD_ID: pa.array(list(ids), pa.string()),
-        EPSG: pa.array([epsg_of(one.crs) for one in sets], pa.int32()),
+        EPSG: pa.array([epsg_of(plan.field.crs) for plan in plans], pa.int32()),
     }
     for name in names:
-        columns[name] = pa.array([row[name] for row in rows], pa.string())
+        columns[name] = pa.array([row[name] for row in records], pa.string())
     return pa.table(columns)
 
 
-def _record(one: Dataset) -> dict[str, str]:
-    content = origin.content_of(one)
-    tables = {
-        name: schema.own_columns(schema.layer(name), table) for name, table in one.tables.items()
-    }
-    texts = {"settings", "source", "evidence", "grid"}
-    return {
-        "name": one.name,
+def _record(plan: Plan, layers: Mapping[str, Rows]) -> dict[str, str]:
+    """What is no layer of one field, but for its settings, which it shares with many."""
+    provenance = replace(plan, settings=None).provenance
+    bare = Dataset({}, plan.field.crs, plan.field.name, provenance, plan.grid)
+    content = origin.content_of(bare)
+    texts = {name: _json(content[name]) for name in ("source", "evidence", "grid")}
+    own = {name: rows.own for name, rows in layers.items()}
+    return texts | {
+        "name": plan.field.name,
         "crs": content["crs"],
-        "tables": _json(tables),
+        "tables": _json(own),
         "software": content["software"],
-        **{name: _json(content[name]) for name in texts},
     }
 
 

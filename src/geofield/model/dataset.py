@@ -78,11 +78,7 @@ class Dataset:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, table in self.tables.items():
-            crs = table.crs
-            # To compare two takes as long as to make a small table.
-            if crs is not self.crs and (crs is None or CRS(crs) != self.crs):
-                raise CRSMismatchError(f"Layer {name!r} is not in the dataset's {self.crs.name}.")
+        refuse_other_crs(self.tables, self.crs)
 
     def table(self, name: str) -> gpd.GeoDataFrame:
         """The table of a layer; an empty one where the dataset has none."""
@@ -122,3 +118,16 @@ class Dataset:
             yield from self.points()
         elif self.has(schema.TRACK_POINTS.name):
             yield self.tables[schema.TRACK_POINTS.name]
+
+
+def refuse_other_crs(layers: Mapping[str, Any], crs: CRS) -> None:
+    """Refuse layers, as tables or rows, that are in another CRS than their dataset's.
+
+    Raises
+    ------
+    CRSMismatchError
+    """
+    for name, layer in layers.items():
+        # To compare two takes as long as to make a small table.
+        if layer.crs is not crs and (layer.crs is None or CRS(layer.crs) != crs):
+            raise CRSMismatchError(f"Layer {name!r} is not in the dataset's {crs.name}.")

@@ -17,6 +17,7 @@ from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
+from geofield.model.rows import Rows, rows_of, tables_when_asked
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
 
 if TYPE_CHECKING:
@@ -31,6 +32,15 @@ def points_per_segment(length_m: NDArray[np.float64], step_m: float) -> NDArray[
     return np.asarray(np.ceil(length_m / step_m - 1e-6).clip(min=1), dtype=np.int64) + 1
 
 
+@tables_when_asked(
+    lines=schema.TRACKS,
+    segments=schema.SEGMENTS,
+    gaps=schema.GAPS,
+    headland=schema.HEADLAND,
+    headland_tracks=schema.HEADLAND_TRACKS,
+    route=schema.ROUTE,
+    turns=schema.TURNS,
+)
 @dataclass(frozen=True, eq=False, repr=False)
 class Tracks:
     """Planned tracks of one field.
@@ -110,20 +120,15 @@ class Tracks:
     @property
     def crs(self) -> CRS:
         """The metric CRS."""
-        return CRS(self.segments.crs)
+        return CRS(self.rows()[schema.SEGMENTS.name].crs)
 
     def tables(self) -> dict[str, gpd.GeoDataFrame]:
         """All layers but the track points, by name; optional ones only where planned."""
-        every = {
-            schema.TRACKS.name: self.lines,
-            schema.SEGMENTS.name: self.segments,
-            schema.GAPS.name: self.gaps,
-            schema.HEADLAND.name: self.headland,
-            schema.HEADLAND_TRACKS.name: self.headland_tracks,
-            schema.ROUTE.name: self.route,
-            schema.TURNS.name: self.turns,
-        }
-        return {name: table for name, table in every.items() if table is not None}
+        return {name: rows.frame for name, rows in self.rows().items()}
+
+    def rows(self) -> dict[str, Rows]:
+        """The same without making tables of rows that nobody asked for yet."""
+        return rows_of(self)
 
     def evidence(self) -> dict[str, Any]:
         """What the tables do not say, as plain JSON values."""

@@ -8,6 +8,8 @@ a few degrees of them, and the tracks follow the longest straight run among thos
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import shapely
 from shapely import Polygon
@@ -20,6 +22,8 @@ _SAME_DEG, _OTHER_DEG = 8.0, 16.0
 _LONGER_COUNTS_MORE = 1.3
 """Power of an edge's length: of two borders as long, the one of fewer pieces is the surer."""
 _MOST_DIRECTIONS = 2000
+_MOST_CELLS = 100_000
+"""Differences of directions that are reckoned at a time."""
 
 
 def dominant_edge(
@@ -45,13 +49,18 @@ def dominant_edge(
     # The longest edges are enough to choose among; all edges are weighed.
     tried = np.argsort(-length, kind="stable")[:_MOST_DIRECTIONS]
     sure = length**_LONGER_COUNTS_MORE
-    weight = np.array([_alike(angle, angle[edge]) @ sure for edge in tried])
+    rows = max(1, _MOST_CELLS // len(xy))
+    weight = np.array([
+        row @ sure
+        for first in range(0, len(tried), rows)
+        for row in _alike(angle, angle[tried[first : first + rows], None])
+    ])  # fmt: skip
     alike = _alike(angle, angle[tried[int(np.argmax(weight.round(6)))]])
     run = longest_run(xy, tolerance, barred | (alike <= 0.5))
     return run, float(alike @ length / max(length.sum(), 1e-12))
 
 
-def _alike(angle: FloatArray, other: float) -> FloatArray:
+def _alike(angle: FloatArray, other: Any) -> FloatArray:
     """1 for directions that are nearly the same, falling to 0 for those that are not."""
     apart = np.abs((angle - other + 90.0) % 180.0 - 90.0)
     return np.asarray(np.clip((_OTHER_DEG - apart) / (_OTHER_DEG - _SAME_DEG), 0.0, 1.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import geopandas as gpd
 import numpy as np
 import shapely
 from pyproj import CRS
@@ -12,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from geofield import schema
 from geofield.errors import TrackError
 from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
+from geofield.model.rows import Rows
 
 # Corners stay corners (an implement is turned there), but a spike's corner is cut off.
 _MITRE_LIMIT = 2.0
@@ -75,11 +75,11 @@ def main_area(
 
 def headland_table(
     outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float
-) -> gpd.GeoDataFrame:
+) -> Rows:
     """Layer `headland`: the field less its main area, one row."""
     strip = shapely.difference(outline, inner)
     parts = [p for p in shapely.get_parts(strip) if isinstance(p, Polygon) and p.area > 0.0]
-    return schema.table(
+    return Rows(
         schema.HEADLAND,
         {
             "headland_no": np.array([1]),
@@ -101,7 +101,7 @@ def headland_track_table(
     crs: CRS,
     scale: float,
     holes: bool = False,
-) -> gpd.GeoDataFrame:
+) -> Rows:
     """Layer `headland_tracks`: rings half a spacing from the border and every spacing inwards.
 
     As many as fit the headland (at least one), cut where obstacles stand. A ring that nothing
@@ -131,7 +131,7 @@ def headland_track_table(
                     rows.append((index + 1, number, offset))
                     lines.append(piece)
     columns = np.array(rows).reshape(-1, 3)
-    return schema.table(
+    return Rows(
         schema.HEADLAND_TRACKS,
         {
             "pass_no": columns[:, 0].astype(np.int64),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import geopandas as gpd
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
+from geofield.model.rows import Rows
 from geofield.model.tracks import points_per_segment
 from geofield.tracks.clip import Crossings, Pieces
 from geofield.tracks.frame import FloatArray, TrackFrame
@@ -30,9 +30,9 @@ def _ends(start: FloatArray, end: FloatArray, v: FloatArray, frame: TrackFrame) 
 
 def segment_table(
     ends: FloatArray, track_no: IntArray, segment_no: IntArray, length_m: FloatArray, crs: CRS
-) -> gpd.GeoDataFrame:
+) -> Rows:
     """Layer `segments`."""
-    return schema.table(
+    return Rows(
         schema.SEGMENTS,
         {"track_no": track_no, "segment_no": segment_no, "length_m": length_m},
         _lines(ends),
@@ -48,11 +48,11 @@ def line_table(
     heading_deg: float,
     step_m: float,
     crs: CRS,
-) -> gpd.GeoDataFrame:
+) -> Rows:
     """Layer `tracks`: one row for each track with at least one segment."""
     numbers, first, count = np.unique(track_no, return_index=True, return_counts=True)
     points = points_per_segment(length_m, step_m)
-    return schema.table(
+    return Rows(
         schema.TRACKS,
         {
             "track_no": numbers,
@@ -75,7 +75,7 @@ def gap_table(
     *,
     obstacle_no: IntArray,
     crs: CRS,
-) -> gpd.GeoDataFrame:
+) -> Rows:
     """Layer `gaps`, each with its causes in words and its lowest obstacle number."""
     before = gaps_between(pieces)
     start, end = pieces.end[before], pieces.start[before + 1]
@@ -84,7 +84,7 @@ def gap_table(
     gap_of_piece[before] = np.arange(len(before))
     piece, owner = gap_causes(pieces, crossings)
     causes, lowest = _in_words(gap_of_piece[piece], owner, obstacle_no, len(before))
-    return schema.table(
+    return Rows(
         schema.GAPS,
         {
             "track_no": track + 1,
