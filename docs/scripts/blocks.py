@@ -7,7 +7,11 @@ namespace. What a block prints is compared with the block that follows it:
 - ``text title="For example"``: the same words; numbers may differ.
 
 A block with a file name as its title (``toml title="geofield.toml"``) is written to that
-file first. ``python docs/scripts/blocks.py --update PAGE...`` writes the outputs anew.
+file first, below what an earlier page put there. ``python docs/scripts/blocks.py --update
+PAGE...`` writes the outputs anew.
+
+Each page is run in a folder of its own, for a reader who comes straight to it, and those of
+:func:`course` also one after another in one folder, for a reader who goes through them all.
 """
 
 from __future__ import annotations
@@ -22,11 +26,12 @@ import shlex
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from orthophoto_server import PUBLIC_ADDRESS, serving
+from orthophoto_server import CHIP_HOST, PUBLIC_ADDRESS, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -86,6 +91,29 @@ def pages() -> list[Path]:
     return [path for path in found if any(map(_runs, read_blocks(path.read_text("utf-8"))))]
 
 
+def course() -> list[Path]:
+    """Tutorials and how-to pages with blocks to run, in the order of the navigation."""
+    named = re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    first, runnable = named.index("tutorial.md"), set(pages())
+    ordered = [
+        DOCS / name for name in named[first:] if "/" not in name or name.startswith("how-to")
+    ]
+    last = max(at for at, page in enumerate(ordered) if page.parent.name == "how-to")
+    return [page for page in ordered[: last + 1] if page in runnable]
+
+
+def real_data() -> Path | None:
+    """The folder of real data beside the project, where there is one."""
+    shared = Path(os.environ.get("GEOFIELD_SHARED", ROOT.parent / "shared"))
+    return shared if (shared / "data").is_dir() else None
+
+
+def needs_shared(page: Path) -> bool:
+    """Whether a page works on real data, which lie beside the project."""
+    text = page.read_text(encoding="utf-8")
+    return "../shared" in text or CHIP_HOST in text
+
+
 def _runs(block: Block) -> bool:
     return block.language in ("python", "bash") and not block.is_output
 
@@ -113,31 +141,36 @@ def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
 
 
 def run_page(path: Path, folder: Path, shared: Path | None = None, *, update: bool = False) -> int:
-    """Run a page's blocks; the number of blocks run.
+    """Run a page's blocks in a folder of its own (:func:`run_pages` of it alone)."""
+    return run_pages([path], folder, shared, update=update)
+
+
+def run_pages(
+    paths: Iterable[Path], folder: Path, shared: Path | None = None, *, update: bool = False
+) -> int:
+    """Run the blocks of pages one after another in one folder; the number of blocks run.
 
     Raises
     ------
     BlockError
         Naming the page and the line of the block.
     """
-    text = path.read_text(encoding="utf-8")
-    if PUBLIC_ADDRESS not in text:
-        return _run_page(path, text, folder, shared, {}, update=update)
-    with serving() as address:
-        return _run_page(path, text, folder, shared, {PUBLIC_ADDRESS: address}, update=update)
+    work, environment = prepare(folder, shared)
+    with serving(shared) as address:
+        addresses = {PUBLIC_ADDRESS: address, CHIP_HOST: address}
+        return sum(_run_page(path, work, environment, addresses, update=update) for path in paths)
 
 
 def _run_page(
     path: Path,
-    text: str,
-    folder: Path,
-    shared: Path | None,
+    work: Path,
+    environment: dict[str, str],
     addresses: dict[str, str],
     *,
     update: bool,
 ) -> int:
     """Run a page's blocks, with addresses that stand for those on the page."""
-    work, environment = prepare(folder, shared)
+    text = path.read_text(encoding="utf-8")
     blocks = read_blocks(text)
     namespace: dict[str, object] = {"__name__": "__main__"}
     replacements: list[tuple[Block, str]] = []
@@ -149,7 +182,8 @@ def _run_page(
             block = replace(block, body=block.body.replace(public, loopback))
         if not _runs(block):
             if "." in block.title and not block.is_output:
-                (work / block.title).write_text(block.body, encoding="utf-8")
+                with (work / block.title).open("a", encoding="utf-8") as file:
+                    file.write(block.body)
             continue
         if block.language == "python":
             printed = _run_python(block, work, namespace, where)
@@ -208,19 +242,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Run the code blocks of documentation pages.")
     parser.add_argument("pages", nargs="*", type=Path)
     parser.add_argument("--update", action="store_true", help="write outputs anew")
+    parser.add_argument("--course", action="store_true", help="the whole course in one folder")
     chosen = parser.parse_args()
-    shared = Path(os.environ.get("GEOFIELD_SHARED", ROOT.parent / "shared"))
+    real = real_data()
     failed = 0
-    for page in [path.resolve() for path in chosen.pages] or pages():
+    if chosen.course:
+        rounds = [[page for page in course() if real or not needs_shared(page)]]
+    else:
+        rounds = [[path.resolve()] for path in chosen.pages] or [[page] for page in pages()]
+    for each in rounds:
         with tempfile.TemporaryDirectory() as folder:
             try:
-                count = run_page(
-                    page,
-                    Path(folder),
-                    shared if shared.is_dir() else None,
-                    update=chosen.update,
-                )
-                print(f"{page.relative_to(ROOT)}: {count} blocks")
+                count = run_pages(each, Path(folder), real, update=chosen.update)
+                print(f"{', '.join(str(page.relative_to(ROOT)) for page in each)}: {count} blocks")
             except BlockError as error:
                 failed += 1
                 print(f"FAILED {error}", file=sys.stderr)

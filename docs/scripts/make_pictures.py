@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,6 @@ def review() -> None:
     inside = plan.field.polygon.buffer(-40).representative_point()
     added = gpd_row(inside.buffer(5), obstacles)
     obstacles = pd.concat([obstacles, added], ignore_index=True)
-    from dataclasses import replace
-
     edited = replace(plan, obstacles=obstacles)
     again = gf.plan_field(SAMPLE, **POINT, settings=settings, previous=edited)
     with tempfile.TemporaryDirectory() as folder:
@@ -65,6 +64,24 @@ def gpd_row(shape: Polygon, like: pd.DataFrame) -> pd.DataFrame:
     import geopandas as gpd
 
     return gpd.GeoDataFrame({"status": ["added"]}, geometry=[shape], crs=like.crs)
+
+
+def meadow() -> None:
+    """The plan of the tutorial on a real picture, without the picture: that stays its owner's."""
+    chip = ROOT.parent / "shared" / "data" / "trees" / "riverside_2018_89.tif"
+    if not chip.is_file():
+        return
+    settings = gf.load_settings(overrides={"tracks": {"spacing_m": 6.0}})
+    scene = gf.read_scene(chip)
+    owner = "J. Ventura et al., Urban Tree Detection Data; NAIP 2018"
+    source = replace(scene.source, attribution=owner, licence="CC BY 4.0")
+    scene = replace(scene, source=source)
+    plan = gf.plan_field(scene, lat=33.930697, lon=-117.427058, settings=settings)
+    plan = replace(plan, scene=None)
+    with tempfile.TemporaryDirectory() as folder:
+        plan.write(Path(folder) / "out", formats=["gpkg"])
+        Image.open(Path(folder) / "out" / "map.png").save(IMAGES / "meadow_map.png")
+    _shrink(IMAGES / "meadow_map.png")
 
 
 def tracks() -> None:
@@ -127,7 +144,7 @@ def _shrink(path: Path) -> None:
 
 def main() -> int:
     IMAGES.mkdir(exist_ok=True)
-    for draw in (demo_map, review, tracks, detection):
+    for draw in (demo_map, review, meadow, tracks, detection):
         draw()
     for path in sorted(IMAGES.iterdir()):
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1024:.0f} kB")

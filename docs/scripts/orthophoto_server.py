@@ -1,16 +1,19 @@
-"""A WMTS of a made-up land survey on loopback, so that the how-to on orthophotos runs offline.
+"""What pages of the documentation fetch from the network, on loopback instead.
 
-It shows one simulated field in the Netherlands' polder, at full georeference.
+A WMTS of a made-up land survey, which shows one simulated field in the Netherlands' polder at full
+georeference; and the real chip of a tutorial, from the recorded copy beside the project.
 """
 
 from __future__ import annotations
 
 import io
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,8 @@ from PIL import Image
 
 #: What the how-to page calls the server.
 PUBLIC_ADDRESS = "https://wmts.landsurvey.example"
+#: Where the tutorial on a real picture gets it from.
+CHIP_HOST = "https://raw.githubusercontent.com"
 LAT, LON, SEED = 52.3201, 5.5203, 17
 _HALF_WORLD_M = 20037508.342789244
 _ZOOMS = range(5, 20)
@@ -94,15 +99,42 @@ class _Handler(BaseHTTPRequestHandler):
     def log_message(self, *_: Any) -> None:
         """Quiet."""
 
-    server: ThreadingHTTPServer
+    server: _Server
+
+    def do_HEAD(self) -> None:
+        self._file(only_head=True)
 
     def do_GET(self) -> None:
+        if self.path.endswith(".tif"):
+            self._file()
+            return
         if self.path.partition("?")[0].endswith("WMTSCapabilities.xml"):
             address = f"http://127.0.0.1:{self.server.server_port}"
             self._reply(capabilities(address), "application/xml")
             return
         zoom, row, column = self.path.removesuffix(".png").split("/")[-3:]
         self._reply(tile(int(zoom), int(row), int(column)), "image/png")
+
+    def _file(self, *, only_head: bool = False) -> None:
+        """A recorded chip, or the piece of it that was asked for."""
+        chips = self.server.chips
+        path = None if chips is None else chips / self.path.rsplit("/", 1)[-1]
+        if path is None or not path.is_file():
+            self.send_error(404)
+            return
+        body = path.read_bytes()
+        piece = re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers.get("Range", ""))
+        start = int(piece[1]) if piece else 0
+        end = min(int(piece[2]) + 1, len(body)) if piece and piece[2] else len(body)
+        self.send_response(206 if piece else 200)
+        if piece:
+            self.send_header("Content-Range", f"bytes {start}-{end - 1}/{len(body)}")
+        self.send_header("Accept-Ranges", "bytes")
+        self.send_header("Content-Type", "image/tiff")
+        self.send_header("Content-Length", str(end - start))
+        self.end_headers()
+        if not only_head:
+            self.wfile.write(body[start:end])
 
     def _reply(self, body: bytes, kind: str) -> None:
         self.send_response(200)
@@ -115,14 +147,18 @@ class _Handler(BaseHTTPRequestHandler):
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
+    def __init__(self, chips: Path | None) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.chips = chips
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that has what it needs may hang up."""
 
 
 @contextmanager
-def serving() -> Iterator[str]:
-    """Run the server; gives its address."""
-    server = _Server(("127.0.0.1", 0), _Handler)
+def serving(shared: Path | None = None) -> Iterator[str]:
+    """Run the server, with the chips of a folder of real data; gives its address."""
+    server = _Server(None if shared is None else shared / "data" / "trees")
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()
     try:

@@ -18,10 +18,35 @@ PAGES = blocks.pages()
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    shared = None
-    if "../shared" in page.read_text(encoding="utf-8"):
-        shared = request.getfixturevalue("shared")
+    shared = request.getfixturevalue("shared") if blocks.needs_shared(page) else None
     assert blocks.run_page(page, tmp_path, shared) > 0
+
+
+@pytest.mark.slow
+def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path) -> None:
+    names = [page.relative_to(blocks.DOCS).as_posix() for page in blocks.course()]
+    assert names[0] == "tutorial.md"
+    how_to = {page for page in PAGES if page.parent.name == "how-to"}
+    assert len(how_to) > 8
+    assert how_to < set(blocks.course())
+    shared = blocks.real_data()
+    course = [page for page in blocks.course() if shared or not blocks.needs_shared(page)]
+    assert blocks.run_pages(course, tmp_path, shared) > 40
+
+
+def test_a_file_of_settings_grows_from_page_to_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(blocks, "ROOT", tmp_path)
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.md").write_text(
+            f'```toml title="words.toml"\n{name} = 1\n```\n\n```bash\ngrep {name} words.toml\n```\n'
+        )
+    (tmp_path / "three.md").write_text("```bash\ngrep one words.toml\n```\n")
+    order = [tmp_path / f"{name}.md" for name in ("one", "two", "three")]
+    assert blocks.run_pages(order, tmp_path / "a") == 3
+    with pytest.raises(blocks.BlockError, match=r"three\.md, line 1"):
+        blocks.run_pages(order[1:], tmp_path / "b")
 
 
 def test_a_wrong_output_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
