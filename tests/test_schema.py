@@ -41,6 +41,10 @@ def test_every_layer_is_well_formed(layer: schema.Layer) -> None:
         unit = column.name.rpartition("_")[2]
         if unit in ("m", "ha", "deg", "px"):
             assert column.unit, column.name
+            assert schema.unit_in_words(column) == {"deg": "°"}.get(unit, unit)
+        meaning = schema.meaning(layer, column)
+        assert meaning.endswith(".")
+        assert len(meaning) > len(column.title)
     table = schema.empty(layer, CRS("EPSG:32636"))
     assert list(table.columns) == [*layer.column_names, "geometry"]
     assert table.crs == "EPSG:32636"

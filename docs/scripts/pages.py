@@ -192,16 +192,16 @@ def layers() -> str:
             "",
             f"{layer.description} Geometry: {layer.geometry}. Key: {key}.{note}",
             "",
-            "| column | type | unit | meaning | in a Shapefile |",
-            "| --- | --- | --- | --- | --- |",
+            "| column | type | unit | title | meaning | in a Shapefile |",
+            "| --- | --- | --- | --- | --- | --- |",
         ]
         for column in layer.columns:
-            meaning = column.title
+            meaning = schema.meaning(layer, column)
             if column.values:
-                meaning += ": " + ", ".join(f"`{value}`" for value in column.values)
+                meaning += " One of " + ", ".join(f"`{value}`" for value in column.values) + "."
             lines.append(
-                f"| `{column.name}` | {column.type} | {column.unit} | {meaning} "
-                f"| `{column.shapefile}` |"
+                f"| `{column.name}` | {column.type} | {schema.unit_in_words(column)} "
+                f"| {column.title} | {meaning} | `{column.shapefile}` |"
             )
         lines.append("")
     return "\n".join(lines)

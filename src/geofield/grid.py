@@ -52,6 +52,13 @@ class Grid:
         From pixel (x, y) to the CRS's (x, y); may be rotated.
     crs : CRS
         Anything `pyproj.CRS` understands.
+
+    Notes
+    -----
+    What its methods take: `x_px`, `y_px` are pixel coordinates from the corner of the top-left
+    pixel, `column`, `row` whole ones, `width_px`, `height_px` counts of pixels; `x`, `y` lie in
+    a `crs` (anything `pyproj.CRS` understands), `lon`, `lat` are degrees in WGS 84; numbers or
+    arrays. `coordinates` are rows of pixel coordinates, or of the metric CRS.
     """
 
     width_px: int

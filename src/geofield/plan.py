@@ -177,7 +177,7 @@ class Plan:
 
     @classmethod
     def from_dataset(cls, dataset: Dataset) -> Plan:
-        """The plan that a dataset's tables describe; a person's edits are taken as they are.
+        """The plan that the tables of `dataset` describe; a person's edits are taken as they are.
 
         Raises
         ------

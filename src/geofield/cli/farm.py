@@ -32,7 +32,7 @@ Example:
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="GeoPackage.")
 @click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
 def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
-    """Write the plan of one field of FARM as a GeoPackage, for QGIS and `geofield review`."""
+    """Write the plan of field ID of FARM as a GeoPackage, for QGIS and `geofield review`."""
     from geofield.errors import FormatError
     from geofield.farm import read_farm
     from geofield.plan_files import save_plan

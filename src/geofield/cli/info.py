@@ -21,7 +21,7 @@ Examples (on the project's own sample):
 @click.option("--crs", help="CRS of a file that does not say its own, e.g. EPSG:32633.")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON on stdout.")
 def info(file: Path, crs: str | None, as_json: bool) -> None:
-    """Show what a file holds: layers, rows, place, CRS, origin."""
+    """Show what FILE, a picture or vector file, holds: layers, rows, place, CRS, origin."""
     facts = _picture(file) if file.suffix.lower() in (".tif", ".tiff") else _vector(file, crs)
     if as_json:
         echo_json(facts)

@@ -31,8 +31,9 @@ def query(
 ) -> None:
     """Answer a question from RDF files: a query of the package, or a file of SPARQL.
 
-    Several files are merged first. GeoSPARQL functions (geof:distance, geof:sfWithin, ...) are
-    available.
+    Every FILE (RDF/XML, Turtle, N-Triples, JSON-LD) is merged into one graph first; NAME is a
+    query of `--list`, or a file of SPARQL. GeoSPARQL functions (geof:distance,
+    geof:sfWithin, ...) are available.
     """
     from geofield.formats.rdf.query import ask, open_store, queries
 

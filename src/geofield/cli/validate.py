@@ -23,7 +23,7 @@ Examples:
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON on stdout.")
 @click.pass_context
 def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> None:
-    """Check products: the rules of the format, and whether the plan in it fits together.
+    """Check each FILE, of any format: the format's rules, and whether the plan fits together.
 
     Exit code 1 when there is an error; warnings alone leave it at 0.
     """

@@ -137,18 +137,20 @@ def _add_origin(connection: sqlite3.Connection, dataset: Dataset) -> None:
 
 
 def _add_columns(connection: sqlite3.Connection, dataset: Dataset) -> None:
-    """Titles, units and value lists of the columns (the Schema extension)."""
+    """Titles, meanings, units and value lists of the columns (the Schema extension)."""
     connection.executescript(_DATA_COLUMNS)
     lists: dict[str, tuple[str, ...]] = {}
     for layer in dataset.layers(working=True):
         for column in layer.columns:
-            unit = f"Unit (UCUM): {column.unit}" if column.unit else None
+            words = schema.meaning(layer, column)
+            if column.unit:
+                words += f" Unit (UCUM): {column.unit}"
             constraint = f"{layer.name}_{column.name}" if column.values else None
             if constraint:
                 lists[constraint] = column.values
             connection.execute(
                 "INSERT INTO gpkg_data_columns VALUES (?, ?, ?, ?, ?, NULL, ?)",
-                (layer.name, column.name, column.name, column.title, unit, constraint),
+                (layer.name, column.name, column.name, column.title, words, constraint),
             )
     for name, values in lists.items():
         for value in values:

@@ -199,7 +199,7 @@ class Field:
         )
 
     def polygon_px(self, grid: Grid) -> Polygon:
-        """The polygon in the pixel coordinates of a grid."""
+        """The polygon in the pixel coordinates of `grid`."""
         return shapely.transform(
             self.polygon, lambda c: np.column_stack(grid.from_crs(c[:, 0], c[:, 1], self.crs))
         )

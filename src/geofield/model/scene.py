@@ -107,7 +107,7 @@ class Scene:
             raise ImageryError(f"Unknown band role {sorted(unknown)[0]!r}.", hint=f"Use {ROLES}.")
 
     def band(self, role: str) -> NDArray[np.uint8] | None:
-        """The first band of a role, or None."""
+        """The first band of `role` (``red``, ``nir``, ...), or None."""
         return self.bands[self.roles.index(role)] if role in self.roles else None
 
     @property
@@ -152,7 +152,7 @@ class Scene:
         raise ImageryError("The picture has no band.")
 
     def crop(self, column: int, row: int, width_px: int, height_px: int) -> Scene:
-        """The part that starts at a column and row; cut at the picture's edge."""
+        """The part of `width_px` by `height_px` from `column`, `row` on, cut at the edge."""
         c0, r0 = max(column, 0), max(row, 0)
         c1 = min(column + width_px, self.grid.width_px)
         r1 = min(row + height_px, self.grid.height_px)

@@ -151,7 +151,10 @@ class Tracks:
         grid: Grid | None = None,
         outline: Polygon | None = None,
     ) -> Tracks:
-        """The tracks that were written as :meth:`tables` and :meth:`evidence`."""
+        """The tracks that :meth:`tables` (`tables`) and :meth:`evidence` (`evidence`) wrote.
+
+        `grid` gives the points their pixels, `outline` (metric CRS) the field for the figures.
+        """
         return cls(
             lines=tables[schema.TRACKS.name],
             segments=tables[schema.SEGMENTS.name],

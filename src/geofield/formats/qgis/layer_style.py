@@ -6,10 +6,8 @@ from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.looks import LOOKS, Look, field_rules
 from geofield.formats.qgis.symbols import QGIS_VERSION, rule_labels, rule_renderer
-from geofield.schema import Column, Layer
+from geofield.schema import Column, Layer, unit_in_words
 
-#: UCUM codes as people write them.
-UNITS = {"m": "m", "har": "ha", "deg": "°", "px": "px", "1": ""}
 _GEOMETRY = {
     "Point": "0",
     "LineString": "1",
@@ -114,8 +112,8 @@ def qml(layer: Layer, frame: str = "") -> str:
 
 def heading(column: Column) -> str:
     """A column's title with its unit: ``Radius (m)``."""
-    unit = UNITS.get(column.unit, column.unit)
-    return f"{column.title} ({unit})" if unit else column.title
+    unit = unit_in_words(column)
+    return f"{column.title} ({unit})" if unit and column.unit != "1" else column.title
 
 
 def map_tip(layer: Layer) -> str:

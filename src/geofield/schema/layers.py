@@ -1,24 +1,9 @@
-"""Layers, columns, types and units: the one place that every reader and writer looks at.
-
-A :class:`Layer` is a table of geometries with named columns. Writers take names, order,
-types, units and the short Shapefile names from here; :func:`conform` brings any table
-into that shape.
-"""
+"""Every layer with its columns, types, units and short names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
-
 from geofield.errors import FormatError
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-    from pyproj import CRS
-
-ColumnType = Literal["int", "float", "str", "date"]
-GeometryType = Literal["Point", "LineString", "MultiLineString", "Polygon", "MultiPolygon"]
+from geofield.schema.columns import Column, Layer
 
 #: What a person or the detector says of an obstacle. `possible`: too uncertain to be driven
 #: around, shown so that a person may decide.
@@ -28,78 +13,6 @@ REVIEWED = ("confirmed", "rejected", "added")
 #: The statuses of what tracks run through.
 NOT_AVOIDED = ("rejected", "possible")
 KINDS = ("tree", "other")
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column of a layer.
-
-    Attributes
-    ----------
-    name : str
-        Lower snake case, with the unit where there is one.
-    type : {"int", "float", "str", "date"}
-        Whole numbers and text may be missing; missing floats are NaN.
-    title : str
-        What a person reads as the column's heading.
-    shapefile : str
-        Its name in a Shapefile: at most ten characters, unique in its layer.
-    unit : str
-        UCUM code (``m``, ``har``, ``deg``), empty where there is none.
-    values : tuple of str
-        The only values allowed, where there is such a list.
-    """
-
-    name: str
-    type: ColumnType
-    title: str
-    shapefile: str
-    unit: str = ""
-    values: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Layer:
-    """A table of one geometry type.
-
-    Attributes
-    ----------
-    name : str
-        As in the GeoPackage.
-    geometry : str
-        The one geometry type of all rows.
-    title, description : str
-        For people.
-    key : tuple of str
-        The columns that together name a row; rows are sorted by them.
-    columns : tuple of Column
-    optional : bool
-        Written only when the plan has it.
-    working : bool
-        For a person to decide by: only in the plan's own GeoPackage and its QGIS project.
-    """
-
-    name: str
-    geometry: GeometryType
-    title: str
-    description: str
-    key: tuple[str, ...]
-    columns: tuple[Column, ...]
-    optional: bool = False
-    working: bool = False
-
-    @property
-    def column_names(self) -> list[str]:
-        """Names in order, without the geometry."""
-        return [column.name for column in self.columns]
-
-    def column(self, name: str) -> Column:
-        """The column of a name."""
-        for column in self.columns:
-            if column.name == name:
-                return column
-        raise FormatError(f"Layer {self.name!r} has no column {name!r}.")
-
 
 _PIXEL = (
     Column("x_px", "float", "Pixel x", "x_px", "px"),
@@ -330,93 +243,3 @@ def layer(name: str) -> Layer:
         f"There is no layer {name!r}.",
         hint=f"Layers: {', '.join(each.name for each in LAYERS)}.",
     )
-
-
-def empty(of: Layer, crs: CRS) -> gpd.GeoDataFrame:
-    """A table of a layer with all its columns and no rows."""
-    return table(of, {column.name: [] for column in of.columns}, [], crs)
-
-
-def table(
-    of: Layer, data: dict[str, Any], geometry: Any, crs: CRS, own: Mapping[str, Any] | None = None
-) -> gpd.GeoDataFrame:
-    """A table of a layer from columns and geometries, with exact types and order.
-
-    Columns that are missing in `data` are filled with missing values; `own` are the user's.
-    """
-    import geopandas as gpd
-    import numpy as np
-    import pandas as pd
-    from geopandas.array import from_shapely
-
-    count = len(geometry)
-    # Plain arrays: a table made of series costs five times as much.
-    columns: dict[str, Any] = {}
-    for column in of.columns:
-        values = data.get(column.name)
-        if values is None:
-            values = [np.nan if column.type == "float" else None] * count
-        if column.type == "float":
-            columns[column.name] = np.array(values, dtype="float64")
-        elif column.type != "int":
-            columns[column.name] = np.empty(count, dtype=object)
-            columns[column.name][:] = list(values)
-        elif isinstance(values, np.ndarray) and values.dtype.kind == "i":
-            whole = values.astype("int64")
-            columns[column.name] = pd.arrays.IntegerArray(whole, np.zeros(count, dtype=bool))
-        else:
-            columns[column.name] = pd.array(list(values), dtype="Int64")
-    columns["geometry"] = from_shapely(geometry, crs=crs)
-    # By way of a plain table: geopandas takes twice as long to make one of columns.
-    return gpd.GeoDataFrame(
-        pd.DataFrame(columns | dict(own or {}), copy=False), geometry="geometry"
-    )
-
-
-def own_columns(of: Layer, frame: gpd.GeoDataFrame) -> list[str]:
-    """The columns that the user added to a layer."""
-    known = {*of.column_names, frame.geometry.name, "geometry", "fid"}
-    return [name for name in frame.columns if name not in known]
-
-
-def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.GeoDataFrame:
-    """Any table in the shape of a layer: its columns, order and types, sorted by its key.
-
-    Rows without a key come last. Further columns are left out, or kept behind the layer's
-    own where `extras` is true.
-    """
-    import numpy as np
-    import pandas as pd
-
-    data: dict[str, Any] = {}
-    for column in of.columns:
-        if column.name not in frame.columns:
-            continue
-        series = frame[column.name]
-        if column.type in ("int", "float"):
-            try:
-                series = pd.to_numeric(series)
-            except (ValueError, TypeError) as error:
-                raise FormatError(
-                    f"Layer {of.name!r}: column {column.name!r} holds something that is no "
-                    f"number ({error}).",
-                    hint="Correct the column, or leave the cell empty.",
-                ) from error
-        if column.type == "int":
-            whole = series
-            if whole.dtype.kind == "i" and not whole.isna().any():
-                data[column.name] = whole.to_numpy(dtype="int64")
-            else:
-                rounded = whole.round().astype("Int64").to_list()
-                data[column.name] = [None if pd.isna(v) else int(v) for v in rounded]
-        elif column.type == "float":
-            data[column.name] = series.to_numpy(dtype="float64", na_value=np.nan)
-        elif column.type == "date":
-            data[column.name] = [None if pd.isna(v) else str(v)[:10] for v in series]
-        else:
-            data[column.name] = [None if pd.isna(v) else str(v) for v in series]
-    result = table(of, data, frame.geometry.to_numpy(), frame.crs)
-    for name in own_columns(of, frame) if extras else ():
-        result[name] = frame[name].array
-    result = result.sort_values(list(of.key), kind="stable", na_position="last")
-    return result.reset_index(drop=True)

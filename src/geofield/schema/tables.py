@@ -1,0 +1,103 @@
+"""Tables in the shape of a layer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from geofield.errors import FormatError
+from geofield.schema.columns import Layer
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    from pyproj import CRS
+
+
+def empty(of: Layer, crs: CRS) -> gpd.GeoDataFrame:
+    """A table of a layer with all its columns and no rows."""
+    return table(of, {column.name: [] for column in of.columns}, [], crs)
+
+
+def table(
+    of: Layer, data: dict[str, Any], geometry: Any, crs: CRS, own: Mapping[str, Any] | None = None
+) -> gpd.GeoDataFrame:
+    """A table of a layer from columns and geometries, with exact types and order.
+
+    Columns that are missing in `data` are filled with missing values; `own` are the user's.
+    """
+    import geopandas as gpd
+    import numpy as np
+    import pandas as pd
+    from geopandas.array import from_shapely
+
+    count = len(geometry)
+    # Plain arrays: a table made of series costs five times as much.
+    columns: dict[str, Any] = {}
+    for column in of.columns:
+        values = data.get(column.name)
+        if values is None:
+            values = [np.nan if column.type == "float" else None] * count
+        if column.type == "float":
+            columns[column.name] = np.array(values, dtype="float64")
+        elif column.type != "int":
+            columns[column.name] = np.empty(count, dtype=object)
+            columns[column.name][:] = list(values)
+        elif isinstance(values, np.ndarray) and values.dtype.kind == "i":
+            whole = values.astype("int64")
+            columns[column.name] = pd.arrays.IntegerArray(whole, np.zeros(count, dtype=bool))
+        else:
+            columns[column.name] = pd.array(list(values), dtype="Int64")
+    columns["geometry"] = from_shapely(geometry, crs=crs)
+    # By way of a plain table: geopandas takes twice as long to make one of columns.
+    return gpd.GeoDataFrame(
+        pd.DataFrame(columns | dict(own or {}), copy=False), geometry="geometry"
+    )
+
+
+def own_columns(of: Layer, frame: gpd.GeoDataFrame) -> list[str]:
+    """The columns that the user added to a layer."""
+    known = {*of.column_names, frame.geometry.name, "geometry", "fid"}
+    return [name for name in frame.columns if name not in known]
+
+
+def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.GeoDataFrame:
+    """Any table in the shape of a layer: its columns, order and types, sorted by its key.
+
+    Rows without a key come last. Further columns are left out, or kept behind the layer's
+    own where `extras` is true.
+    """
+    import numpy as np
+    import pandas as pd
+
+    data: dict[str, Any] = {}
+    for column in of.columns:
+        if column.name not in frame.columns:
+            continue
+        series = frame[column.name]
+        if column.type in ("int", "float"):
+            try:
+                series = pd.to_numeric(series)
+            except (ValueError, TypeError) as error:
+                raise FormatError(
+                    f"Layer {of.name!r}: column {column.name!r} holds something that is no "
+                    f"number ({error}).",
+                    hint="Correct the column, or leave the cell empty.",
+                ) from error
+        if column.type == "int":
+            whole = series
+            if whole.dtype.kind == "i" and not whole.isna().any():
+                data[column.name] = whole.to_numpy(dtype="int64")
+            else:
+                rounded = whole.round().astype("Int64").to_list()
+                data[column.name] = [None if pd.isna(v) else int(v) for v in rounded]
+        elif column.type == "float":
+            data[column.name] = series.to_numpy(dtype="float64", na_value=np.nan)
+        elif column.type == "date":
+            data[column.name] = [None if pd.isna(v) else str(v)[:10] for v in series]
+        else:
+            data[column.name] = [None if pd.isna(v) else str(v) for v in series]
+    result = table(of, data, frame.geometry.to_numpy(), frame.crs)
+    for name in own_columns(of, frame) if extras else ():
+        result[name] = frame[name].array
+    result = result.sort_values(list(of.key), kind="stable", na_position="last")
+    return result.reset_index(drop=True)
