@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -129,7 +130,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
                         environment |= parameters.variable(row, self, values, context)
                     else:
                         words += parameters.words(row, self, values, context)
-                feedback.pushCommandInfo("geofield " + " ".join(words))
+                feedback.pushCommandInfo(shlex.join(["geofield", self.command, *words]))
                 result = engine.run(
                     [self.command, *words],
                     is_cancelled=feedback.isCanceled,

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from qgis.core import (
     Qgis,
+    QgsApplication,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
     QgsPointXY,
@@ -245,6 +246,7 @@ def work():
     QTest.qWait(500)
     tool.grab().save(str(FOLDER / "tool.png"))
     tool.close()
+    ANSWER["batch"] = in_batch({"INPUT": f"{finished[0]}|layername=field"}, (5.0, 9.0))
     ours.show_engine()
     QTest.qWait(300)
     ours.dialog.grab().save(str(FOLDER / "engine.png"))
@@ -264,6 +266,34 @@ def work():
     left = [Path(f"/proc/{each}").exists() for each in (awake, ANSWER["waiting"])]
     ANSWER["engine_left"] = any(left)
     ANSWER["after_unload"] = [len(names(QDockWidget)), len(names(QToolBar))]
+
+
+def in_batch(given, spacings_m):
+    """Tracks at several spacings by the dialogue of batch mode; where they lie."""
+    from processing.tools.dataobjects import createContext
+    from processing.gui.BatchAlgorithmDialog import BatchAlgorithmDialog
+
+    dialog = BatchAlgorithmDialog(
+        QgsApplication.processingRegistry().createAlgorithmById("geofield:tracks")
+    )
+    panel, context = dialog.mainWidget(), createContext()
+    panel.addRow(len(spacings_m) - 1)
+    outputs = [str(FOLDER / f"batch {spacing_m:g} ä") for spacing_m in spacings_m]
+    for row, (spacing_m, output) in enumerate(zip(spacings_m, outputs)):
+        for name, value in {**given, "SPACING_M": spacing_m}.items():
+            column = panel.parameter_to_column[name]
+            panel.wrappers[row][column].setParameterValue(value, context)
+        place = panel.tblParameters.cellWidget(row + 1, panel.parameter_to_column["OUTPUT"])
+        place.setValue(output)
+    dialog.resize(1200, 500)
+    dialog.show()
+    QTest.qWait(300)
+    dialog.grab().save(str(FOLDER / "batch.png"))
+    QTest.mouseClick(dialog.runButton(), Qt.MouseButton.LeftButton)
+    until(lambda: not dialog.cancelButton().isEnabled(), 200, "batch")
+    dialog.grab().save(str(FOLDER / "batch_done.png"))
+    dialog.close()
+    return outputs
 
 
 def begin():

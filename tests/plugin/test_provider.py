@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import subprocess
 import sys
@@ -179,7 +180,7 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         requests=[
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": memory, "OBSTACLES_TO_AVOID": trees, "SPACING_M": 10,
-                "OUTPUT": str(tmp_path / "all")}},
+                "OUTPUT": str(tmp_path / "all of them")}},
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {**memory, "select": "name in ('Acker 1', 'Acker 3')"},
                 "SPACING_M": 10, "OUTPUT": str(tmp_path / "some")}},
@@ -193,12 +194,16 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         ],
     )  # fmt: skip
     assert every["result"]["FIELDS"] == 4
+    # The log shows the command as a shell takes it.
+    (command,) = (line for line in every["log"].splitlines() if line.startswith("geofield "))
+    assert shlex.split(command)[:2] == ["geofield", "tracks"]
+    assert str(tmp_path / "all of them") in shlex.split(command)
     assert some["result"]["FIELDS"] == 2
     assert sorted(each.stem for each in (tmp_path / "some").glob("*.gpkg")) == [
         "Acker_1",
         "Acker_3",
     ]
-    assert len(read_dataset(tmp_path / "all" / "Acker_0.gpkg").table("gaps")) > 0
+    assert len(read_dataset(tmp_path / "all of them" / "Acker_0.gpkg").table("gaps")) > 0
     assert "not saved" in edited["error"]
     assert filtered["result"]["FIELDS"] == 3
 

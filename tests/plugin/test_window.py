@@ -126,6 +126,11 @@ def test_alt_takes_ground_away(seen):
     assert seen["outline_again_s"] < 60.0
 
 
+def test_the_dialogue_of_batch_mode(seen):
+    spacings_m = [read_plan(next(Path(place).glob("*.gpkg"))).tracks.spacing_m for place in seen["batch"]]
+    assert spacings_m == [5.0, 9.0]
+
+
 def test_nothing_is_left_after_unloading(seen):
     assert seen["after_reload"] == [1, 1]
     assert seen["after_unload"] == [0, 0]
