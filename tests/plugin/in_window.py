@@ -270,8 +270,8 @@ def work():
 
 def in_batch(given, spacings_m):
     """Tracks at several spacings by the dialogue of batch mode; where they lie."""
-    from processing.tools.dataobjects import createContext
     from processing.gui.BatchAlgorithmDialog import BatchAlgorithmDialog
+    from processing.tools.dataobjects import createContext
 
     dialog = BatchAlgorithmDialog(
         QgsApplication.processingRegistry().createAlgorithmById("geofield:tracks")
@@ -279,7 +279,7 @@ def in_batch(given, spacings_m):
     panel, context = dialog.mainWidget(), createContext()
     panel.addRow(len(spacings_m) - 1)
     outputs = [str(FOLDER / f"batch {spacing_m:g} ä") for spacing_m in spacings_m]
-    for row, (spacing_m, output) in enumerate(zip(spacings_m, outputs)):
+    for row, (spacing_m, output) in enumerate(zip(spacings_m, outputs, strict=True)):
         for name, value in {**given, "SPACING_M": spacing_m}.items():
             column = panel.parameter_to_column[name]
             panel.wrappers[row][column].setParameterValue(value, context)

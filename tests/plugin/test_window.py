@@ -127,7 +127,9 @@ def test_alt_takes_ground_away(seen):
 
 
 def test_the_dialogue_of_batch_mode(seen):
-    spacings_m = [read_plan(next(Path(place).glob("*.gpkg"))).tracks.spacing_m for place in seen["batch"]]
+    spacings_m = [
+        read_plan(next(Path(place).glob("*.gpkg"))).tracks.spacing_m for place in seen["batch"]
+    ]
     assert spacings_m == [5.0, 9.0]
 
 
