@@ -49,7 +49,8 @@ def sizes(extra: str, folder: Path) -> dict[str, float]:
     uv = Path(sys.executable).with_name("uv")
     subprocess.run([uv, "venv", "-q", "--python", sys.executable, home], check=True)
     python = home / "bin" / "python"
-    install = [uv, "pip", "install", "-q", "--python", python, f"geofield{extra} @ {ROOT.as_uri()}"]
+    project = f"geofield{extra} @ {ROOT.as_uri()}"
+    install: list[str | Path] = [uv, "pip", "install", "-q", "--python", python, project]
     subprocess.run(install, check=True)
     found = subprocess.run(
         [python, "-B", "-c", SIZES], check=True, capture_output=True, text=True

@@ -191,6 +191,17 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
             )
         )
 
+    def add_obstacles_to_avoid(self) -> None:
+        """Ask for obstacles that are known already."""
+        self.addParameter(
+            QgsProcessingParameterFeatureSource(
+                "OBSTACLES_TO_AVOID",
+                tr("Obstacles to avoid: polygons, points with radius_m, lines"),
+                [compat.VECTORS],
+                optional=True,
+            )
+        )
+
     def add_plan(self) -> None:
         """Ask for a plan, by any of its layers or by its file."""
         self.addParameter(

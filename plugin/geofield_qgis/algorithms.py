@@ -86,14 +86,7 @@ class ManyFieldsAlgorithm(GeofieldAlgorithm):
             )
         )
         self.add_picture()
-        self.addParameter(
-            QgsProcessingParameterFeatureSource(
-                "OBSTACLES_TO_AVOID",
-                tr("Obstacles to avoid: polygons, points with radius_m, lines"),
-                [compat.VECTORS],
-                optional=True,
-            )
-        )
+        self.add_obstacles_to_avoid()
         self.addParameter(
             QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder of the farm"))
         )
@@ -189,14 +182,7 @@ class TracksAlgorithm(GeofieldAlgorithm):
         self.addParameter(
             QgsProcessingParameterFeatureSource("INPUT", tr("Fields"), [compat.POLYGONS])
         )
-        self.addParameter(
-            QgsProcessingParameterFeatureSource(
-                "OBSTACLES_TO_AVOID",
-                tr("Obstacles to avoid: polygons, points with radius_m, lines"),
-                [compat.VECTORS],
-                optional=True,
-            )
-        )
+        self.add_obstacles_to_avoid()
         self.addParameter(
             QgsProcessingParameterFolderDestination("OUTPUT", tr("Folder for the plans"))
         )

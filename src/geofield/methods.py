@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal, get_args
 
 _STUDY_DETECTORS = "geofield.study.detectors:detect_by_study"
 
@@ -22,20 +22,21 @@ FIELD: Mapping[str, str] = MappingProxyType(
 """Each takes (scene, x_px, y_px) and returns a `Segmentation`; of auto also `include`, `exclude`
 and `search`, of the study also `regions`."""
 
+Strategy = Literal[
+    "auto",
+    "single",
+    "t_range",
+    "max_of_all",
+    "dlc",
+    "consensus",
+    "study_text",
+    "study_listing",
+    "study_dlc",
+]
+"""Ways to find obstacles: geofield's own, then the study's."""
+
 STUDY_STRATEGIES: Mapping[str, str] = MappingProxyType(
-    dict.fromkeys(
-        (
-            "single",
-            "t_range",
-            "max_of_all",
-            "dlc",
-            "consensus",
-            "study_text",
-            "study_listing",
-            "study_dlc",
-        ),
-        _STUDY_DETECTORS,
-    )
+    dict.fromkeys(get_args(Strategy)[1:], _STUDY_DETECTORS)
 )
 """Each takes (scene, region, strategy, radius_px, options, progress)."""
 

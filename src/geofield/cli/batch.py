@@ -13,6 +13,7 @@ from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
 from geofield.cli.options import section_options, section_values, settings_option
 from geofield.cli.place_options import place_options, places_of
+from geofield.errors import FieldError, GeofieldError
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -125,7 +126,6 @@ def batch(
     from geofield.settings import load_settings
 
     settings = load_settings(settings_file, section_values(options))
-    from geofield.errors import FieldError, GeofieldError
     from geofield.farm.edits import put_edits
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
@@ -214,7 +214,6 @@ def _imagery(
 
 def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
     """Who does the work; said, with the address of a dashboard."""
-    from geofield.errors import GeofieldError
     from geofield.farm.pool import Pool, cores
 
     engine: Engine

@@ -11,6 +11,7 @@ import math
 import types
 import typing
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import click
@@ -65,6 +66,15 @@ def point_options(command: Command) -> Command:
 def name_option(command: Command) -> Command:
     """Add ``--name``."""
     return click.option("--name", help="The field's name; its place when not given.")(command)
+
+
+def plan_argument(command: Command) -> Command:
+    """Add ``PLAN.gpkg``, a file that exists."""
+    return click.argument(
+        "plan_file",
+        metavar="PLAN.gpkg",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    )(command)
 
 
 def settings_option(command: Command) -> Command:

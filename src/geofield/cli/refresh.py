@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.options import plan_argument
 
 
 @click.command(
@@ -17,9 +18,7 @@ Examples (on the project's own sample):
   geofield refresh out/field.gpkg
 """
 )
-@click.argument(
-    "plan_file", metavar="PLAN.gpkg", type=click.Path(exists=True, dir_okay=False, path_type=Path)
-)
+@plan_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the files as JSON on stdout.")
 def refresh(plan_file: Path, as_json: bool) -> None:
     """Write all products anew that lie beside PLAN.gpkg: map, report, files of every format.

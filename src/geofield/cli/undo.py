@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say
+from geofield.cli.options import plan_argument
 
 
 @click.command(
@@ -17,9 +18,7 @@ Examples (on the project's own sample):
   geofield undo out/field.gpkg
 """
 )
-@click.argument(
-    "plan_file", metavar="PLAN.gpkg", type=click.Path(exists=True, dir_okay=False, path_type=Path)
-)
+@plan_argument
 def undo(plan_file: Path) -> None:
     """Bring back the plan that the last run or stage replaced, edits and all.
 

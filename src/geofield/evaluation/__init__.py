@@ -1,15 +1,10 @@
 """Detected obstacles against a truth: matching, figures, pictures."""
 
+from geofield.evaluation.compare import Evaluation, evaluate
 from geofield.evaluation.driving import Driving, driving, unseen
-from geofield.evaluation.matching import (
-    Evaluation,
-    Matches,
-    Score,
-    evaluate,
-    match_points,
-    reliability,
-)
+from geofield.evaluation.matching import Matches, match_points
 from geofield.evaluation.picture import draw_matches, draw_reliability, read_obstacles
+from geofield.evaluation.scores import Score, reliability
 
 __all__ = [
     "Driving",

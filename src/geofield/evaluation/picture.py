@@ -10,7 +10,8 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from geofield.errors import CRSError, ObstacleError
-from geofield.evaluation.matching import Evaluation, reliability
+from geofield.evaluation.compare import Evaluation
+from geofield.evaluation.scores import reliability
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.strangers import check_vector

@@ -18,7 +18,7 @@ from geofield.errors import CRSError, FormatError
 from geofield.farm.place_files import RawPlaces, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
-from geofield.formats.foreign_tables import _ID, _NAME
+from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.settings import Settings
 
 if TYPE_CHECKING:
@@ -66,12 +66,14 @@ def read_places(
     CRSError
         When the file does not say its CRS.
     """
-    raw = read_raw(Path(path), layer=layer, texts=(*_ID, *_NAME, id_column, name_column))
+    raw = read_raw(
+        Path(path), layer=layer, texts=(*ID_COLUMNS, *NAME_COLUMNS, id_column, name_column)
+    )
     if not raw.table.num_rows:
         raise FormatError(f"{path} is empty: it holds no places.", hint="Give one row per field.")
     raw = _without_ours(raw)
     find = _Columns(raw)
-    id_name, name_name = find(id_column, _ID), find(name_column, _NAME)
+    id_name, name_name = find(id_column, ID_COLUMNS), find(name_column, NAME_COLUMNS)
     lat_name, lon_name = find(lat_column, _LAT), find(lon_column, _LON)
     notes: list[str] = list(raw.notes)
     kept = np.arange(raw.table.num_rows)

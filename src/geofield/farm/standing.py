@@ -30,7 +30,7 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
     """
     from geofield.crs import parse_crs
     from geofield.formats.foreign import read_vector
-    from geofield.formats.foreign_tables import _NUMBER, column_like
+    from geofield.formats.foreign_tables import NUMBER_COLUMNS, column_like
 
     frame = read_vector(path)
     if frame.crs is None:
@@ -39,7 +39,7 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
                 f"{path} does not say its CRS.", hint="Name it: --crs EPSG:4326, for instance."
             )
         frame = frame.set_crs(parse_crs(crs))
-    if column_like(frame, _NUMBER) is None:
+    if column_like(frame, NUMBER_COLUMNS) is None:
         frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
     frame = frame[~(frame.geometry.isna() | frame.geometry.is_empty)]
     return frame.explode(ignore_index=True)

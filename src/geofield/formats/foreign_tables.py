@@ -24,11 +24,21 @@ if TYPE_CHECKING:
 #: Radius of an obstacle point that has none, metres: the smallest tree of METHOD.md, section 3.
 POINT_RADIUS_M = 2.0
 
-_NAME = ("name", "field", "fieldname", "field_name", "designator", "label", "title", "schlag")
-_ID = ("field_id", "id", "fid", "guid", "uuid", "parcel_id", "ref")
+#: What others call the columns that say this, the likeliest first.
+NAME_COLUMNS = (
+    "name",
+    "field",
+    "fieldname",
+    "field_name",
+    "designator",
+    "label",
+    "title",
+    "schlag",
+)
+ID_COLUMNS = ("field_id", "id", "fid", "guid", "uuid", "parcel_id", "ref")
 _RADIUS = ("radius_m", "radius")
 _BUFFER = ("buffer_m", "buffer")
-_NUMBER = ("obstacle_no", "obst_no", "number", "no")
+NUMBER_COLUMNS = ("obstacle_no", "obst_no", "number", "no")
 _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
 
@@ -60,7 +70,7 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     FormatError
         When there are several: a dataset is one field.
     """
-    names = column_like(frame, _NAME)
+    names = column_like(frame, NAME_COLUMNS)
     if len(frame) > 1:
         shown = "" if names is None else f" ({', '.join(map(str, names[:5]))}, ...)"
         raise SeveralFieldsError(
@@ -68,7 +78,7 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
             hint="Save the one you want as a file of its own.",
         )
     polygon = shapely.orient_polygons(shapely.force_2d(frame.geometry.iloc[0]))
-    ids = column_like(frame, _ID)
+    ids = column_like(frame, ID_COLUMNS)
     data: dict[str, Any] = {
         column.name: [frame[column.name].iloc[0]]
         for column in schema.FIELD.columns
@@ -117,7 +127,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         if name in frame.columns
     }
     data |= {
-        "obstacle_no": _whole_numbers(numbers_like(frame, _NUMBER)),
+        "obstacle_no": _whole_numbers(numbers_like(frame, NUMBER_COLUMNS)),
         "kind": _one_of(frame, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
         "status": _one_of(frame, "status", schema.STATUSES, np.full(count, "added")),
         "radius_m": radius,
@@ -177,7 +187,7 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
 
 def _numbers_in_names(frame: gpd.GeoDataFrame) -> np.ndarray:
     """Track numbers from names such as ``Track 7``, where all rows have one; else 1, 2, ..."""
-    names = column_like(frame, _NAME)
+    names = column_like(frame, NAME_COLUMNS)
     if names is not None:
         found = [re.search(r"\d+", str(name)) for name in names]
         if all(found):

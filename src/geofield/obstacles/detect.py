@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import shapely
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.errors import ObstacleError
 from geofield.grid import Grid
-from geofield.methods import STUDY_STRATEGIES, method
+from geofield.methods import STUDY_STRATEGIES, Strategy, method
 from geofield.model.circles import Circles, checked_range
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px, from_polygons
@@ -29,17 +29,6 @@ if TYPE_CHECKING:
     from geofield.study.phase_code import CircleMethod
     from geofield.study.strategies import ThresholdRange
 
-Strategy = Literal[
-    "auto",
-    "single",
-    "t_range",
-    "max_of_all",
-    "dlc",
-    "consensus",
-    "study_text",
-    "study_listing",
-    "study_dlc",
-]
 RADIUS_M = (1.0, 15.0)
 STUDY_RADIUS_M = (2.0, 9.0)
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)

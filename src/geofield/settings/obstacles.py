@@ -6,23 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PositiveFloat
 
+from geofield.methods import Strategy
 from geofield.settings.section import NonNegative, Section
 
 
 class ObstacleSettings(Section):
     """Stage 3: the obstacles."""
 
-    strategy: Literal[
-        "auto",
-        "single",
-        "t_range",
-        "max_of_all",
-        "dlc",
-        "consensus",
-        "study_text",
-        "study_listing",
-        "study_dlc",
-    ] = Field("auto", description="How obstacles are found: auto, or a way of the study.")
+    strategy: Strategy = Field(
+        "auto", description="How obstacles are found: auto, or a way of the study."
+    )
     radius_m: tuple[PositiveFloat, PositiveFloat] | None = Field(
         None,
         description="Smallest and largest crown radius, metres; 1 to 15 with auto, 2 to 9 with "

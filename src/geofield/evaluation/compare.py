@@ -1,0 +1,151 @@
+"""Detected obstacles against a truth: :func:`evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from geofield.crs import ground_areas_m2, is_metric
+from geofield.errors import CRSError, ObstacleError
+from geofield.evaluation.driving import Driving, driving
+from geofield.evaluation.matching import FloatArray, Matches, match_points
+from geofield.evaluation.scores import Counts, Score, score
+from geofield.model.obstacles import active
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+DEFAULT_DISTANCE_M = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Figures per picture and pooled.
+
+    Attributes
+    ----------
+    pooled : Score
+    images : dict of name to Score
+    matches : dict of name to Matches
+    distance_m : float
+        Within which a detection counts.
+    driving : Driving or None
+        What a driver loses, where tracks were given.
+    """
+
+    pooled: Score
+    images: dict[str, Score]
+    matches: dict[str, Matches]
+    distance_m: float
+    driving: Driving | None = None
+
+
+def evaluate(
+    detected: gpd.GeoDataFrame | Mapping[str, gpd.GeoDataFrame],
+    truth: gpd.GeoDataFrame | Mapping[str, gpd.GeoDataFrame],
+    *,
+    distance_m: float = DEFAULT_DISTANCE_M,
+    area: Any = None,
+    segments: gpd.GeoDataFrame | Mapping[str, gpd.GeoDataFrame] | None = None,
+    bootstrap: int = 1000,
+    seed: int = 0,
+) -> Evaluation:
+    """Compare detected obstacles with a truth.
+
+    >>> truth = gf.read_plan("sample_data/field_1.gpkg").obstacles
+    >>> gf.evaluate(truth, truth).pooled.f1
+    1.0
+
+    Parameters
+    ----------
+    detected : GeoDataFrame, or mapping of picture name to GeoDataFrame
+        Obstacles as :func:`geofield.detect_obstacles` returns them; rejected ones are left out.
+    truth : GeoDataFrame, or mapping of picture name to GeoDataFrame
+        Points, boxes or polygons; a column ``radius_m``, where there is one, or the radius of
+        the circle of a polygon's area is the true radius.
+    distance_m : float
+        Between centres, on the ground.
+    area : shapely geometry, or mapping of picture name to one, optional
+        Only obstacles and truths with their centre inside count; in the CRS of ``detected``.
+    segments : GeoDataFrame, or mapping of picture name to one, optional
+        The lines that are driven, in metres; with an area, the fields, they give the
+        figures of `Evaluation.driving`.
+    bootstrap : int
+        Resamplings for the intervals: of pictures where there are at least five, of single
+        obstacles otherwise; 0 for none.
+    seed : int
+
+    Raises
+    ------
+    ObstacleError
+        When the distance is not above zero or a picture has no truth.
+    CRSError
+        When a table has no CRS, or the detected obstacles are not in metres.
+    """
+    found = detected if isinstance(detected, Mapping) else {"": detected}
+    true = truth if isinstance(truth, Mapping) else {"": truth}
+    missing = sorted(set(found) ^ set(true))
+    if missing:
+        raise ObstacleError(f"Picture {missing[0]!r} has detections or a truth, but not both.")
+    matches: dict[str, Matches] = {}
+    rows: dict[str, Counts] = {}
+    for name in found:
+        within = area.get(name) if isinstance(area, Mapping) else area
+        a, b = _comparable(found[name], true[name])
+        centre_a, radius_a, _ = _circles(a, within)
+        centre_b, radius_b, has_radius = _circles(b, within)
+        match = match_points(centre_a, centre_b, distance_m)
+        matches[name] = match
+        difference = radius_a[match.detected_index] - radius_b[match.truth_index]
+        if not has_radius:
+            difference = np.full(difference.shape, np.nan)
+        rows[name] = Counts(match, difference)
+    images = {name: score([counts]) for name, counts in rows.items()}
+    pooled = score(list(rows.values()), bootstrap=bootstrap, seed=seed)
+    lost = None
+    if segments is not None:
+        if area is None:
+            raise ObstacleError("What a driver loses needs the field as area.")
+        lost = Driving()
+        for name in found:
+            lines = segments[name] if isinstance(segments, Mapping) else segments
+            field = area[name] if isinstance(area, Mapping) else area
+            lost += driving(lines, found[name], true[name], field)
+    return Evaluation(pooled, images, matches, distance_m, lost)
+
+
+def _comparable(
+    detected: gpd.GeoDataFrame, truth: gpd.GeoDataFrame
+) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+    if detected.crs is None or truth.crs is None:
+        raise CRSError("Detections and truth need a CRS.", hint="Set it with set_crs.")
+    if not is_metric(detected.crs):
+        raise CRSError(
+            "Detections are not in a metric CRS.", hint="Reproject them to their UTM zone."
+        )
+    detected = active(detected)
+    return detected, truth.to_crs(detected.crs)
+
+
+def _circles(frame: gpd.GeoDataFrame, within: Any) -> tuple[FloatArray, FloatArray, bool]:
+    """Centres (n, 2) and radii (n,), and whether there are radii at all."""
+    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
+    frame, geometry = frame[present], geometry[present]
+    centre = shapely.centroid(geometry)
+    xy = np.column_stack([shapely.get_x(centre), shapely.get_y(centre)]).reshape(-1, 2)
+    radius = np.full(len(geometry), np.nan)
+    if "radius_m" in frame.columns:
+        radius = frame["radius_m"].to_numpy(dtype="float64", na_value=np.nan)
+    else:
+        area = ground_areas_m2(geometry, CRS(frame.crs))
+        radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)
+    if within is not None:
+        keep = shapely.covers(within, centre)
+        xy, radius = xy[keep], radius[keep]
+    return xy, radius, bool(np.isfinite(radius).any())
