@@ -7,6 +7,7 @@ chunk, and back how many of them went well.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import signal
 import time
@@ -17,6 +18,7 @@ from geofield import __version__
 from geofield.errors import GeofieldError, NetworkError
 from geofield.farm.chunk import Done, Orders, Task, plan_chunk
 from geofield.farm.engine import ONE_THREAD, Control, Patience, one_thread
+from geofield.farm.marks import WORK
 from geofield.farm.store import Store
 
 #: Chunks per worker thread in the scheduler: one is worked on, one is there when it is done.
@@ -79,6 +81,8 @@ class Cluster:
         """
         from distributed import Client
 
+        # What goes wrong is told in our own words.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         try:
             client = Client(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
@@ -117,12 +121,14 @@ class Cluster:
                     "The scheduler has no workers.", hint="Start some with `dask worker ADDRESS`."
                 )
             time.sleep(0.2)
-        probe = f".work/probe-{time.time_ns()}"
+        probe = f"{WORK}/probe-{time.time_ns()}"
         store.put(probe, b"here")
         try:
             answers = self._client.run(_facts, store, probe, on_error="return")
         finally:
             store.remove(probe)
+            if not store.names(WORK):
+                store.remove(WORK)
         for worker, facts in sorted(answers.items()):
             if isinstance(facts, ImportError):
                 raise GeofieldError(
@@ -145,7 +151,8 @@ class Cluster:
 
     def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
         """Plan chunks; see `geofield.farm.engine.Engine`."""
-        from distributed import KilledWorker, wait
+        from distributed import CancelledError, KilledWorker, wait
+        from distributed.comm import CommClosedError
 
         patience = Patience()
         running: dict[Any, Task] = {}
@@ -172,9 +179,15 @@ class Cluster:
                     except KilledWorker:
                         patience.again(task)
                         again.append(task)
+        except (CancelledError, CommClosedError) as error:
+            raise NetworkError(
+                "The scheduler has gone, and the work with it.",
+                hint="What was done is kept: the same command does what is missing.",
+            ) from error
         finally:
             for future in running:
-                future.cancel()
+                with contextlib.suppress(CommClosedError):
+                    future.cancel()
 
     def close(self) -> None:
         """Leave the cluster; end it where it is our own."""

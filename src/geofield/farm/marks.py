@@ -10,8 +10,10 @@ from __future__ import annotations
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from geofield.farm.store import Store
+from geofield.folders import cannot_write
 
 WORK = ".work"
 #: As often as this a place may end its worker.
@@ -50,8 +52,11 @@ class Marks:
         marks._judge()
         if store.folder is not None:
             path = store.folder / marks.name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            marks._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                marks._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            except OSError as error:
+                raise cannot_write(path, error) from error
         elif not marks._again:
             store.put(marks.name, b"x\n")
         return marks
@@ -99,7 +104,10 @@ class Marks:
 
     def _note(self, line: str) -> None:
         if self._handle is not None:
-            os.write(self._handle, f"{line}\n".encode())
+            try:
+                os.write(self._handle, f"{line}\n".encode())
+            except OSError as error:
+                raise cannot_write(Path(self.store.place, self.name), error) from error
         elif self._again:
             # In an object store each note is an upload: only where a worker ended before.
             self._lines.append(line)

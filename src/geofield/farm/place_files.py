@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield.errors import FormatError
+from geofield.farm.row_crs import refuse_other_rows
 from geofield.strangers import check_vector
 
 if TYPE_CHECKING:
@@ -168,6 +169,7 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
             f"{path}: its text is not in the encoding it claims ({error}).",
             hint="Save it as UTF-8 (a Shapefile with a .cpg file beside it).",
         ) from None
+    refuse_other_rows(path, layer, meta["crs"])
     name = meta["geometry_name"] or "wkb_geometry"
     table = table.replace_schema_metadata(None)
     if name not in table.column_names:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, parse_crs, transformer
+from geofield.crs import LONLAT, authority_name, parse_crs, transformer
 from geofield.errors import CRSError, FormatError
 from geofield.farm.place_files import RawPlaces, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
@@ -215,8 +215,20 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
             f"{len(np.unique(rows[parts > 0]))} parcels have several parts: each is a field."
         )
     joined = pa.concat_arrays(outlines)
+    _refuse_degrees(raw, source, np.concatenate(xs), np.concatenate(ys))
     lon, lat = transformer(source, LONLAT).transform(np.concatenate(xs), np.concatenate(ys))
     return rows, parts, joined if joined.null_count < len(joined) else None, lat, lon
+
+
+def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
+    """Refuse degrees that a file calls metres: all its places would lie off the coast of Africa."""
+    known = np.isfinite(x) & np.isfinite(y)
+    if source.is_projected and known.any() and (np.hypot(x, y)[known] < 200.0).all():
+        raise CRSError(
+            f"{raw.name} is in {authority_name(source)} by its own word, and its coordinates look "
+            "like degrees.",
+            hint="Say the true CRS in the file: ogr2ogr -a_srs EPSG:4326 right.gpkg FILE",
+        )
 
 
 def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:

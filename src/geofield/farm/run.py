@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -119,40 +119,53 @@ def run_farm(
     FormatError
         When it cannot be written.
     """
-    record = _prepare(places, job, store, imagery or {}, fresh=fresh)
-    done = place.committed(store)
-    if retry:
-        done = _forget_failed(store, done)
-    excuse_all(store)
-    count = Count(len(places), _statuses(store, done))
-    count.before = count.done
-    order = places.order()
-    size = record.chunk_fields
+    record, there = _asked(places, job, store, imagery or {}, fresh=fresh)
+    done = [] if fresh else place.committed(store)
+    again = _with_failures(store, done) if retry else []
+    done = [chunk for chunk in done if chunk not in again]
     missing = sorted(set(range(record.chunks)) - set(done))
-    orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
-
-    def tasks() -> Iterator[Task]:
-        for chunk in missing:
-            yield Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
-
-    tell(count)
-    if missing:
-        hired = engine()
-        try:
-            for one in hired.run(tasks(), orders, control or Control()):
+    # Nothing is changed before somebody is there who can do the work.
+    hired = engine() if missing else None
+    try:
+        if fresh and there is not None:
+            clear(store)
+            store.remove(WORK)
+        if fresh or there is None:
+            store.put(place.RECORD, record.to_json())
+        for chunk in again:
+            store.remove(place.file_of(place.STATUS, chunk))
+        excuse_all(store)
+        count = Count(len(places), _statuses(store, done))
+        count.before = count.done
+        tell(count)
+        if hired is not None:
+            size, order = record.chunk_fields, places.order()
+            orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
+            tasks = (
+                Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
+                for chunk in missing
+            )
+            for one in hired.run(tasks, orders, control or Control()):
                 count.statuses.update(one.counts)
                 tell(count)
-        finally:
+    finally:
+        if hired is not None:
             hired.close()
     if count.done == count.total:
         store.remove(WORK)
     return count
 
 
-def _prepare(
+def _asked(
     places: Places, job: Job, store: Store, imagery: Mapping[str, Any], *, fresh: bool
-) -> place.Record:
-    """The record of the farm: the one that is there, when it is of the same work, or a new one."""
+) -> tuple[place.Record, place.Record | None]:
+    """The record of what is asked for, and the one that is there.
+
+    Raises
+    ------
+    OutputExistsError
+        When there is something else.
+    """
     size = chunk_fields(len(places), pictures=job.imagery is not None)
     wanted = record_of(places, job, imagery, size)
     there = place.Record.read(store)
@@ -165,12 +178,7 @@ def _prepare(
             f"{store.shown} is a farm of other work: {difference(there, wanted)}.",
             hint="Choose another folder, or --fresh: all is planned anew, what you reviewed stays.",
         )
-    if there is not None and fresh:
-        clear(store)
-        store.remove(WORK)
-    if there is None or there.digest != wanted.digest or fresh:
-        store.put(place.RECORD, wanted.to_json())
-    return wanted
+    return wanted, there
 
 
 def _statuses(store: Store, chunks: list[int]) -> Counter[str]:
@@ -182,13 +190,7 @@ def _statuses(store: Store, chunks: list[int]) -> Counter[str]:
     return counts
 
 
-def _forget_failed(store: Store, chunks: list[int]) -> list[int]:
-    """The chunks in which all went well; the marks of the others are taken away."""
-    kept = []
-    for chunk in chunks:
-        counts = _statuses(store, [chunk])
-        if counts["failed"] or counts["lost"]:
-            store.remove(place.file_of(place.STATUS, chunk))
-        else:
-            kept.append(chunk)
-    return kept
+def _with_failures(store: Store, chunks: list[int]) -> list[int]:
+    """The chunks in which places failed or were lost."""
+    bad = ("failed", "lost")
+    return [chunk for chunk in chunks if any(_statuses(store, [chunk])[status] for status in bad)]
