@@ -22,7 +22,11 @@ SVG = "{http://www.w3.org/2000/svg}"
 def maps(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("maps")
     plan = gf.plan_field(
-        simulated.scene, lat=simulated.lat, lon=simulated.lon, spacing_m=10, name="Hill & Dale"
+        simulated.scene,
+        lat=simulated.lat,
+        lon=simulated.lon,
+        spacing_m=10,
+        name="Hill & Dale \N{LATIN SMALL LETTER D WITH PALATAL HOOK}",
     )
     plan.write(folder, formats=["gpkg"])
     geofield, plan_file = Path(sys.executable).with_name("geofield"), folder / "field.gpkg"
@@ -55,6 +59,14 @@ def test_the_pdf_is_one_page_of_a4(maps: Path) -> None:
     long_mm, short_mm = (float(side) / 72 * 25.4 for side in box)
     assert (long_mm, short_mm) == pytest.approx((297, 210), abs=1.5)
     assert b"CreationDate" not in data
+
+
+def test_letters_that_the_usual_font_lacks_are_drawn_with_another(maps: Path) -> None:
+    fonts = set(re.findall(rb"/BaseFont /(?:[A-Z]{6}\+)?([\w-]+)", (maps / "map.pdf").read_bytes()))
+    assert b"DejaVuSans" in fonts
+    # matplotlib's font of last resort draws a box for every letter.
+    assert not any(each.startswith(b"LastResort") for each in fonts)
+    assert fonts - {b"DejaVuSans"}
 
 
 def test_they_are_renewed_with_the_plan(maps: Path) -> None:

@@ -123,6 +123,7 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
     _needed()
     import matplotlib as mpl
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
     # Not pyplot: no window, and no state that a program of the user's may have set.
     figure = Figure(figsize=(11.7, 8.3), layout="constrained")
@@ -133,6 +134,10 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
     doubts = dataset.table(schema.FIELD.name)["doubts"].iloc[0]
     told = [f"Check the outline: {doubts}"] if isinstance(doubts, str) and doubts else []
     figure.supxlabel("\n".join([*told, credit_in_words(dataset)]), fontsize=8)
+    words = figure.findobj(Text)
+    families = _families("".join(each.get_text() for each in words))
+    for each in words:
+        each.set_fontfamily(families)
     with (
         mpl.rc_context({"svg.hashsalt": "geofield", "svg.fonttype": "none"}),
         warnings.catch_warnings(),
@@ -141,6 +146,29 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         figure.savefig(path, dpi=200, metadata=dict(undated))
     return path
+
+
+def _families(text: str) -> list[str]:
+    """DejaVu Sans, and for letters that it lacks installed fonts that have them."""
+    from matplotlib.font_manager import findfont, fontManager, get_font
+
+    families = ["DejaVu Sans"]
+    missing = set(map(ord, text)) - get_font(findfont(families[0])).get_charmap().keys()
+    # matplotlib's own font of last resort has every letter, as a box.
+    upright = [
+        each
+        for each in fontManager.ttflist
+        if each.style == "normal" and not each.name.startswith("Last Resort")
+    ]
+    # In one order, so that a machine draws the same map every time; regular before bold.
+    for each in sorted(upright, key=lambda f: (f.weight not in (400, "normal"), f.name, f.fname)):
+        if not missing - {10}:
+            break
+        found = missing & get_font(each.fname).get_charmap().keys()
+        if found:
+            families.append(each.name)
+            missing -= found
+    return families
 
 
 def _scale_bar(ax: Axes, dataset: Dataset) -> None:
