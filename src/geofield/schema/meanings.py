@@ -80,6 +80,16 @@ _OF_LAYER = {
         "outside_m": "Length outside the ground that may be driven on.",
         "fits": "Whether the machine can drive it there.",
     },
+    "places": {
+        "place": "Row in the file of places, from 1.",
+        "field_id": "The field's id; parts of one parcel have .1, .2 behind it.",
+        "name": "What you call the field.",
+        "status": "Whether it was planned, is doubtful, failed, or ended its worker twice.",
+        "error": "Why there is no plan.",
+        "hint": "What helps.",
+        "notes": "What there was to tell of it.",
+        "reviewed": "Whether it is as a person left it.",
+    },
     "alternatives": {
         "alternative_no": "Rank by certainty; 1 is the one that was taken.",
         "certainty": "Probability that this outline is the right one.",
@@ -90,8 +100,9 @@ _UNITS = {"har": "ha", "deg": "°", "1": "0 to 1"}
 
 
 def meaning(of: Layer, column: Column) -> str:
-    """What a column of a layer says."""
-    return _OF_LAYER.get(of.name, {}).get(column.name) or _EVERYWHERE[column.name]
+    """What a column of a layer says; its title where nobody has written more."""
+    words = _OF_LAYER.get(of.name, {}).get(column.name)
+    return words or _EVERYWHERE.get(column.name, f"{column.title}.")
 
 
 def unit_in_words(column: Column) -> str:
