@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from geofield import theme
+from geofield import map_font, theme
 from geofield.mapping import draw_map
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
@@ -107,3 +108,26 @@ def test_tracks_show_on_white_ground(plan: Plan, simulated: SimulatedField) -> N
         for a, b in zip(x * scale, y * scale, strict=True)
     ]
     assert np.mean(dark) > 0.95
+
+
+def test_letters_beyond_english_are_no_boxes(plan: Plan) -> None:
+    def panel(name: str) -> bytes:
+        named = replace(plan, field=replace(plan.field, name=name), scene=None)
+        return draw_map(named.to_dataset(), None).tobytes()
+
+    # A box is a box, whatever it stands for.
+    assert panel("Wiese \N{LATIN SMALL LETTER SHARP S}") != panel(
+        "Wiese \N{LATIN SMALL LETTER L WITH STROKE}"
+    )
+    assert panel("Pr\N{LATIN SMALL LETTER E WITH ACUTE}") != panel(
+        "Pr\N{LATIN SMALL LETTER O WITH DIAERESIS}"
+    )
+
+
+def test_without_any_other_font_accents_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_font, "_OTHERS", ())
+    text, _ = map_font.written(
+        "Gro\N{LATIN SMALL LETTER SHARP S}e Pr\N{LATIN SMALL LETTER E WITH ACUTE}s", 14
+    )
+    assert text == "Grosse Pres"
+    assert map_font.written("Long meadow, 3.62 ha", 14)[0] == "Long meadow, 3.62 ha"

@@ -18,6 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from geofield import schema, theme
 from geofield.grid import Grid
+from geofield.map_font import written
 from geofield.map_labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw_labels
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
@@ -262,10 +263,11 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
         place = (16, top + 92 + 18 * number)
         font = ImageFont.load_default(_DOUBT_SIZE)
         draw.text(place, line, font=font, fill=theme.rgb(theme.DOUBT), anchor="ls")
+    credit, font = written(credit_in_words(dataset), 12)
     draw.text(
         (16, image.height - 12),
-        credit_in_words(dataset),
-        font=ImageFont.load_default(12),
+        credit,
+        font=font,
         fill=(190, 195, 200),
         anchor="ls",
     )
@@ -307,11 +309,12 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, tuple[float, float
 
 
 def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) -> None:
-    for index, line in enumerate(figures_in_words(dataset)):
+    for index, words in enumerate(figures_in_words(dataset)):
+        line, font = written(words, 16 if index == 0 else 14)
         draw.text(
             (width - 16, top + 14 + 22 * index),
             line,
-            font=ImageFont.load_default(16 if index == 0 else 14),
+            font=font,
             fill=_INK[:3],
             anchor="rm",
         )
