@@ -46,7 +46,7 @@ def main() -> None:
                 work = works[number % len(works)]
                 kind = STOPS[number // len(works) % len(STOPS)]
                 # A fifth while files are moved: few moments of chance fall into that.
-                aimed = number % 5 == 4 and len(work.written) > 1
+                aimed = number // len(works) % 5 == 4 and len(work.written) > 1
                 out = folder / str(number)
                 found.append(stop(work, kind, dice, out, aimed=aimed))
                 shutil.rmtree(out)
@@ -60,7 +60,7 @@ def _page(found: list[Stop], seed: int) -> list[str]:
     for each in found:
         groups[each.work, each.kind].append(each)
     aimed = sum(each.moment == "while moving" for each in found)
-    cut = [each for each in found if each.at_once not in ("old", "new")]
+    cut = [each for each in found if each.work != "batch" and each.at_once not in ("old", "new")]
     lines = [
         f"{len(found)} stops (seed {seed}) of commands that replace earlier products: "
         f"{len(found) - aimed} at moments drawn evenly over the command's life, {aimed} as soon as "
@@ -69,7 +69,9 @@ def _page(found: list[Stop], seed: int) -> list[str]:
         "",
         "A fault is a mixture of old and new files, one that cannot be read, a hidden folder that "
         "stays, a traceback, or an exit code other than 1 with a word (0 where the work was done; "
-        "the signal's own where it met Python before the command had begun).",
+        "the signal's own where it met Python before the command had begun). A farm (`batch`) goes "
+        "on where it was stopped: after each stop the same command is given again, and a file "
+        "whose bytes are not those of an undisturbed run is a fault.",
         "",
         "| command | stop | stops | products before | products of the stopped one | exit codes | "
         "faults |",
