@@ -465,7 +465,9 @@ def test_capabilities_from_a_file_and_bad_ones(tmp_path: Path) -> None:
     source = find_source(str(file), allow=["http://127.0.0.1:9"])
     assert not isinstance(source, PictureSource)
     assert source.pyramid.zooms == (5, 20)
+    nowhere = wmts_document("http://127.0.0.1:9", mercator=True, rest=True)
     for text, message in [
+        (nowhere.replace("http://127.0.0.1:9", "caps"), "no web address of its service"),
         ("<html>wmts<body>", "does not give XML"),
         ("<ExceptionReport>wmts is down</ExceptionReport>", "answers: wmts is down"),
         ('<!DOCTYPE a [<!ENTITY b "wmts">]><a>&b;</a>', "entity"),

@@ -9,6 +9,7 @@ import shapely
 from pyproj import CRS
 from shapely import Polygon
 
+from geofield.crossings import mended
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import CRSError, FieldError
 from geofield.model import Field, FieldQuality
@@ -92,7 +93,7 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
         why = shapely.is_valid_reason(polygon)
-        parts = shapely.get_parts(shapely.make_valid(polygon))
+        parts = shapely.get_parts(mended(polygon))
         polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
         reasons = (f"the boundary was not valid ({why}) and was repaired",)
     # Long sides bend in another projection: points between keep them where they are.

@@ -20,6 +20,7 @@ import pandas as pd
 import shapely
 from pyproj import CRS
 
+from geofield.crossings import mended
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
 
@@ -205,15 +206,15 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
     bad = polygons & ~frame.geometry.is_valid
     if not bad.any():
         return frame
+    sound = frame.copy()
+    sound.loc[bad, sound.geometry.name] = frame.geometry[bad].apply(mended)
     warnings.warn(
         f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired; look at them.",
         FormatWarning,
         stacklevel=5,
     )
-    mended = frame.copy()
-    mended.loc[bad, mended.geometry.name] = frame.geometry[bad].make_valid()
-    mended = mended.explode(index_parts=False, ignore_index=True)
-    return mended[mended.geom_type.isin(["Polygon", "Point"])]
+    sound = sound.explode(index_parts=False, ignore_index=True)
+    return sound[sound.geom_type.isin(["Polygon", "Point"])]
 
 
 def _joined(frames: list[Any]) -> Any:

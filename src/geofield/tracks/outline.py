@@ -10,6 +10,7 @@ from pyproj import CRS
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from geofield.crossings import mended
 from geofield.crs import authority_name, is_metric, parse_crs
 from geofield.errors import CRSError, TrackError
 
@@ -71,7 +72,7 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     _refuse_degrees(polygon)
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon)
-        polygon = _largest_part(shapely.make_valid(polygon, method="structure"), reason)
+        polygon = _largest_part(mended(polygon, "structure"), reason)
         notes.append(f"The field's outline was repaired ({reason}).")
     parts = [part for part in shapely.get_parts(polygon) if part.area > 0.0]
     if not parts:

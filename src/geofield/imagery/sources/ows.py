@@ -76,6 +76,20 @@ def link(element: ET.Element) -> str:
     return element.get(_XLINK, "")
 
 
+def require_web_address(target: str, document: str) -> None:
+    """Refuse a service whose document does not say where it is asked, but for a path.
+
+    Raises
+    ------
+    ImageryError
+    """
+    if urlsplit(target).scheme not in ("http", "https") or not urlsplit(target).netloc:
+        raise ImageryError(
+            f"{plain_address(document)} names no web address of its service.",
+            hint="Give the address of the service itself, which begins with https://.",
+        )
+
+
 def with_query(address: str, **values: str) -> str:
     """An address with query values set, whatever their case was."""
     parts = urlsplit(address)

@@ -20,6 +20,7 @@ from geofield.imagery.sources.ows import (
     plain_address,
     query_value,
     read_document,
+    require_web_address,
     text,
     with_query,
 )
@@ -146,9 +147,10 @@ def open_wms(
     )
     form = next((f for f in _FORMATS if f in offered), "image/png")
     target = target or address
+    require_web_address(target, address)
     if not service:
         (reach or Reach()).of(address).require(target, plain_address(address))
-    own = with_query(target, SERVICE="WMS") if target else address
+    own = with_query(target, SERVICE="WMS")
     return WMSSource(
         name=name or chosen,
         service=own,

@@ -22,6 +22,7 @@ from geofield.imagery.sources.ows import (
     plain_address,
     query_value,
     read_document,
+    require_web_address,
     text,
     with_query,
 )
@@ -120,6 +121,7 @@ def open_wmts(
     links = [text(each, "TileMatrixSet") for each in children(element, "TileMatrixSetLink")]
     set_id, pyramid = _best_set([(i, sets[i]) for i in links if i in sets], address)
     template = _template(root, element, set_id, address)
+    require_web_address(template, address)
     (reach or Reach()).of(address).require(template, plain_address(address))
     return WMTSSource(
         name=name or chosen,
