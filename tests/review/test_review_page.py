@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from axe_core_python.selenium import Axe
@@ -21,6 +22,7 @@ from selenium.webdriver.common.keys import Keys
 
 from geofield.plan import read_plan
 from geofield.review import Session
+from geofield.settings import DirectionName
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
 
@@ -138,6 +140,10 @@ def test_drawing_moving_and_resizing_with_the_pointer(page: Page) -> None:
 
 def test_the_outline_is_edited_and_tracks_turn(page: Page) -> None:
     before = page.state()
+    offered = page.run(
+        "return [...document.querySelectorAll('#directions option')].map(one => one.value)"
+    )
+    assert offered == list(get_args(DirectionName))
     corner = max(before["field"]["rings"][0], key=lambda place: place[0])
     page.press("o")
     page.drag(tuple(corner), (corner[0] - 15, corner[1]))

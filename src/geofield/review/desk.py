@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from geofield.crs import ground_scale_of
 from geofield.errors import ChangedError, FormatError, GeofieldError
@@ -23,7 +23,7 @@ from geofield.review.ground import Ground
 from geofield.review.journal import Journal, fingerprint, play
 from geofield.review.session import Session
 from geofield.review.shown import state_of, tracks_of
-from geofield.settings import Settings
+from geofield.settings import DirectionName, Settings
 from geofield.staging import refuse_locked
 from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
@@ -76,6 +76,7 @@ class Desk:
                 "scale": 1.0 / float(ground_scale_of(plan.field.polygon, plan.field.crs)),
                 "theme": web_theme(),
                 "formats": _formats(),
+                "directions": get_args(DirectionName),
             }
 
     def edit(self, command: Command) -> dict[str, Any]:

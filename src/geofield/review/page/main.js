@@ -233,6 +233,7 @@ async function start() {
   listen(ACTIONS);
   $("infrared-row").hidden = !state.picture?.infrared;
   $("credit").textContent = state.picture?.credit ?? "";
+  $("directions").replaceChildren(...state.directions.map(name => new Option(name)));
   $("export-format").replaceChildren(...state.formats.map(([name, title]) => new Option(title, name)));
   $("language").value = currentLanguage();
   $("plans-row").hidden = state.plans.length < 2;
