@@ -46,12 +46,18 @@ def parse_crs(value: Any) -> CRS:
             "There is no coordinate reference system.", hint="Name one, for instance EPSG:32633."
         )
     try:
-        return CRS.from_user_input(value)
+        return _named(value) if isinstance(value, str) else CRS.from_user_input(value)
     except ProjCRSError as error:
         raise CRSError(
             f"Unknown coordinate reference system {str(value)[:80]!r}.",
             hint="Give an EPSG code such as EPSG:32633, or WKT.",
         ) from error
+
+
+@lru_cache(maxsize=256)
+def _named(text: str) -> CRS:
+    """A CRS by its text, made once: that takes longer than to plan a field."""
+    return CRS.from_user_input(text)
 
 
 def utm_crs(lon: float, lat: float) -> CRS:
@@ -71,15 +77,15 @@ def utm_crs(lon: float, lat: float) -> CRS:
         )
     lon = (lon + 180.0) % 360.0 - 180.0
     if lat >= 84.0:
-        return CRS.from_epsg(5041)
+        return _named("EPSG:5041")
     if lat < -80.0:
-        return CRS.from_epsg(5042)
+        return _named("EPSG:5042")
     zone = int((lon + 180.0) // 6.0) + 1
     if 56.0 <= lat < 64.0 and 3.0 <= lon < 12.0:
         zone = 32
     elif lat >= 72.0 and 0.0 <= lon < 42.0:
         zone = 31 + 2 * int((lon + 3.0) // 12.0) if lon >= 9.0 else 31
-    return CRS.from_epsg((32600 if lat >= 0 else 32700) + zone)
+    return _named(f"EPSG:{(32600 if lat >= 0 else 32700) + zone}")
 
 
 def is_utm(crs: CRS) -> bool:
@@ -133,6 +139,23 @@ def transformer(source: CRS, target: CRS) -> Transformer:
             f"Coordinates cannot be brought from {source.name[:80]!r} to {target.name[:80]!r}.",
             hint="Is the file whole that says them? Name another system.",
         ) from error
+
+
+def reproject(geometry: Any, source: CRS, target: CRS) -> Any:
+    """A geometry, or an array of them, vertex by vertex from one CRS to another, without heights.
+
+    Parameters
+    ----------
+    geometry : shapely geometry or array of them
+        x (easting, longitude) before y, as everywhere in geofield.
+    source, target : CRS
+    """
+    if source is target or source == target:
+        return geometry
+    project = transformer(source, target)
+    return shapely.transform(
+        geometry, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
+    )
 
 
 def authority_name(crs: CRS) -> str:

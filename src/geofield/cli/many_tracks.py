@@ -138,6 +138,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     """One after the other, each into a file of its own."""
     from geofield.errors import GeofieldError, TrackError
     from geofield.farm.work import plan_place
+    from geofield.formats.names import unlike
     from geofield.plan_files import save_plan
 
     if wanted.output.suffix:
@@ -148,7 +149,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     rows, failed, taken = [], {}, set[str]()
     with progress_bar(quiet=wanted.quiet) as progress:
         for done, place in enumerate(places):
-            stem = file_name(place.name, taken)
+            stem = unlike(file_name(place.name), taken, "_")
             progress(done, len(places), stem)
             try:
                 plan = plan_place(place, job)
@@ -161,15 +162,9 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     return rows, failed
 
 
-def file_name(name: str, taken: set[str]) -> str:
-    """A name for a file, unlike all others taken."""
-    stem = re.sub(r"[^\w.-]+", "_", name).strip("._") or "field"
-    unique, number = stem, 1
-    while unique.lower() in taken:
-        number += 1
-        unique = f"{stem}_{number}"
-    taken.add(unique.lower())
-    return unique
+def file_name(name: str) -> str:
+    """A field's name as that of a file on a disk, which has letters of every script."""
+    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "field"
 
 
 def figures_of(plan: Plan, target: Path) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def tracks(
         else:
             assert places is not None  # noqa: S101 - no plan, so there are places
             place = next(iter(places))
-            stem = file_name(place.name, set())
+            stem = file_name(place.name)
             # Without an id of its own the field gets one by its shape.
             field_id = place.field_id if places.ids_given else ""
             begun = replace(place, name=name or place.name, field_id=field_id)

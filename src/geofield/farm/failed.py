@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, reproject
 from geofield.farm import folder
 from geofield.farm.places import Places
 from geofield.farm.store import Store
@@ -65,11 +65,7 @@ def _positions(places: Places, at: Any) -> dict[str, Any]:
         lat, lon = (pa.array(values[at], from_pandas=True) for values in (places.lat, places.lon))
         return {"lat": lat, "lon": lon}
     shapes = shapely.from_wkb(places.outlines.take(at).to_numpy(zero_copy_only=False))
-    if places.crs != LONLAT:
-        project = transformer(places.crs, LONLAT)
-        shapes = shapely.transform(
-            shapes, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
-        )
+    shapes = reproject(shapes, places.crs, LONLAT)
     points = shapely.points(places.lon[at], places.lat[at])
     text = shapely.to_wkt(np.where(shapely.is_missing(shapes), points, shapes), -1)
     return {"geometry": pa.array(text, pa.string(), from_pandas=True)}

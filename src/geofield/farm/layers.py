@@ -19,7 +19,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, parse_crs, reproject
 from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.antimeridian import split
@@ -166,10 +166,7 @@ def _grouped(zones: Sequence[CRS], shapes: Sequence[Any]) -> list[tuple[CRS, lis
 
 def _lonlat(shapes: Any, crs: CRS) -> Any:
     """Shapes in WGS 84, rings counter-clockwise, cut at the 180th meridian."""
-    project = transformer(crs, LONLAT)
-    moved = shapely.transform(
-        shapes, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
-    )
+    moved = reproject(shapes, crs, LONLAT)
     west, _, east, _ = shapely.total_bounds(moved)
     if east - west > 180.0:
         moved = split(moved)
@@ -227,11 +224,6 @@ def epsg_of(crs: CRS) -> int | None:
     return _epsg(crs.srs)
 
 
-@lru_cache(maxsize=64)
-def _crs(wkt: str) -> CRS:
-    return CRS.from_wkt(wkt)
-
-
 def plan_of(tables: Mapping[str, pa.Table]) -> Plan:
     """The plan of one field.
 
@@ -243,7 +235,7 @@ def plan_of(tables: Mapping[str, pa.Table]) -> Plan:
     if PLAN not in tables or tables[PLAN].num_rows != 1:
         raise FormatError("The farm's record of this field is missing or double.")
     record = tables[PLAN].to_pylist()[0]
-    crs = _crs(record["crs"])
+    crs = parse_crs(record["crs"])
     parsed = {name: json.loads(record[name]) for name in ("settings", "source", "evidence", "grid")}
     parsed |= {"version": origin.VERSION, "name": record["name"], "software": record["software"]}
     back = origin.from_content({**parsed, "crs": record["crs"]})

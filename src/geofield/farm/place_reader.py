@@ -19,6 +19,8 @@ from geofield.farm.place_files import RawPlaces, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
+from geofield.formats.names import unlike
+from geofield.model.place import position_words
 from geofield.settings import Settings
 
 if TYPE_CHECKING:
@@ -313,7 +315,7 @@ def _names(
         if one:
             ids[at] = f"{one}.{part[at]}" if part[at] else one
         else:
-            ids[at] = _unlike(_place_id(lat[at], lon[at], int(kept[at]) + 1), taken)
+            ids[at] = unlike(_place_id(lat[at], lon[at], int(kept[at]) + 1), taken, "-", key=str)
     return pa.array(ids, pa.string()), pa.array(
         [name or one for name, one in zip(names, ids, strict=True)], pa.string()
     )
@@ -336,17 +338,7 @@ def _place_id(lat: float, lon: float, row: int) -> str:
     """An id for a place without one: where it is, to about 10 m."""
     if not (np.isfinite(lat) and np.isfinite(lon)):
         return f"row{row}"
-    north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
-    return f"{abs(lat):.4f}{north}{abs(lon):.4f}{east}"
-
-
-def _unlike(name: str, taken: set[str]) -> str:
-    unique, number = name, 1
-    while unique in taken:
-        number += 1
-        unique = f"{name}-{number}"
-    taken.add(unique)
-    return unique
+    return position_words(lat, lon, 4)
 
 
 def _unlike_ours(name: str) -> str:

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from pyproj import CRS
 
-from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.errors import FieldError, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
@@ -181,28 +180,12 @@ def parcel_of(place: Place) -> Field:
     TrackError
         When its outline is no area.
     """
-    source = _crs(place.crs)
-    geometry = shapely.from_wkb(place.outline)
+    source = parse_crs(place.crs)
     metric = metric_crs(place.lon, place.lat, source)
-    if metric != source:
-        project = transformer(source, metric)
-        geometry = shapely.transform(
-            geometry, lambda xy: np.column_stack(project.transform(xy[:, 0], xy[:, 1]))
-        )
-    polygon, _ = clean_outline(geometry)
+    polygon, _ = clean_outline(reproject(shapely.from_wkb(place.outline), source, metric))
     return Field(
         polygon, metric, name=place.name, field_id=place.field_id, method="boundary", own=place.own
     )
-
-
-_KNOWN: dict[str, CRS] = {}
-
-
-def _crs(text: str) -> CRS:
-    """A CRS by its text; made once, which costs more than a parcel."""
-    if text not in _KNOWN:
-        _KNOWN[text] = CRS(text)
-    return _KNOWN[text]
 
 
 def told(place: Place, heard: Sequence[warnings.WarningMessage]) -> str:

@@ -10,7 +10,7 @@ from pyproj import CRS
 from shapely import Polygon
 
 from geofield.crossings import mended
-from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.crs import LONLAT, metric_crs, reproject, transformer
 from geofield.errors import CRSError, FieldError
 from geofield.model import Field, FieldQuality
 
@@ -88,7 +88,6 @@ def field_from_boundary(
 
 def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
     target = metric_crs(lon, lat, own=own)
-    project = transformer(own, target)
     polygon = shapely.force_2d(row.geometry.iloc[0])
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
@@ -99,9 +98,7 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
     # Long sides bend in another projection: points between keep them where they are.
     if own != target and own.is_geographic:
         polygon = shapely.segmentize(polygon, 0.001)
-    polygon = shapely.transform(
-        polygon, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
-    )
+    polygon = reproject(polygon, own, target)
     label = ""
     for column in _NAME_COLUMNS:
         if column in row.columns and row[column].notna().iloc[0]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, authority_name, transformer
+from geofield.crs import LONLAT, authority_name, reproject
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import split
 
@@ -59,13 +59,7 @@ def disk_hint(path: Path) -> str:
 
 def to_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
     """Geometries in WGS 84 longitude and latitude, degrees; those across 180 jump there."""
-    if crs == LONLAT:
-        return geometry
-    project = transformer(crs, LONLAT)
-    return np.asarray(
-        shapely.transform(geometry, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))),
-        dtype=object,
-    )
+    return np.asarray(reproject(geometry, crs, LONLAT), dtype=object)
 
 
 def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:

@@ -15,7 +15,7 @@ import pandas as pd
 from geofield import schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError
-from geofield.formats.names import safe_name
+from geofield.formats.names import safe_name, unlike
 from geofield.formats.origin import imagery_day
 from geofield.model import Dataset, Provenance
 
@@ -126,10 +126,6 @@ def distinct(datasets: Sequence[Dataset]) -> list[Dataset]:
     taken: set[str] = set()
     found = []
     for each in datasets:
-        name, number = each.name, 1
-        while safe_name(name).lower() in taken:
-            number += 1
-            name = f"{each.name[:30]} {number}"
-        taken.add(safe_name(name).lower())
+        name = unlike(each.name, taken, " ", length=30, key=lambda one: safe_name(one).lower())
         found.append(each if name == each.name else replace(each, name=name))
     return found

@@ -18,7 +18,7 @@ from geofield.crs import (
     ground_scale_of,
     is_metric,
     parse_crs,
-    transformer,
+    reproject,
 )
 from geofield.errors import CRSError, FieldError
 from geofield.grid import Grid
@@ -193,10 +193,8 @@ class Field:
     @property
     def polygon_lonlat(self) -> Polygon:
         """The polygon in longitude and latitude, degrees."""
-        project = transformer(self.crs, LONLAT)
-        return shapely.transform(
-            self.polygon, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
-        )
+        polygon: Polygon = reproject(self.polygon, self.crs, LONLAT)
+        return polygon
 
     def polygon_px(self, grid: Grid) -> Polygon:
         """The polygon in the pixel coordinates of `grid`."""

@@ -53,8 +53,8 @@ def place_id(polygon: Polygon, crs: CRS) -> str:
         found = _inside(whole, crs, per_degree, box)
         if len(found):
             lat, lon = min(found.tolist(), key=lambda one: (_rank(one[0]), _rank(one[1]), one))
-            return _written(lat / per_degree, lon / per_degree, digits)
-    return _written(lat_0, lon_0, 7)
+            return position_words(lat / per_degree, lon / per_degree, digits)
+    return position_words(lat_0, lon_0, 7)
 
 
 def _inside(
@@ -75,7 +75,8 @@ def _rank(steps: int) -> int:
     return -(steps & -steps) if steps else -(1 << 62)
 
 
-def _written(lat: float, lon: float, digits: int) -> str:
+def position_words(lat: float, lon: float, digits: int) -> str:
+    """A position as part of a name: ``35.075N33.531E`` with three digits."""
     lon = (lon + 180.0) % 360.0 - 180.0
     north, east = ("N" if lat >= 0 else "S"), ("E" if lon >= 0 else "W")
     return f"{abs(lat):.{digits}f}{north}{abs(lon):.{digits}f}{east}"

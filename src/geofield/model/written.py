@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
-from geofield.crs import transformer
+from geofield.crs import reproject, transformer
 from geofield.model.obstacles import QUARTER_SEGMENTS, floats, still_round
 
 if TYPE_CHECKING:
@@ -209,13 +209,10 @@ def matches(shapes: Any, others: Any) -> NDArray[np.int64]:
 
 
 def _moved(shape: PlainShape, source: CRS, target: CRS) -> PlainShape:
-    project = transformer(source, target)
     if not isinstance(shape, str):
-        x, y = project.transform(shape[0], shape[1])
+        x, y = transformer(source, target).transform(shape[0], shape[1])
         return (round(x, _DECIMALS), round(y, _DECIMALS), shape[2])
-    moved = shapely.transform(
-        shapely.from_wkt(shape), lambda xy: np.column_stack(project.transform(*xy.T))
-    )
+    moved = reproject(shapely.from_wkt(shape), source, target)
     return str(shapely.to_wkt(moved, rounding_precision=_DECIMALS))
 
 

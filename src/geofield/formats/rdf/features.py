@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, ground_areas_m2, northing_first, transformer
+from geofield.crs import LONLAT, ground_areas_m2, northing_first, reproject
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import (
     CANDIDATE,
@@ -233,10 +233,7 @@ def _geometries(
     """The geometries' nodes, and the links from their features to them."""
     default = [f"{iri}/geometry" for iri in iris]
     identifier = crs_iri(crs)
-    project = transformer(crs, LONLAT)
-    lonlat = shapely.transform(
-        geometry, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
-    )
+    lonlat = reproject(geometry, crs, LONLAT)
     decimals = LONLAT_DECIMALS if identifier else -1
     nodes = [_geometry_nodes(default, lonlat, CRS84, decimals, accuracy_m)]
     if identifier:

@@ -10,12 +10,11 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Any
 
-import numpy as np
 import pyoxigraph as ox
 import shapely
 from pyproj import Geod
 
-from geofield.crs import LONLAT, transformer, utm_crs
+from geofield.crs import LONLAT, reproject, utm_crs
 from geofield.errors import FormatError
 from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEOF, expand, node
 from geofield.formats.rdf.wkt import geometries_of
@@ -65,15 +64,8 @@ def buffer(literal: str, radius: float, unit: str = METRE_IRIS[0]) -> str:
     _need_metres(unit)
     west, south, east, north = shapely.bounds(_shape(literal)).tolist()
     crs = utm_crs((west + east) / 2, (south + north) / 2)
-
-    def moved(shape: Any, project: Any) -> Any:
-        return shapely.transform(
-            shape, lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
-        )
-
-    metres = moved(_shape(literal), transformer(LONLAT, crs))
-    grown = shapely.buffer(metres, float(radius), quad_segs=16)
-    return _literal(moved(grown, transformer(crs, LONLAT)))
+    grown = shapely.buffer(reproject(_shape(literal), LONLAT, crs), float(radius), quad_segs=16)
+    return _literal(reproject(grown, crs, LONLAT))
 
 
 def _relation(name: str) -> tuple[Callable[..., Value], str]:

@@ -31,6 +31,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.namespaces import DEFAULT_BASE
 from geofield.model.dataset import Dataset
+from geofield.model.place import position_words
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -163,5 +164,4 @@ def _field_part(dataset: Dataset) -> str:
         return identifier
     point = shapely.point_on_surface(table.geometry.iloc[0])
     lon, lat = transformer(dataset.crs, LONLAT).transform(point.x, point.y)
-    north, east = "N" if lat >= 0 else "S", "E" if lon >= 0 else "W"
-    return f"{abs(lat):.3f}{north}{abs(lon):.3f}{east}/{path_part(identifier or 'field')}"
+    return f"{position_words(lat, lon, 3)}/{path_part(identifier or 'field')}"
