@@ -10,8 +10,9 @@ is quick.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from geofield.late import late_names
 
 __version__ = "0.1.0"
 
@@ -85,14 +86,7 @@ __all__ = [
     "write_scene",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'geofield' has no attribute {name!r}")
-    # A submodule of the same name (geofield.evaluate) must not shadow the function.
-    value = getattr(import_module(f"geofield.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__ = late_names(__name__, _HOME)
 
 
 def __dir__() -> list[str]:

@@ -6,8 +6,9 @@ needs nothing of what fetches one from a server.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, FetchOptions, Where, acquire, with_provenance
@@ -48,14 +49,4 @@ __all__ = [
     "write_scene",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__ = late_names(__name__, _HOME)

@@ -10,8 +10,9 @@ is drawn by OpenLayers, which lies there with its licence.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.review.commands import apply_command
@@ -19,11 +20,5 @@ if TYPE_CHECKING:
 
 __all__ = ["Session", "apply_command"]
 
-#: Loaded when first used: the server answers before tables and geometry are there.
-_LATE = {"Session": "session", "apply_command": "commands"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _LATE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_LATE[name]}"), name)
+# The server answers before tables and geometry are there.
+__getattr__ = late_names(__name__, {"Session": "session", "apply_command": "commands"})
