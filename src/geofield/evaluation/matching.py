@@ -14,10 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from geofield.errors import ObstacleError
 
@@ -71,6 +67,12 @@ def match_points(detected: ArrayLike, truth: ArrayLike, distance: float) -> Matc
     ObstacleError
         When the distance is not above zero.
     """
+    # Every run reports what it may have missed, and matches nothing: not loaded for that.
+    from scipy.optimize import linear_sum_assignment
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     if not (np.isfinite(distance) and distance > 0):
         raise ObstacleError(f"The matching distance {distance:g} is not above zero.")
     found = np.asarray(detected, dtype=float).reshape(-1, 2)
