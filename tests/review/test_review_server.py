@@ -5,6 +5,8 @@ from __future__ import annotations
 import http.client
 import io
 import json
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -96,6 +98,15 @@ def test_a_plan_that_cannot_be_read_is_told_to_the_page(tmp_path: Path) -> None:
     assert (status, "no plan" in json.loads(body)["message"]) == (422, True)
     server.shutdown()
     server.server_close()
+
+
+def test_no_page_is_opened_on_a_folder_without_a_plan(tmp_path: Path) -> None:
+    (tmp_path / "other.gpkg").write_bytes(b"no plan")
+    words = [sys.executable, "-m", "geofield", "review", str(tmp_path), "--no-browser"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert "holds no plan of geofield" in done.stderr
+    assert done.stdout == ""
 
 
 def test_only_the_printed_address_opens(visitor: Visitor) -> None:

@@ -54,8 +54,11 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     The page is served to this machine only, under an address that holds a key.
     """
     from geofield.errors import GeofieldError
+    from geofield.review.plans import is_farm, plans_in
     from geofield.review.server import ReviewServer
 
+    if plan_file.is_dir() and not is_farm(plan_file):
+        plans_in(plan_file)  # no browser is opened on nothing
     try:
         server = ReviewServer(port)
     except OSError as error:

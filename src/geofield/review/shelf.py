@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import sqlite3
 import threading
 from collections.abc import Callable
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 
 from geofield.errors import FormatError
 from geofield.review.desk import Desk
-
-#: The file that makes a folder a farm.
-FARM = "farm.json"
-#: Folders below the one that was named: `farm/field.gpkg` and `farm/field-7/field.gpkg`.
-_DEPTH = ("*.gpkg", "*/*.gpkg")
+from geofield.review.plans import is_farm, plans_in
 
 
 class Shelf:
@@ -85,30 +79,10 @@ def _desks_of(place: Path, picture: Path | None) -> list[tuple[str, Callable[[],
     """What the plans of a place are called, and how each comes on the desk."""
     if place.is_file():
         return [(place.name, partial(Desk, place, picture))]
-    if (place / FARM).is_file():
+    if is_farm(place):
         from geofield.review.farm import farm_desks
 
         return farm_desks(place, picture)
     return [
         (str(path.relative_to(place)), partial(Desk, path, picture)) for path in plans_in(place)
     ]
-
-
-def plans_in(folder: Path) -> list[Path]:
-    """The plans of geofield in a folder and the folders in it, by name."""
-    places = [path for pattern in _DEPTH for path in sorted(folder.glob(pattern))]
-    found = [path for path in places if not path.name.startswith(".") and _is_plan(path)]
-    if not found:
-        raise FormatError(
-            f"{folder} holds no plan of geofield.",
-            hint="Name a GeoPackage that `geofield run` wrote, or a folder with such files.",
-        )
-    return found
-
-
-def _is_plan(path: Path) -> bool:
-    try:
-        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as file:
-            return bool(file.execute("SELECT 1 FROM gpkg_metadata").fetchone())
-    except sqlite3.Error:
-        return False

@@ -1,0 +1,45 @@
+"""Which plans lie in a folder: looked at before anything heavy is loaded."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+from geofield.errors import FormatError
+
+#: The file that makes a folder a farm.
+_FARM = "farm.json"
+#: Folders below the one that was named: `farm/field.gpkg` and `farm/field-7/field.gpkg`.
+_DEPTH = ("*.gpkg", "*/*.gpkg")
+
+
+def is_farm(place: Path) -> bool:
+    """Whether a folder is a farm of geofield."""
+    return (place / _FARM).is_file()
+
+
+def plans_in(folder: Path) -> list[Path]:
+    """The plans of geofield in a folder and the folders in it, by name.
+
+    Raises
+    ------
+    FormatError
+        There is none.
+    """
+    places = [path for pattern in _DEPTH for path in sorted(folder.glob(pattern))]
+    found = [path for path in places if not path.name.startswith(".") and _is_plan(path)]
+    if not found:
+        raise FormatError(
+            f"{folder} holds no plan of geofield.",
+            hint="Name a GeoPackage that `geofield run` wrote, or a folder with such files.",
+        )
+    return found
+
+
+def _is_plan(path: Path) -> bool:
+    try:
+        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as file:
+            return bool(file.execute("SELECT 1 FROM gpkg_metadata").fetchone())
+    except sqlite3.Error:
+        return False
