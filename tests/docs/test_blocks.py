@@ -13,16 +13,26 @@ sys.path.insert(0, str(ROOT / "docs" / "scripts"))
 import blocks  # noqa: E402
 
 PAGES = blocks.pages()
+#: One after another: a page that starts a cluster names its port.
+IN_TURN = pytest.mark.xdist_group("cluster of the documentation")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[IN_TURN] if "--scheduler" in page.read_text("utf-8") else [])
+        for page in PAGES
+    ],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
 def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     shared = request.getfixturevalue("shared") if blocks.needs_shared(page) else None
     assert blocks.run_page(page, tmp_path, shared) > 0
 
 
 @pytest.mark.slow
+@IN_TURN
 def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path) -> None:
     names = [page.relative_to(blocks.DOCS).as_posix() for page in blocks.course()]
     assert names[0] == "tutorial.md"
