@@ -21,7 +21,7 @@ from geofield.farm.store import Store
 from geofield.farm.value import clear
 from geofield.farm.work import Job
 
-#: Places per chunk at most, with pictures and without: about half a minute of work.
+#: Places per chunk at most: half a minute of work with pictures, some seconds without.
 MOST_WITH_PICTURES, MOST_PARCELS = 25, 250
 _LEAST_PARCELS = 25
 #: Chunks that a run has at least, where there are enough places, so that all workers have work.
