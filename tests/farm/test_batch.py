@@ -214,6 +214,64 @@ def test_a_run_that_is_ended_at_once_goes_on_later(
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
+def test_a_worker_killed_while_it_writes_leaves_nothing(farm: Path, tmp_path: Path) -> None:
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "sitecustomize.py").write_text(
+        "import sys\n"
+        "if 'worker' in ' '.join(sys.orig_argv):\n"
+        "    import os, pathlib, signal\n"
+        "    plain = pathlib.Path.replace\n"
+        "    def bad(self, target):\n"
+        "        if 'tracks/chunk=0000' in str(target):\n"
+        "            os.kill(os.getpid(), signal.SIGKILL)\n"
+        "        return plain(self, target)\n"
+        "    pathlib.Path.replace = bad\n"
+    )
+    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+            str(tmp_path / "farm"), "--workers", "1"]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "bad")}
+    process = subprocess.Popen(line, stderr=subprocess.DEVNULL, env=environment)
+    until = time.monotonic() + 120
+    while not list(tmp_path.glob("farm/tracks/chunk=0000/.*.tmp")) and time.monotonic() < until:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    assert list(tmp_path.glob("farm/tracks/chunk=0000/.*.tmp"))
+    (tmp_path / "farm" / ".half.tmp").write_bytes(b"of the record")
+    batch(*line[4:])
+    assert layers_of(tmp_path / "farm") == layers_of(farm)
+
+
+def test_a_run_killed_at_its_end_is_finished_by_the_next(farm: Path, tmp_path: Path) -> None:
+    import shutil
+
+    from geofield.farm.stac import write_stac
+    from geofield.farm.store import Store
+
+    mine = tmp_path / "farm"
+    shutil.copytree(farm, mine)
+    shutil.copy(farm.parent / "parcels.gpkg", tmp_path)
+    line = [tmp_path / "parcels.gpkg", "--spacing", 5, "--out", mine, "--workers", 1]
+    # A run that was stopped has a catalogue of a half, a second one is killed where all is done.
+    (mine / "status" / "chunk=0001" / "part-0.parquet").unlink()
+    write_stac(Store.of(mine))
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "sitecustomize.py").write_text(
+        "import sys\n"
+        "if 'batch' in sys.orig_argv:\n"
+        "    import os, signal\n"
+        "    import geofield.farm.finish as module\n"
+        "    module.finish = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "bad")}
+    ended = subprocess.run([*PLAIN, "batch", *map(str, line)], env=environment, check=False)
+    assert ended.returncode == -signal.SIGKILL
+    assert layers_of(mine) != layers_of(farm)
+    batch(*line)
+    assert layers_of(mine) == layers_of(farm)
+    assert not (mine / ".work").exists()
+
+
 def test_a_program_sees_how_far_it_is(tmp_path: Path) -> None:
     places = parcels(tmp_path / "p.gpkg", 60)
     said = batch(places, "--out", tmp_path / "farm", "--progress", "json")

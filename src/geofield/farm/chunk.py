@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from geofield import __version__
 from geofield.errors import FormatError, GeofieldError
-from geofield.farm.folder import write_chunk
+from geofield.farm.folder import sweep_chunk, write_chunk
 from geofield.farm.layers import tables_of
 from geofield.farm.limits import Limits, Watch
 from geofield.farm.marks import MOST_DEATHS, Marks
@@ -92,6 +92,8 @@ def plan_chunk(task: Task, orders: Orders) -> Done:
         )
     begun = time.perf_counter()
     marks = Marks.load(orders.store, task.chunk)
+    if marks.again:
+        sweep_chunk(orders.store, task.chunk)
     plans: list[Plan] = []
     outcomes: list[Outcome] = []
     done = False

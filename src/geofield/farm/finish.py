@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from geofield.farm.failed import write_failed
+from geofield.farm.marks import CHANGED, WORK
 from geofield.farm.overview import OVERVIEW, write_overview
 from geofield.farm.places import Places
 from geofield.farm.stac import COLLECTION, write_stac
@@ -25,11 +26,16 @@ def finish(store: Store, places: Places, *, anew: bool = True, overview: bool = 
         Write ``farm.gpkg`` and ``farm.qgz``, where the farm lies on a disk.
     """
     there = store.names("")
+    # A run that was killed here, or before it came here, left them as they were.
+    anew = anew or store.get(CHANGED) is not None
     written = write_failed(store, places)
     if anew or COLLECTION not in there:
         written += _catalogue(store)
     if overview and (anew or OVERVIEW not in there):
         written += _overview(store)
+    store.remove(CHANGED)
+    if not store.names(WORK):
+        store.remove(WORK)
     return written
 
 

@@ -129,6 +129,12 @@ def write_chunk(store: Store, chunk: int, tables: Tables, status: pa.Table) -> N
     store.put(file_of(STATUS, chunk), parquet_bytes(STATUS, status))
 
 
+def sweep_chunk(store: Store, chunk: int) -> None:
+    """Remove what a worker that was killed had begun to write of a chunk."""
+    for layer in (*(each.name for each in LAYERS), PLAN, STATUS):
+        store.sweep(file_of(layer, chunk).rpartition("/")[0])
+
+
 def parquet_bytes(layer: str, table: pa.Table) -> memoryview:
     """A table as a Parquet file; GeoParquet 1.1 with boxes where it has shapes."""
     import pyarrow as pa

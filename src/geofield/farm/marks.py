@@ -16,6 +16,8 @@ from geofield.farm.store import Store
 from geofield.folders import cannot_write
 
 WORK = ".work"
+#: There while files that are made from the whole farm are older than it.
+CHANGED = f"{WORK}/changed"
 #: As often as this a place may end its worker.
 MOST_DEATHS = 2
 _BEGIN, _END, _EXCUSED, _TIME, _MEMORY = "b", "e", "x", "t", "m"
@@ -33,14 +35,16 @@ class Marks:
         How often each place ended its worker since it last went well.
     over : dict of int to (str, float)
         Places that went over a limit: ``t`` and seconds, or ``m`` and megabytes.
+    again : bool
+        Whether a worker has ended at the chunk before.
     """
 
     store: Store
     chunk: int
     deaths: Counter[int] = field(default_factory=Counter)
     over: dict[int, tuple[str, float]] = field(default_factory=dict)
+    again: bool = False
     _lines: list[str] = field(default_factory=list)
-    _again: bool = False
     _handle: int | None = None
 
     @classmethod
@@ -48,7 +52,7 @@ class Marks:
         """What earlier workers noted of a chunk."""
         marks = cls(store, chunk)
         marks._lines = (store.get(marks.name) or b"").decode(errors="replace").split("\n")[:-1]
-        marks._again = bool(marks._lines)
+        marks.again = bool(marks._lines)
         marks._judge()
         if store.folder is not None:
             path = store.folder / marks.name
@@ -57,7 +61,7 @@ class Marks:
                 marks._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             except OSError as error:
                 raise cannot_write(path, error) from error
-        elif not marks._again:
+        elif not marks.again:
             store.put(marks.name, b"x\n")
         return marks
 
@@ -108,7 +112,7 @@ class Marks:
                 os.write(self._handle, f"{line}\n".encode())
             except OSError as error:
                 raise cannot_write(Path(self.store.place, self.name), error) from error
-        elif self._again:
+        elif self.again:
             # In an object store each note is an upload: only where a worker ended before.
             self._lines.append(line)
             self.store.put(self.name, "".join(f"{each}\n" for each in self._lines).encode())
@@ -124,7 +128,15 @@ class Marks:
 
 def excuse_all(store: Store) -> None:
     """A stopped run is no place's fault: what was begun then does not count against it."""
-    for name in store.names(WORK):
-        if name.endswith(".marks"):
-            data = store.get(f"{WORK}/{name}") or b""
-            store.put(f"{WORK}/{name}", data + f"{_EXCUSED}\n".encode())
+    for name in _files(store):
+        store.put(name, (store.get(name) or b"") + f"{_EXCUSED}\n".encode())
+
+
+def forget_all(store: Store) -> None:
+    """All is done: of a worker that died behind its last place a file may be there yet."""
+    for name in _files(store):
+        store.remove(name)
+
+
+def _files(store: Store) -> list[str]:
+    return [f"{WORK}/{name}" for name in store.names(WORK) if name.endswith(".marks")]

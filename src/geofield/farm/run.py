@@ -14,9 +14,10 @@ from geofield.farm.chunk import Orders, Task
 from geofield.farm.digest import difference, record_of
 from geofield.farm.engine import Control, Engine
 from geofield.farm.limits import Limits
-from geofield.farm.marks import WORK, excuse_all
+from geofield.farm.marks import CHANGED, WORK, excuse_all, forget_all
 from geofield.farm.places import Places
 from geofield.farm.reviewed import reviewed_ids
+from geofield.farm.stac import ITEMS as STAC_ITEMS
 from geofield.farm.store import Store
 from geofield.farm.value import clear
 from geofield.farm.work import Job
@@ -132,6 +133,10 @@ def run_farm(
             store.remove(WORK)
         if fresh or there is None:
             store.put(place.RECORD, record.to_json())
+        for name in ("", place.REVIEWED, STAC_ITEMS):
+            store.sweep(name)
+        if missing:
+            store.put(CHANGED, b"")
         for chunk in again:
             store.remove(place.file_of(place.STATUS, chunk))
         excuse_all(store)
@@ -152,7 +157,7 @@ def run_farm(
         if hired is not None:
             hired.close()
     if count.done == count.total:
-        store.remove(WORK)
+        forget_all(store)
     return count
 
 

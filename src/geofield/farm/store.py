@@ -16,6 +16,9 @@ from typing import Any
 from geofield.errors import FormatError
 from geofield.folders import cannot_write
 
+#: What a file is called while it is written, behind a name of chance.
+_HALF = ".tmp"
+
 
 @dataclass(frozen=True)
 class Store:
@@ -92,7 +95,7 @@ class Store:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             # Readers pass over names that begin with a dot.
-            handle, temporary = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=target.parent)
+            handle, temporary = tempfile.mkstemp(prefix=".", suffix=_HALF, dir=target.parent)
             try:
                 with os.fdopen(handle, "wb") as stream:
                     stream.write(data)
@@ -105,6 +108,12 @@ class Store:
                 raise
         except OSError as error:
             raise cannot_write(target, error) from error
+
+    def sweep(self, folder: str) -> None:
+        """Remove what a process that was killed had begun to write in a folder."""
+        if self.folder is not None:
+            for half in (self.folder / folder).glob(f".*{_HALF}"):
+                half.unlink(missing_ok=True)
 
     def get(self, name: str) -> bytes | None:
         """The content of a file; None where there is none."""
