@@ -13,14 +13,16 @@ import argparse
 import json
 import math
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import shapely
 import torch
 from numpy.typing import NDArray
-from outline_pictures import Picture, fold_of, labelled, simulated
+from outline_cases import Case, fold_of, labelled, simulated
 from scipy import ndimage
 from torch import Tensor, nn
 from torch.nn import functional
@@ -36,6 +38,8 @@ WIDTHS, COMPARED = (20, 32, 48, 64), 2
 #: Share of real pictures; of batches that also see corrective points; of those without near
 #: infrared and without colour.
 REAL, CORRECTED, NO_NIR, GREY = 0.85, 0.4, 0.33, 0.2
+#: Simulated pictures are reduced to this side, pixels; their number; the seed of the first.
+SIMULATED_PX, SIMULATED, SIMULATION_SEED = 320, 72, 52_000
 #: What a site counts by its table: outlines nobody would see are drawn less exactly.
 WEIGHT = {"truth": 1.2, "own": 1.2, "hard": 0.8, "more": 1.0}
 
@@ -116,6 +120,46 @@ def unlike(x: Tensor, at_points: Tensor) -> Tensor:
 
 
 # ---------------------------------------------------------------- pictures, disturbed
+
+
+@dataclass
+class Picture:
+    """A picture with a field in it.
+
+    Attributes
+    ----------
+    mark, site : str
+    bands : uint8 array (4, rows, columns)
+        Red, green, blue, near infrared.
+    masks : list of uint8 array (rows, columns)
+        The field as drawn, 255 inside; the second is the other outline of a doubtful one.
+    seed_px : (float, float)
+    """
+
+    mark: str
+    site: str
+    bands: NDArray[np.uint8]
+    masks: list[NDArray[np.uint8]]
+    seed_px: tuple[float, float]
+
+
+def picture_of(case: Case, side_px: int | None = None) -> Picture:
+    """A case in a size that is trained on."""
+    bands = np.asarray(case.scene.bands, np.uint8)
+    scale = 1.0 if side_px is None else side_px / max(bands.shape)
+    if side_px is not None:
+        size = (side_px, side_px)
+        bands = np.stack([cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in bands])
+    masks = []
+    for outline in (case.truth, case.doubtful):
+        if outline is not None:
+            mask = np.zeros(bands.shape[1:], np.uint8)
+            for part in shapely.get_parts(outline):
+                points = shapely.get_coordinates(part.exterior) * scale
+                # OpenCV counts from pixel centres, in sixteenths.
+                cv2.fillPoly(mask, [np.rint((points - 0.5) * 16).astype(np.int32)], 255, shift=4)
+            masks.append(mask)
+    return Picture(case.mark, case.site, bands, masks, (case.x_px * scale, case.y_px * scale))
 
 
 def turned(
@@ -317,14 +361,14 @@ def train(options: argparse.Namespace) -> None:
     torch.set_num_threads(1)
     torch.manual_seed(SEED)
     rng = np.random.default_rng(SEED)
-    real = list(labelled())
+    real = [picture_of(one) for one in labelled()]
     judged = [
         one
         for one in real
         if options.without is not None and fold_of(one.site, options.folds) == options.without
     ]
     known = [one for one in real if not any(one is other for other in judged)]
-    made = list(simulated())
+    made = [picture_of(one, SIMULATED_PX) for one in simulated(SIMULATED, SIMULATION_SEED)]
     sites = [one.site for one in known]
     weight = np.array([WEIGHT[one.mark] / sites.count(one.site) ** 0.7 for one in known])
     weight /= weight.sum()

@@ -1,11 +1,14 @@
 """Learn which of the outlines of a search is taken, and what that certainty is worth.
 
-    python tools/train_ranking.py CACHE [--write] [--processes 1]
+    python tools/train_ranking.py CACHE [CACHE ...] [--write] [--processes 1]
 
 Learned from fields drawn by eye on sites that the network has not seen, and from simulated ones:
 the curves over the figures of the outlines make beliefs as likely as their overlaps with the
 truth say. Part K of the table is learned without the sites of fold K, and what certainty is worth
-from outlines taken by such parts. CACHE keeps the searches.
+from outlines taken by such parts. The curves move a step on from those of the table that is there.
+CACHE keeps the searches. These follow the table, and a ranking sees other outlines where it has
+led the search itself: so learn and write, search into one more CACHE, then put the first table
+back, learn from all of them and write.
 """
 
 from __future__ import annotations
@@ -23,22 +26,34 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from outline_cases import Case, middle_of_error, unseen
-from outline_pictures import fold_of
+from outline_cases import (
+    FOLDS,
+    Case,
+    fold_of,
+    middle_of_error,
+    other,
+    reseeded,
+    simulated,
+    unseen,
+)
 from scipy.optimize import minimize
 
 from geofield.field.auto import evidence_of
-from geofield.field.ranking import BEND, END, WEIGHED, Ranking, bends, expected_overlaps
+from geofield.field.ranking import BEND, END, WEIGHED, Ranking, bends, expected_overlaps, trained
 from geofield.field.search import Candidate, search_field
 
 TABLE = Path(__file__).resolve().parent.parent / "src/geofield/learned/outline_ranking.json"
-FOLDS = 4
 #: Pull towards zero, of curves and of what certainty is worth.
 RIDGE, CALM = 1e-2, 1.0
+#: What is learned moves the table before by so much; and both are believed so much more, as
+#: outlines that are much alike are many, and would outweigh a single better one.
+STEP, SURER = 0.5, 2.0
 #: How much likelier an outline is believed to be for its overlap; less than half is nothing.
 SHARPNESS, WORST = 20.0, 0.5
-#: What a simulated picture counts against a real one.
-SIMULATED = 0.4
+#: Simulated pictures, and what one counts against a real one.
+SIMULATED, SIMULATED_COUNTS = 20, 4.0
+#: Other pictures of the fields.
+OTHERS = ("colour", "grey", "JPEG 40", "colour", "grey", "haze", "contrast")
 #: Overlap from which an outline is right, by what is asked.
 RIGHT = {"field": 0.85, "ground": 0.70, "border": 0.93}
 #: What certainty is told from.
@@ -73,7 +88,7 @@ class Searched:
 
 def searched(case: Case) -> list[Searched]:
     """The search of a case, and once more with a point where its best outline errs."""
-    search = search_field(case.scene, case.x_px, case.y_px)
+    search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
     truth = shapely.transform(case.truth, lambda c: c / search.factor)
     found = []
     include: tuple[tuple[float, float], ...] = ()
@@ -105,7 +120,7 @@ def weights(known: Sequence[Searched]) -> np.ndarray:
     often = Counter(one.site for one in known)
     share = np.array(
         [
-            (SIMULATED if one.mark.startswith("simulated") else 1.0) / often[one.site] ** 0.5
+            (SIMULATED_COUNTS if one.mark.startswith("simulated") else 1.0) / often[one.site] ** 0.5
             for one in known
         ]
     )
@@ -188,20 +203,21 @@ def rounded(slopes: np.ndarray) -> np.ndarray:
     return slopes.round(4)
 
 
-def table_of(known: Sequence[Searched], names: Sequence[str]) -> tuple[dict, list[Chosen]]:
+def table_of(known: Sequence[Searched]) -> tuple[dict, list[Chosen]]:
     """The table, and what its parts take on the sites that they have not seen."""
+    names = trained().names
     at = [known[0].names.index(name) for name in names]
     for one in known:
         one.figures = one.figures[:, at]
-        one.names = tuple(names)
-    every = np.concatenate([one.figures for one in known])
-    mean, spread = every.mean(axis=0).round(4), (every.std(axis=0) + 1e-3).round(4)
+        one.names = names
+    before = [trained(k) for k in range(FOLDS)]
+    mean, spread = before[0].mean, before[0].spread
+    learned = [learn([one for one in known if one.fold != k], mean, spread) for k in range(FOLDS)]
     slopes = [
-        rounded(learn([one for one in known if one.fold != k], mean, spread)) for k in range(FOLDS)
+        rounded(SURER * (one.slope + STEP * more))
+        for one, more in zip(before, learned, strict=True)
     ]
-    taken = [
-        chosen(one, Ranking(tuple(names), mean, spread, slopes[one.fold], {})) for one in known
-    ]
+    taken = [chosen(one, Ranking(names, mean, spread, slopes[one.fold], {})) for one in known]
     real = [one for one in taken if not one.of.mark.startswith("simulated")]
     calibration = {"all": calibrated(real)}
     for k in range(FOLDS):
@@ -243,9 +259,18 @@ def write(table: dict) -> None:
     TABLE.write_text(text + "\n", encoding="utf-8")
 
 
-def all_searched(processes: int, only: int | None) -> Iterator[Searched]:
+def cases() -> Iterator[Case]:
+    """What is learned from: each field as it is and as another picture; simulated ones."""
+    for case in unseen():
+        yield case
+        pick = zlib.crc32(case.name.encode())
+        yield other(reseeded(case), OTHERS[pick % len(OTHERS)])
+    yield from simulated(SIMULATED)
+
+
+def all_searched(processes: int) -> Iterator[Searched]:
     """The searches of every case."""
-    some = [one for one in unseen() if only is None or fold_of(one.site, FOLDS) == only]
+    some = list(cases())
     with Pool(processes) as pool:
         for number, found in enumerate(pool.imap(searched, some, chunksize=4), 1):
             yield from found
@@ -255,20 +280,19 @@ def all_searched(processes: int, only: int | None) -> Iterator[Searched]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cache", type=Path)
+    parser.add_argument("caches", type=Path, nargs="+", metavar="CACHE")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--only", type=int, help="search the cases of this fold only")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    if not options.cache.is_file():
-        found = list(all_searched(options.processes, options.only))
-        options.cache.write_bytes(pickle.dumps(found))
-    if options.only is None:
-        known = pickle.loads(options.cache.read_bytes())
-        table, taken = table_of(known, known[0].names)
-        report(taken)
-        if options.write:
-            write(table)
+    known: list[Searched] = []
+    for cache in options.caches:
+        if not cache.is_file():
+            cache.write_bytes(pickle.dumps(list(all_searched(options.processes))))
+        known += pickle.loads(cache.read_bytes())
+    table, taken = table_of(known)
+    report(taken)
+    if options.write:
+        write(table)
 
 
 if __name__ == "__main__":

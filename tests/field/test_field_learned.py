@@ -11,6 +11,7 @@ import shapely
 from geofield.errors import FieldError
 from geofield.field import ranking
 from geofield.field.border import measure
+from geofield.field.cuts import divided
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import agreement, trained
 from geofield.field.regions import partition
@@ -157,3 +158,30 @@ def test_the_network_takes_its_channels_in_their_order():
     assert max(abs(a - b) for a, b in zip(places["apart_at"], (5, 50), strict=True)) <= 1
     assert maps["belongs_around"].mean() > maps["belongs_at"].mean()
     assert maps["apart_around"].mean() > maps["apart_at"].mean()
+
+
+def test_a_region_holds_the_superpixels_of_its_parts():
+    rng = np.random.default_rng(6)
+    tree = partition(rng.normal(0, 1, (2, 60, 70)).astype(np.float32)).tree
+    for region in range(len(tree.parent)):
+        parts = [] if region < tree.leaf_count else tree.parts[region].tolist()
+        held = [leaf for part in parts for leaf in tree.leaves(part).tolist()] or [region]
+        assert sorted(tree.leaves(region).tolist()) == sorted(held)
+    assert len(tree.leaves(len(tree.parent) - 1)) == tree.leaf_count
+
+
+def test_the_division_follows_the_border_that_the_picture_shows():
+    rng = np.random.default_rng(7)
+    stack = rng.normal(0, 0.3, (2, 100, 160)).astype(np.float32)
+    stack[0, :, 90:] += 15
+    parted = partition(stack)
+    # The network is 20 pixels off, and far from sure.
+    likely = parted.mean(np.where(np.arange(160) < 70, 0.75, 0.3)[None, :].repeat(100, 0))
+    wanted, barred = parted.at(((20.5, 50.5),)), parted.at(((60.5, 10.5),))
+    found = divided(likely, parted.size_px, parted.pairs, wanted, [], 60.0, 0.8)
+    inside = found[parted.labels]
+    assert inside[:, :87].mean() > 0.98
+    assert inside[:, 93:].mean() < 0.02
+    obeys = divided(likely, parted.size_px, parted.pairs, wanted, barred, 60.0, 0.8)
+    assert obeys[wanted].all()
+    assert not obeys[barred].any()

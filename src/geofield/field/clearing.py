@@ -113,7 +113,10 @@ def _ring(own: BoolArray) -> BoolArray:
 def _like_most(stack: FloatArray, ground: BoolArray) -> BoolArray:
     """Of some ground what is like most of it."""
     around = stack[:, ground]
-    distance = np.linalg.norm(around - np.median(around, axis=1)[:, None], axis=0)
+    ordered, count = np.sort(around, axis=1), around.shape[1]
+    median = ordered[:, (count - 1) // 2 : count // 2 + 1].mean(axis=1)  # NumPy's takes longer
+    away = around - median[:, None]
+    distance = np.sqrt(np.einsum("cn,cn->n", away, away))
     even = np.zeros_like(ground)
     even[ground] = distance < _EVEN
     return even

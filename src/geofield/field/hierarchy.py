@@ -35,6 +35,10 @@ class MergeTree:
         -1 for superpixels.
     size_px : float array (regions,)
     leaf_count : int
+    order : int array (superpixels,)
+        All superpixels so that those of any region stand side by side.
+    span : int array (regions, 2)
+        Where a region's superpixels begin and end in `order`.
     """
 
     parent: IntArray
@@ -42,6 +46,8 @@ class MergeTree:
     parts: IntArray
     size_px: FloatArray
     leaf_count: int
+    order: IntArray
+    span: IntArray
 
     def chain(self, leaf: int) -> list[int]:
         """The regions that contain a superpixel, from itself to the root."""
@@ -72,14 +78,10 @@ class MergeTree:
         one, two = self.parts[self.parent[region]]
         return int(two if one == region else one)
 
-    def leaves(self, region: int) -> NDArray[np.int64]:
+    def leaves(self, region: int) -> IntArray:
         """The superpixels of a region."""
-        here = np.array([region], np.int64)
-        found = []
-        while len(here):
-            found.append(here[here < self.leaf_count])
-            here = self.parts[here[here >= self.leaf_count]].ravel()
-        return np.concatenate(found)
+        start, end = self.span[region]
+        return self.order[start:end]
 
 
 def merge(
@@ -138,4 +140,28 @@ def merge(
         total = np.bincount(index, total[apart], len(keys)).astype(float)
         length = np.bincount(index, length[apart], len(keys)).astype(float)
         a, b = keys // made, keys % made
-    return MergeTree(parent[:made], height[:made], parts[:made], size_px[:made], count)
+    parts = parts[:made]
+    return MergeTree(
+        parent[:made], height[:made], parts, size_px[:made], count, *_side_by_side(parts, count)
+    )
+
+
+def _side_by_side(parts: IntArray, leaf_count: int) -> tuple[IntArray, IntArray]:
+    """The superpixels in the order of a walk through the tree, and each region's span in it."""
+    number = [1] * leaf_count
+    pairs = parts[leaf_count:].tolist()
+    for one, other in pairs:
+        number.append(number[one] + number[other])
+    start = [0] * len(parts)
+    end = 0
+    has_parent = np.zeros(len(parts), bool)
+    has_parent[parts[leaf_count:].ravel()] = True
+    for root in np.flatnonzero(~has_parent).tolist():  # more than one: parts without a border
+        start[root], end = end, end + number[root]
+    for region in range(len(parts) - 1, leaf_count - 1, -1):
+        one, other = pairs[region - leaf_count]
+        start[one] = start[region]
+        start[other] = start[region] + number[one]
+    order = np.empty(leaf_count, np.int64)
+    order[start[:leaf_count]] = np.arange(leaf_count)
+    return order, np.column_stack([start, np.add(start, number)])

@@ -2,17 +2,20 @@
 
 Superpixels merge across their weakest borders first; the pieces around the seed make a chain
 from a patch of ground to the whole picture. Further points take parts of that tree away or add
-them. What the network takes for the field makes a few regions more.
+them. What the network takes for the field makes a few regions more (`cuts`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logit
 
+from geofield.field.cuts import divided
 from geofield.field.evidence import gradient
 from geofield.field.hierarchy import MergeTree, merge
 from geofield.field.morphology import filled, tidy
@@ -32,8 +35,8 @@ SMALLEST_PX = 200.0
 _OWN_SHARE = 0.2
 #: So many regions of a chain are looked at, those that agree best with the network.
 _MOST = 14
-#: Superpixels from these probabilities on make regions of the network's own.
-_LIKELY = (0.3, 0.5, 0.7)
+#: Prices of border and favours at which the network's ground is divided from the rest.
+_DIVISIONS = ((30.0, 0.5), (30.0, 1.5), (90.0, 0.5), (90.0, 1.5), (200.0, 0.5), (200.0, 2.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +99,11 @@ def partition(stack: NDArray[np.float32]) -> Partition:
 
 
 def regions(
-    parted: Partition, likely: FloatArray, include: Points, exclude: Points
+    parted: Partition,
+    likely: FloatArray,
+    include: Points,
+    exclude: Points,
+    earlier: Sequence[BoolArray] = (),
 ) -> list[Region]:
     """The regions around the points that may be the field.
 
@@ -107,6 +114,8 @@ def regions(
         How likely each belongs to the field.
     include, exclude : tuple of (float, float)
         Points that belong and that do not, pixel coordinates; the first one is the seed.
+    earlier : sequence of bool array (superpixels,)
+        What was found before the last points: the pieces at those are added or taken away.
     """
     size = parted.size_px
     wanted, unwanted = parted.at(include), set(parted.at(exclude))
@@ -121,11 +130,19 @@ def regions(
             sets[members.tobytes()] = common / (area + everywhere - common), members
     ranked = sorted(sets.values(), key=lambda one: -one[0])[:_MOST]
     chosen = [members for _, members in ranked]
-    for least in _LIKELY:
-        members = likely > least
-        members[wanted] = True
-        members[list(unwanted)] = False
-        chosen.append(members)
+    likelier = likely > 0.5
+    likelier[wanted], likelier[list(unwanted)] = True, False
+    chosen.append(likelier)
+    chosen += [
+        divided(likely, size, parted.pairs, wanted, sorted(unwanted), price, favour)
+        for price, favour in _DIVISIONS
+    ]
+    gain = size * logit(np.clip(likely, 0.02, 0.98))
+    chosen += [
+        _mended(parted.tree, one, gain * worth, wanted, unwanted)
+        for one in earlier
+        for worth in (1.0, 0.0)
+    ]
     found: list[Region] = []
     for members in chosen:
         raw = members[parted.labels]
@@ -152,6 +169,35 @@ def _chain(tree: MergeTree, wanted: list[int], unwanted: set[int]) -> Iterator[B
             if not one[leaf]:
                 one[part] = True
         yield one
+
+
+def _mended(
+    tree: MergeTree, members: BoolArray, gain: FloatArray, wanted: list[int], unwanted: set[int]
+) -> BoolArray:
+    """Superpixels with the pieces at the points added or taken away.
+
+    Of the regions around a point that hold none of the other kind, the one with the largest
+    gain, or the largest of all where none gains anything.
+    """
+    one = members.copy()
+    for leaves, without, belongs in (
+        (sorted(unwanted), set(wanted), False),
+        (wanted, unwanted, True),
+    ):
+        for leaf in leaves:
+            if one[leaf] == belongs:
+                continue
+            best, most = np.array([leaf]), -math.inf
+            for region in tree.chain(leaf):
+                piece = tree.leaves(region)
+                if not without.isdisjoint(piece.tolist()):
+                    break
+                changed = piece[one[piece] != belongs]
+                worth = float(gain[changed].sum()) * (1.0 if belongs else -1.0)
+                if worth >= most:
+                    best, most = piece, worth
+            one[best] = belongs
+    return one
 
 
 def _largest(tree: MergeTree, leaf: int, without: set[int]) -> NDArray[np.int64]:

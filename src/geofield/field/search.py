@@ -47,6 +47,10 @@ _STRAY_PX = 20
 _TOLERANCE_PX = 3.0
 #: So many of the regions' outlines get well fitted sides; so many are redrawn, so many times.
 _FITTED, _BREADTH, _ROUNDS = 5, 4, 2
+#: Outlines that overlap more than this are alike.
+_ALIKE = 0.95
+#: So many earlier outlines are mended at new points.
+_MENDED = 4
 #: Of what an outline suggests, so many that agree best with the network are measured.
 _SUGGESTED = 12
 
@@ -131,6 +135,7 @@ class FieldSearch:
         likely = self.likely(include, exclude)
         points = (self.seed_px, *include), exclude
         ground = self.surface.parted.mean(likely)
+        earlier = self._earlier(ground) if include or exclude else []
         found: dict[bytes, Candidate] = {}
 
         def add(outlines: Iterable[tuple[Polygon, BoolArray]]) -> None:
@@ -151,7 +156,7 @@ class FieldSearch:
         add((one.polygon, one.holes) for one in list(self.known.values()))
         second = self.second.mean(likely)
         around = [
-            *regions(self.surface.parted, ground, *points),
+            *regions(self.surface.parted, ground, *points, earlier),
             *regions(self.second, second, *points),
         ]
         rough = {rough_outline(one.mask): one for one in around}
@@ -160,18 +165,45 @@ class FieldSearch:
             (polygon for polygon in rough if polygon.wkb in found),
             key=lambda polygon: -found[polygon.wkb].score,
         )
-        for polygon in ranked[:_FITTED]:
+        for polygon in self._different(ranked, _FITTED):
             with suppress(FieldError):
                 fitted = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
                 add([(Polygon(fitted.exterior), rough[polygon].holes)])
         tried: set[bytes] = set()
         for _ in range(_ROUNDS):
-            for key in [one for one in best_first(found)[:_BREADTH] if one not in tried]:
-                tried.add(key)
-                one = found[key]
+            best = self._different([found[key].polygon for key in best_first(found)], _BREADTH)
+            for one in [found[polygon.wkb] for polygon in best if polygon.wkb not in tried]:
+                tried.add(one.polygon.wkb)
                 others = redrawn(one.polygon, self.seed_px, self.surface.shape)
                 add((other, one.holes) for other in self._agreeing(others, ground))
         return [found[key] for key in best_first(found)]
+
+    def _earlier(self, ground: FloatArray) -> list[BoolArray]:
+        """The best of what is known, also where it does not obey the points."""
+        if not self.known:
+            self.candidates()  # points correct what is found without them
+        some = [one for one in self.known.values() if one.figures is not None]
+        if not some:
+            return []
+        size = self.surface.size_px
+        scores = trained(self.part).scores(
+            [{**(one.figures or {}), **agreement(ground, size, one.inside)} for one in some]
+        )
+        return [some[at].inside for at in np.argsort(-scores, kind="stable")[:_MENDED]]
+
+    def _different(self, ranked: Sequence[Polygon], most: int) -> list[Polygon]:
+        """The first outlines that hold different ground: each gets its well drawn sides."""
+        size = self.surface.size_px
+        chosen: list[Polygon] = []
+        grounds: list[BoolArray] = []
+        for polygon in ranked:
+            inside = self.known[polygon.wkb].inside
+            if all(size @ (inside & one) < _ALIKE * (size @ (inside | one)) for one in grounds):
+                chosen.append(polygon)
+                grounds.append(inside)
+            if len(chosen) == most:
+                break
+        return chosen
 
     def _agreeing(self, polygons: Sequence[Polygon], ground: FloatArray) -> list[Polygon]:
         """Of many outlines those that agree best with the network: measuring takes longer."""
