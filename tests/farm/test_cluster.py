@@ -149,3 +149,20 @@ def test_a_farm_stays_whole_where_nobody_can_do_the_work(tmp_path: Path) -> None
     assert "does not answer" in said
     assert {each: each.read_bytes() for each in farm.rglob("*") if each.is_file()} == before
     assert len(read_farm(farm)) == 4
+
+
+def test_workers_of_this_machine_keep_their_memory() -> None:
+    script = (
+        "import os\n"
+        "from geofield.farm.cluster import Cluster\n"
+        "if __name__ == '__main__':\n"
+        "    own = Cluster.here(1)\n"
+        "    print(own._client.run(os.getenv, 'MALLOC_TRIM_THRESHOLD_'))\n"
+        "    print(own._client.run(os.getenv, 'OMP_NUM_THREADS'))\n"
+        "    own.close()\n"
+    )
+    line = [sys.executable, "-c", script]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=100, check=True)
+    trim, threads = (text.rpartition(": ")[2] for text in done.stdout.splitlines())
+    # With the limit that Dask sets, pictures take a third longer.
+    assert (trim, threads) == ("None}", "'1'}")
