@@ -120,7 +120,8 @@ def resampled(case: Case, turn_deg: float, scale: float) -> Case:
     truth = truth.intersection(shapely.box(0, 0, width, height))
     x, y = onto @ [case.x_px, case.y_px, 1.0]
     grid = case.scene.grid.resized(width, height)
-    scene = replace(case.scene, grid=grid, bands=np.stack(warped))
+    valid = np.ones((height, width), bool)
+    scene = replace(case.scene, grid=grid, bands=np.stack(warped), valid=valid)
     return replace(case, scene=scene, truth=truth, x_px=float(x), y_px=float(y))
 
 
@@ -177,14 +178,15 @@ def random_walker(case: Case) -> Callable[[list[Point], list[Point]], shapely.Po
 
 
 def felzenszwalb(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
-    """The pieces at the points that belong, without those at the others."""
+    """The pieces at the points that belong, without those at the others; the seed's stays."""
     from skimage.segmentation import felzenszwalb as segment
 
     labels = segment(case.scene.rgb, scale=600, sigma=1.0, min_size=400)
 
     def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
         wanted = {labels[int(y), int(x)] for x, y in include}
-        wanted -= {labels[int(y), int(x)] for x, y in exclude}
+        seed = labels[int(case.y_px), int(case.x_px)]
+        wanted -= {labels[int(y), int(x)] for x, y in exclude} - {seed}
         return polygon_of(np.isin(labels, list(wanted)))
 
     return run
