@@ -156,13 +156,14 @@ def _is_removed(folder: Path) -> bool:
 
 
 def discard(staging: Path) -> None:
-    """Remove a staging folder; a stop meanwhile leaves a name that everybody may sweep."""
+    """Remove a hidden folder; a kill meanwhile leaves a name that everybody may sweep."""
     gone = staging.with_name(_GONE + staging.name.removeprefix(PREFIX))
-    try:
-        staging.rename(gone)
-    except OSError:
-        gone = staging
-    shutil.rmtree(gone, ignore_errors=True)
+    with unstopped():
+        try:
+            staging.rename(gone)
+        except OSError:
+            gone = staging
+        shutil.rmtree(gone, ignore_errors=True)
 
 
 def is_living(staging: Path) -> bool:

@@ -10,11 +10,13 @@ from __future__ import annotations
 import atexit
 import json
 import logging
+import math
 import os
 import signal
 import stat
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -25,8 +27,10 @@ import click
 Progress = Callable[..., None]
 
 _PROGRAM_WATCHES = False
-#: Signals that asked this command to stop.
-_STOPS: list[int] = []
+#: When this command was asked to stop, seconds.
+_STOPS: list[float] = []
+#: Programs say a stop in two ways at once, as they may not know which one is heard.
+_SAME_STOP_S = 1.0
 _LOG = logging.getLogger("geofield.cli")
 _LOG.addHandler(logging.NullHandler())
 
@@ -85,8 +89,11 @@ def stop_cleanly() -> None:
         atexit.register(_stop_no_more)
 
 
-def _stop(number: int, _: Any) -> None:
-    _STOPS.append(number)
+def _stop(*_: Any) -> None:
+    now_s = time.monotonic()
+    if _STOPS and now_s - _STOPS[-1] < _SAME_STOP_S:
+        return  # said twice; what it leaves is being taken away
+    _STOPS.append(now_s)
     sys.unraisablehook = _stop_again
     sys.excepthook = _say_no_stop
     raise KeyboardInterrupt
@@ -102,6 +109,7 @@ def _stop_again(unheard: Any) -> None:
     """A stop that came where Python passes over it, as in a destructor, comes once more."""
     if not issubclass(unheard.exc_type, KeyboardInterrupt):
         return
+    _STOPS.append(-math.inf)
     again = threading.Timer(0.05, _interrupt)
     again.daemon = True
     again.start()
