@@ -59,6 +59,8 @@ class Cluster:
         # Dask has the C library hand memory back at every turn; pictures need it again at the next,
         # and a place takes a third longer.
         dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ONE_THREAD)})
+        # Nor do its workers look a hundred times a second where their one thread is.
+        dask.config.set({"distributed.worker.profile.enabled": False})
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
