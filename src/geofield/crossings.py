@@ -63,8 +63,9 @@ def _is_tangle(polygon: BaseGeometry) -> bool:
     tree = shapely.STRtree(sides)
     crossed = met = 0
     for some in np.array_split(sides, max(1, len(sides) ** 2 // _PAIRS)):
-        crossed += tree.query(some, predicate="crosses").shape[1]
-        met += tree.query(some, predicate="intersects").shape[1]
+        one, other = tree.query(some, predicate="intersects")
+        crossed += int(shapely.crosses(some[one], sides[other]).sum())
+        met += len(one)
         # Found from both sides; each also meets itself and its two neighbours.
         if crossed > 2 * _MOST_CROSSINGS or met > 3 * len(sides) * _MOST_TIMES:
             return True

@@ -84,6 +84,8 @@ def test_all_algorithms_one_after_the_other(process, request, tmp_path, where):
         TRUTH=f"{truth}|layername=obstacles",
     )
     assert told["F1"] > 0.8
+    tables = [read_dataset(Path(one)).table("obstacles") for one in (source, truth)]
+    assert told["F1"] == pytest.approx(gf.evaluate(*tables).pooled.f1, abs=1e-3)
 
 
 def test_a_real_chip_gives_what_the_command_gives(process, geofield, shared, tmp_path):
