@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsSettings
+from qgis.PyQt.QtCore import pyqtSignal
 from qgis.PyQt.QtWidgets import (
     QDialog,
     QFileDialog,
@@ -23,6 +24,9 @@ from .words import tr
 
 class EngineDialog(QDialog):
     """What engine there is, and the ways to get one."""
+
+    #: An engine was installed or named, and answers.
+    ready = pyqtSignal()
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -52,14 +56,17 @@ class EngineDialog(QDialog):
         box.addWidget(self.log)
         self.tell()
 
-    def tell(self) -> None:
-        """Say which engine is used."""
+    def tell(self) -> bool:
+        """Say which engine is used; whether there is one."""
         try:
             command = engine.require_engine()
-            words = tr("Ready: {0}, version {1}").format(command, engine.engine_version(command))
         except engine.EngineError as error:
-            words = str(error)
-        self.state.setText(words)
+            self.state.setText(str(error))
+            return False
+        self.state.setText(
+            tr("Ready: {0}, version {1}").format(command, engine.engine_version(command))
+        )
+        return True
 
     def install(self, _: Any = None, wheel: str = "") -> None:
         """Install; pressing the button below the words is the consent."""
@@ -82,7 +89,7 @@ class EngineDialog(QDialog):
         path, _ = QFileDialog.getOpenFileName(self, tr("The geofield command"))
         if path:
             QgsSettings().setValue(engine.SETTING, str(Path(path)))
-            self.tell()
+            self._tell_others()
 
     def forget(self) -> None:
         """Forget a command that was named."""
@@ -104,7 +111,11 @@ class EngineDialog(QDialog):
     def _done(self) -> None:
         self._installer = None
         self._enable(True)
-        self.tell()
+        self._tell_others()
+
+    def _tell_others(self) -> None:
+        if self.tell():
+            self.ready.emit()
 
     def _enable(self, on: bool) -> None:
         for button in self.buttons.values():

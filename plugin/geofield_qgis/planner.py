@@ -59,6 +59,8 @@ class Planner(QObject):
         self._here: QgsPointXY | None = None
         self._ground: dict[str, list[QgsPointXY]] = {"include": [], "exclude": []}
         self._begun_s = 0.0
+        #: A click was made and there is no engine yet.
+        self.waits = False
         #: Seconds from the click to the sketch of the outline, of the last field.
         self.outline_s: float | None = None
 
@@ -83,6 +85,12 @@ class Planner(QObject):
         self._points.addPoint(point)
         self.stop()
         self._begin()
+
+    def go_on(self) -> None:
+        """Plan what was clicked before there was an engine."""
+        if self.waits and self._here is not None:
+            self.awake.wake()
+            self._begin()
 
     def stop(self) -> None:
         """End what runs; what was planned before stays."""
@@ -126,8 +134,10 @@ class Planner(QObject):
         try:
             engine.require_engine()
         except engine.EngineError as error:
+            self.waits = True
             self.engine_missing.emit(str(error))
             return
+        self.waits = False
         if self._target is None:
             self._target = _folder() / time.strftime("field_%Y%m%d_%H%M%S.gpkg")
         for each in self._sketch.values():

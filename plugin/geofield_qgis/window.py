@@ -77,7 +77,9 @@ class Window:
 
     def show_engine(self) -> None:
         """Show the dialogue of the engine."""
-        self.dialog = self.dialog or EngineDialog(self.iface.mainWindow())
+        if self.dialog is None:
+            self.dialog = EngineDialog(self.iface.mainWindow())
+            self.dialog.ready.connect(self._engine_is_there)
         self.dialog.tell()
         self.dialog.show()
         self.dialog.raise_()
@@ -94,6 +96,12 @@ class Window:
         button.clicked.connect(lambda *_: (messages.popWidget(item), self.show_engine()))
         item.layout().addWidget(button)
         messages.pushWidget(item)
+
+    def _engine_is_there(self) -> None:
+        """Go on where a click waits for the engine."""
+        if self.planner.waits:
+            self.dialog.accept()
+            self.planner.go_on()
 
     def _planned(self, path: str) -> None:
         self.show_review(path)

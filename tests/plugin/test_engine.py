@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import subprocess
 import time
-import zipfile
 from pathlib import Path
 
 import pytest
-from plugin_place import CLIENT, POINT, SAMPLE
+from plugin_place import CLIENT, POINT, SAMPLE, tiny_engine
 
 from real_qgis import PYTHON
 
@@ -155,23 +153,9 @@ def test_the_engine_ends_with_qgis(qgis_environment, tmp_path):
 
 def test_the_engine_is_installed_by_its_hash(qgis, tmp_path):
     """A tiny engine of the same name: only the file with the hash that is named comes in."""
-    wheel = tmp_path / "geofield-0.1.0-py3-none-any.whl"
-    with zipfile.ZipFile(wheel, "w") as archive:
-        meta = "geofield-0.1.0.dist-info"
-        archive.writestr("tiny_engine.py", "def main():\n    print('geofield, version 0.1.0')\n")
-        archive.writestr(
-            f"{meta}/entry_points.txt", "[console_scripts]\ngeofield = tiny_engine:main\n"
-        )
-        archive.writestr(
-            f"{meta}/METADATA", "Metadata-Version: 2.1\nName: geofield\nVersion: 0.1.0\n"
-        )
-        archive.writestr(
-            f"{meta}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-        )
-        archive.writestr(f"{meta}/RECORD", "")
-    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    wheel, locked = tiny_engine(tmp_path, "print('geofield, version 0.1.0')")
     requirements = tmp_path / "requirements.txt"
-    requirements.write_text(f"--no-index\ngeofield==0.1.0 --hash=sha256:{digest}\n")
+    requirements.write_text(locked)
     other = tmp_path / "other" / wheel.name
     other.parent.mkdir()
     other.write_bytes(wheel.read_bytes() + b" ")

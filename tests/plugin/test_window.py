@@ -6,11 +6,12 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import shapely
-from plugin_place import CLIENT, SAMPLE
+from plugin_place import CLIENT, SAMPLE, tiny_engine
 
 from geofield.crs import LONLAT, transformer
 from geofield.formats import read_dataset
@@ -27,28 +28,24 @@ enableVersionCheck=false
 """
 
 
-@pytest.fixture(scope="module")
-def seen(qgis_environment, tmp_path_factory):
-    """What the window showed and did, see in_window.py."""
+def in_window(script, environment, folder, variables=None, **asked):
+    """What a script saw in the window of a QGIS with a profile of its own."""
     if shutil.which("xvfb-run") is None or not Path("/usr/bin/qgis").exists():
         if os.environ.get("CI"):
             pytest.fail("a display is missing: apt-get install qgis xvfb xauth")
         pytest.skip("needs QGIS and a display: apt-get install qgis xvfb xauth")
-    folder = tmp_path_factory.mktemp("window")
     profile = folder / "p" / "profiles" / "default" / "QGIS"
     profile.mkdir(parents=True)
     (profile / "QGIS3.ini").write_text(INI)
-    asked = {"picture": str(SAMPLE), "lat": 35.075373, "lon": 33.531142, "folder": str(folder)}
-    (folder / "asked.json").write_text(json.dumps(asked))
-    environment = {
-        name: value for name, value in qgis_environment.items() if name != "QT_QPA_PLATFORM"
-    }
+    place = {"picture": str(SAMPLE), "lat": 35.075373, "lon": 33.531142, "folder": str(folder)}
+    (folder / "asked.json").write_text(json.dumps({**place, **asked}))
+    environment = {name: value for name, value in environment.items() if name != "QT_QPA_PLATFORM"}
     done = subprocess.run(
         [
             "xvfb-run", "-a", "-s", "-screen 0 1440x900x24", "/usr/bin/qgis", "--nologo",
-            "--noversioncheck", "--profiles-path", folder / "p", "--code", SCRIPT,
+            "--noversioncheck", "--profiles-path", folder / "p", "--code", script,
         ],
-        env={**environment, "GEOFIELD_TEST": str(folder / "asked.json")},
+        env={**environment, "GEOFIELD_TEST": str(folder / "asked.json"), **(variables or {})},
         capture_output=True,
         text=True,
         timeout=540,
@@ -58,6 +55,35 @@ def seen(qgis_environment, tmp_path_factory):
     answer = json.loads((folder / "answer.json").read_text())
     assert "error" not in answer, answer["error"]
     return answer
+
+
+@pytest.fixture(scope="module")
+def seen(qgis_environment, tmp_path_factory):
+    """What the window showed and did, see in_window.py."""
+    return in_window(SCRIPT, qgis_environment, tmp_path_factory.mktemp("window"))
+
+
+def test_from_no_engine_to_the_first_map_in_four_clicks(qgis_environment, tmp_path):
+    """What was clicked waits for the engine, and is planned as soon as that is there."""
+    command = str(Path(sys.executable).with_name("geofield"))
+    _, locked = tiny_engine(
+        tmp_path, f"import os, sys\nos.execv({command!r}, [{command!r}, *sys.argv[1:]])"
+    )
+    requirements = tmp_path / "requirements.txt"
+    requirements.write_text(locked)
+    answer = in_window(
+        CLIENT.with_name("first_map.py"),
+        qgis_environment,
+        tmp_path,
+        {"PATH": "/usr/bin:/bin", "PIP_FIND_LINKS": str(tmp_path)},
+        requirements=str(requirements),
+    )
+    assert answer["engine_before"] is None
+    assert answer["clicks"] == ["tool", "field", "engine", "install"]
+    assert answer["engine"].endswith("/geofield/engine/bin/geofield")
+    assert not answer["dialog_open"]
+    assert {"Field", "Obstacles", "Tracks"} <= set(answer["layers"])
+    assert len(read_plan(answer["plan"]).tracks.lines) > 10
 
 
 def test_a_click_plans_the_field(seen):
