@@ -6,8 +6,8 @@ Where to look, in the order of the data:
   means what), `namespaces`, `names` (how things are named), `resources`;
 - out: `describe` and `features` (a dataset as nodes), `study` (the source study's words),
   `triples`, `write` (by pyoxigraph; a graph of rdflib), `jsonld`; `study_xml` (plain XML);
-- in: `guard` (hostile files and questions), `parse`, `graph`, `wkt`, `scope` (which plan is meant),
-  `origin`, `complete`, `read`;
+- in: `guard` (hostile files and questions), `parse`, `repeated`, `graph`, `wkt`, `scope`
+  (which plan is meant), `origin`, `complete`, `read`;
 - questions: `validate` with `shapes` and `checks`, `query` with `geosparql` and ``queries/``.
 
 A new column of the schema becomes a property by itself: `layers` may give it a better name, and

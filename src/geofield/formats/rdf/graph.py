@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 from geofield.formats.rdf.namespaces import TYPE, expand
 
@@ -55,13 +57,14 @@ class Graph:
 
     def pairs(self, predicate: str) -> Iterator[tuple[str, str]]:
         """Every subject with every value of a predicate."""
-        yield from self.column(predicate).items()
-        for subject, values in self.more.get(expand(predicate), {}).items():
-            yield from ((subject, value) for value in values)
+        more = self.more.get(expand(predicate), {})
+        further = ((subject, value) for subject, values in more.items() for value in values)
+        return chain(self.column(predicate).items(), further)
 
     def everywhere(self, predicate: str) -> Iterator[str]:
         """The values of a predicate, whatever the subject."""
-        return (value for _, value in self.pairs(predicate))
+        more = self.more.get(expand(predicate), {})
+        return chain(self.column(predicate).values(), *more.values())
 
     def has(self, subject: str) -> bool:
         """Whether anything is said of a subject."""
@@ -70,8 +73,10 @@ class Graph:
     def of_type(self, *types: str) -> list[str]:
         """The subjects of any of some classes, in the order of the file."""
         if not self.by_type:
+            by_type: defaultdict[str, list[str]] = defaultdict(list)
             for iri, each in self.pairs(TYPE):
-                self.by_type.setdefault(each, {})[iri] = None
+                by_type[each].append(iri)
+            self.by_type.update((each, dict.fromkeys(iris)) for each, iris in by_type.items())
         found = [self.by_type[name] for name in map(expand, types) if name in self.by_type]
         if len(found) < 2:
             return list(*found)

@@ -30,6 +30,7 @@ from geofield.formats.rdf.layers import (
 from geofield.formats.rdf.namespaces import GML, STUDY_OBSTACLE, STUDY_TREE, SVG_CIRCLE, expand
 from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
 from geofield.formats.rdf.parse import parse
+from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
 from geofield.formats.rdf.study import STUDY_OBSTACLE_TERMS, STUDY_POINT_TERMS
 from geofield.formats.rdf.wkt import geometries_of, known_crs, split_literal
@@ -39,7 +40,7 @@ from geofield.model.obstacles import circle_polygons
 if TYPE_CHECKING:
     import geopandas as gpd
 
-_DEFAULT = expand("geo:hasDefaultGeometry")
+_DEFAULT = "geo:hasDefaultGeometry"
 #: A further type by which rows of a layer are known, and further names of their columns.
 _STUDY = {
     "obstacles": (STUDY_TREE + "tree", STUDY_OBSTACLE_TERMS),
@@ -80,7 +81,9 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
 
 
 def load(path: Path) -> Graph:
-    """The triples of a file; those of JSON-LD as geofield writes it without expanding it."""
+    """The triples of a file; of JSON-LD and RDF/XML as geofield writes them, by that form."""
+    if path.suffix == ".rdf" and (graph := repeated(path)) is not None:
+        return graph
     graph = Graph()
     flat = flat_triples(path) if path.suffix.lower() == ".jsonld" else None
     graph.add(((s.value, p.value, o.value) for s, p, o, _ in parse(path)) if flat is None else flat)
@@ -266,19 +269,18 @@ class _Rows:
 
     def literals(self, places: list[str], crs: CRS) -> list[str | None]:
         """The WKT of each place; where it has only a default geometry, that one's at once."""
-        wkt, default = self.graph.column("geo:asWKT"), self.graph.column("geo:hasDefaultGeometry")
-        several = {**self.graph.column("geo:hasGeometry"), **self.graph.more.get(_DEFAULT, {})}
+        wkt, default = self.graph.column("geo:asWKT"), self.graph.column(_DEFAULT)
+        several = set(self.graph.column("geo:hasGeometry"))
+        several.update(*(self.graph.more.get(expand(n), {}) for n in ("geo:asWKT", _DEFAULT)))
         return [
-            self.best_wkt(iri, crs)
-            if iri in several or iri not in default
-            else wkt.get(default[iri])
+            self.best_wkt(iri, crs) if iri in several else wkt.get(default.get(iri, iri))
             for iri in places
         ]
 
     def best_wkt(self, iri: str, crs: CRS) -> str | None:
         """The literal in the metric CRS, else that of the default geometry, else any."""
         graph = self.graph
-        links = ("geo:hasDefaultGeometry", "geo:hasGeometry")
+        links = (_DEFAULT, "geo:hasGeometry")
         nodes = [each for link in links for each in graph.values(iri, link)]
         texts = [text for node in (*nodes, iri) for text in graph.values(node, "geo:asWKT")]
         for text in texts:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain, repeat
 from typing import Any
 from xml.sax.saxutils import escape
@@ -101,10 +100,8 @@ def xml_text(text: str) -> str:
 
 def typed(texts: Iterable[str | None], datatype: str) -> list[ox.Literal | None]:
     """Texts as literals of a datatype (a prefixed name or IRI)."""
-    texts, literal = list(texts), partial(ox.Literal, datatype=node(datatype))
-    if None in texts:
-        return [None if text is None else literal(text) for text in texts]
-    return list(map(literal, texts))
+    kind = node(datatype)
+    return [None if text is None else ox.Literal(text, datatype=kind) for text in texts]
 
 
 def named(iris: Iterable[str | None]) -> list[Any]:

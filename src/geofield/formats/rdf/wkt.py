@@ -74,21 +74,22 @@ def geometries_of(
 ) -> NDArray[np.object_]:
     """WKT literals as geometries in one CRS; None stays None."""
     result = np.full(len(texts), None, dtype=object)
-    by_crs: dict[str, list[int]] = {}
-    parts = [("", "") if text is None else split_literal(text) for text in texts]
-    for index, (iri, _) in enumerate(parts):
-        if iri:
-            by_crs.setdefault(iri, []).append(index)
-    for iri, rows in by_crs.items():
+    heads = [None if text is None else text[: text.find(">") + 1] for text in texts]
+    for head in dict.fromkeys(each for each in heads if each is not None):
+        rows = [row for row, each in enumerate(heads) if each == head]
+        known = [texts[row] or "" for row in rows]
+        iri = split_literal(known[0])[0]
         try:
             crs = known_crs(iri)
-            shapes = shapely.from_wkt([parts[row][1] for row in rows])
+            shapes = shapely.from_wkt([text[len(head) :] for text in known])
             finite = bool(np.isfinite(shapely.get_coordinates(shapes)).all())
         except (ShapelyError, FormatError):
             finite = False
         if not finite:
             # One by one, to name the one that is at fault.
-            shapes = np.array([geometry_of(texts[row] or "", subjects[row])[0] for row in rows])
+            shapes = np.array(
+                [geometry_of(t, subjects[r])[0] for t, r in zip(known, rows, strict=True)]
+            )
             crs = known_crs(iri)
         elif northing_first(crs):
             shapes = shapely.transform(shapes, lambda c: c[:, ::-1])
