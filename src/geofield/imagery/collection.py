@@ -20,10 +20,9 @@ from rasterio.windows import Window
 from geofield.errors import GeofieldError, ImageryError, PointOutsideError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name
+from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import REACH_M, WarpOrigin
-from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
-from geofield.model.scene import ImagerySource
 
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
@@ -96,26 +95,15 @@ class CollectionReader(SceneReader):
         return values, valid
 
 
-def open_collection(
-    paths: Sequence[str],
-    *,
-    lat: float | None = None,
-    lon: float | None = None,
-    bands: Sequence[str] | None = None,
-    crs: Any = None,
-    scaling: tuple[float, float] | None = None,
-    source: ImagerySource | None = None,
-    reach: Reach | None = None,
-    name: str = "",
-) -> SceneReader:
+def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "") -> SceneReader:
     """A reader over several pictures.
 
     Parameters
     ----------
     paths : sequence of str
         Files or addresses; earlier ones win where several are as fine at the point.
-    lat, lon : float, optional
-        The point; pictures farther than 10 km from it are left out.
+    options : OpenOptions
+        What is known of them; pictures farther than 10 km from its point are left out.
     name : str
         Of the whole, for people.
 
@@ -130,9 +118,7 @@ def open_collection(
     notes: list[str] = []
     for path in paths:
         try:
-            readers.append(
-                _looked_at(path, _version(path), tuple(bands or ()), crs, scaling, reach)
-            )
+            readers.append(_looked_at(path, options))
         except GeofieldError as error:
             notes.append(f"{display_name(path)} was left out: {error.message}")
     if not readers:
@@ -140,12 +126,12 @@ def open_collection(
             f"{name or 'The collection'} holds no picture that can be read.",
             hint=notes[0] if notes else "Give a folder with GeoTIFF files.",
         )
-    reference = _reference(readers, lat, lon, name)
+    reference = _reference(readers, options.point, name)
     usable = [each for each in readers if _fits(each, reference)]
     if len(usable) < len(readers):
         notes.append(f"{len(readers) - len(usable)} pictures with other bands were left out.")
     usable.sort(key=lambda each: each is not reference)  # stable: the reference first
-    grid, boxes = _common_grid(reference, usable, lat, lon)
+    grid, boxes = _common_grid(reference, usable, options.point)
     parts = []
     for reader, box in zip(usable, boxes, strict=True):
         if box is None:
@@ -163,14 +149,14 @@ def open_collection(
             f"Joined from {len(parts)} pictures"
             + (f"; {moved} of them reprojected to {grid.crs.name}." if moved else ".")
         )
-    known = source or replace(reference.source, name=name or reference.source.name)
+    known = options.source or replace(reference.source, name=name or reference.source.name)
     return CollectionReader(
         path=reference.path,
         grid=grid,
         roles=reference.roles,
         dtype=reference.dtype,
         source=known,
-        scaling=scaling if scaling is not None else reference.scaling,
+        scaling=reference.scaling,
         notes=(*reference.notes, *notes),
         palette=reference.palette,
         parts=tuple(parts),
@@ -186,23 +172,24 @@ def _version(path: str) -> tuple[int, int] | None:
     return facts.st_mtime_ns, facts.st_size
 
 
-def _looked_at(
-    path: str,
-    version: tuple[int, int] | None,
-    bands: tuple[str, ...],
-    crs: Any,
-    scaling: tuple[float, float] | None,
-    reach: Reach | None,
-) -> SceneReader:
+def _looked_at(path: str, options: OpenOptions) -> SceneReader:
     """A picture's reader; each file is looked at once, however many fields lie in the set."""
-    options = {"bands": bands or None, "crs": crs, "scaling": scaling, "reach": reach}
-    if version is None:
-        return SceneReader.open(path, **options)
-    key = (path, version, bands, str(crs), scaling, reach)
+    # Where the point is and whose the set is does not matter to one of its pictures.
+    options = replace(options, lat=None, lon=None, source=None)
+    if (version := _version(path)) is None:
+        return SceneReader.open(path, options)
+    key = (
+        path,
+        version,
+        tuple(options.bands or ()),
+        str(options.crs),
+        options.scaling,
+        options.reach,
+    )
     if key not in _KNOWN:
         if len(_KNOWN) >= _MOST_KNOWN:
             _KNOWN.clear()
-        _KNOWN[key] = SceneReader.open(path, **options)
+        _KNOWN[key] = SceneReader.open(path, options)
     return _KNOWN[key]
 
 
@@ -213,18 +200,18 @@ def on_grid(reader: SceneReader, grid: Grid) -> SceneReader:
 
 
 def _reference(
-    readers: list[SceneReader], lat: float | None, lon: float | None, name: str
+    readers: list[SceneReader], point: tuple[float, float] | None, name: str
 ) -> SceneReader:
     """The finest picture at the point; the first of equals."""
     here = readers
-    if lat is not None and lon is not None:
-        here = [each for each in readers if each.grid.contains_px(*each.grid.from_lonlat(lon, lat))]
+    if point is not None:
+        here = [each for each in readers if each.grid.contains_px(*each.grid.from_lonlat(*point))]
         if not here:
-            raise PointOutsideError(_outside(readers, lat, lon, name))
+            raise PointOutsideError(_outside(readers, *point, name))
     return min(here, key=lambda each: round(each.grid.ground_resolution_m, 4))
 
 
-def _outside(readers: list[SceneReader], lat: float, lon: float, name: str) -> str:
+def _outside(readers: list[SceneReader], lon: float, lat: float, name: str) -> str:
     corners = [corner for each in readers for corner in each.grid.corners_lonlat()]
     lons, lats = [c[0] for c in corners], [c[1] for c in corners]
     message = (
@@ -254,14 +241,14 @@ _Box = tuple[int, int, int, int]
 
 
 def _common_grid(
-    reference: SceneReader, readers: list[SceneReader], lat: float | None, lon: float | None
+    reference: SceneReader, readers: list[SceneReader], point: tuple[float, float] | None
 ) -> tuple[Grid, list[_Box | None]]:
     """The reference's lattice over all pictures near the point, and each one's place on it."""
     base = reference.grid
     reach = math.inf
     x0, y0 = base.width_px / 2, base.height_px / 2
-    if lat is not None and lon is not None:
-        x0, y0 = base.from_lonlat(lon, lat)
+    if point is not None:
+        x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
     boxes: list[tuple[float, float, float, float] | None] = []
     for reader in readers:

@@ -9,60 +9,49 @@ from typing import Any
 from geofield.errors import ImageryError
 from geofield.imagery.collection import open_collection
 from geofield.imagery.gdal import display_name, is_remote
+from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.stac import is_stac, open_stac
-from geofield.model.scene import ImagerySource
 from geofield.strangers import check_vector
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
 
 
-def open_reader(
-    path: str,
-    *,
-    lat: float | None = None,
-    lon: float | None = None,
-    bands: Sequence[str] | None = None,
-    crs: Any = None,
-    scaling: tuple[float, float] | None = None,
-    source: ImagerySource | None = None,
-    allow: Sequence[str] = (),
-) -> SceneReader:
-    """A reader of any picture or set of pictures; parameters as `SceneReader.open`.
+def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneReader:
+    """A reader of any picture or set of pictures.
 
-    `allow` are files, folders and addresses that VRTs, indexes and STAC files may lead to
-    besides their own folder.
+    Parameters
+    ----------
+    path : str
+        A file, folder, tile index or STAC file, or an address.
+    allow : sequence of str
+        Files, folders and addresses that VRTs, indexes and STAC files may lead to besides
+        their own folder.
+    **known
+        What is known of the picture: `lat`, `lon`, `bands`, `crs`, `scaling` and `source` of
+        `OpenOptions`.
 
     Raises
     ------
     ImageryError
     """
-    options: dict[str, Any] = {
-        "lat": lat,
-        "lon": lon,
-        "bands": bands,
-        "crs": crs,
-        "scaling": scaling,
-        "source": source,
-        "reach": Reach(tuple(allow)),
-    }
+    options = OpenOptions(**known, reach=Reach(tuple(allow)))
     if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):
-        return SceneReader.open(path, **options)
+        return SceneReader.open(path, options)
     file = Path(path)
     if file.is_dir():
-        return open_collection(pictures_in(file), name=file.name, **options)
+        return open_collection(pictures_in(file), options, name=file.name)
     if file.suffix.lower() in (".json", ".geojson") and file.is_file() and is_stac(file):
-        return open_stac(file, **options)
+        return open_stac(file, options)
     if file.suffix.lower() in _INDEXES and file.is_file():
         located = pictures_of_index(file)
-        reach = Reach(tuple(allow)).of(path)
         for each in located:
-            reach.require(each, file.name)
+            options.reach.of(path).require(each, file.name)
         if located:
-            return open_collection(located, name=file.name, **options)
-    return SceneReader.open(path, **options)
+            return open_collection(located, options, name=file.name)
+    return SceneReader.open(path, options)
 
 
 def pictures_in(folder: Path) -> list[str]:

@@ -9,7 +9,7 @@ reprojected to the metric CRS, because the trees in it would not be round.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -34,6 +34,7 @@ from geofield.imagery.gdal import (
     reading,
     to_rasterio,
 )
+from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scale_limits, to_uint8
@@ -46,6 +47,7 @@ from geofield.model.scene import ImagerySource, Scene, outside_message
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
+_NOTHING = OpenOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,36 +89,15 @@ class SceneReader:
     reach: Reach = OWN_FOLDER
 
     @classmethod
-    def open(
-        cls,
-        path: str,
-        *,
-        lat: float | None = None,
-        lon: float | None = None,
-        bands: Sequence[str] | None = None,
-        crs: Any = None,
-        scaling: tuple[float, float] | None = None,
-        source: ImagerySource | None = None,
-        reach: Reach | None = None,
-    ) -> SceneReader:
+    def open(cls, path: str, options: OpenOptions = _NOTHING) -> SceneReader:
         """Look at a picture without reading its pixels.
 
         Parameters
         ----------
         path : str
             Path, or an http(s) address of a GeoTIFF; anything GDAL opens.
-        lat, lon : float, optional
-            The point of interest, degrees; where a reprojected picture is centred.
-        bands : sequence of str, optional
-            What the bands show, in order.
-        crs : optional
-            The picture's CRS, for files that do not name it.
-        scaling : (float, float), optional
-            File values that become 0 and 255.
-        source : ImagerySource, optional
-            Provenance that is known better than the file knows it.
-        reach : Reach, optional
-            What a VRT may lead to besides its own folder.
+        options : OpenOptions
+            What is known of it.
 
         Raises
         ------
@@ -126,7 +107,7 @@ class SceneReader:
             Without CRS or without position.
         """
         path = str(path)
-        reach = reach or OWN_FOLDER
+        crs, reach = options.crs, options.reach
         with gdal_env(path), open_picture(path, reach) as dataset:
             if dataset.count == 0:
                 raise ImageryError(
@@ -146,7 +127,7 @@ class SceneReader:
                 )
             with reading(path):
                 palette = palette_of(dataset)
-                roles = roles_of(dataset, bands) if not palette else BandRoles(("red",))
+                roles = roles_of(dataset, options.bands) if not palette else BandRoles(("red",))
             own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
             flags = dataset.mask_flag_enums[0]
             reader = cls(
@@ -154,8 +135,8 @@ class SceneReader:
                 grid=Grid(1, 1, Affine.identity(), own_crs),
                 roles=roles,
                 dtype=str(np.result_type(*dtypes)),
-                source=source or source_from_tags(dataset.tags(), path),
-                scaling=scaling,
+                source=options.source or source_from_tags(dataset.tags(), path),
+                scaling=options.scaling,
                 notes=(*notes_from_tags(dataset.tags()), *roles.notes),
                 nodata=dataset.nodata,
                 palette=palette,
@@ -164,8 +145,7 @@ class SceneReader:
             )
             if reader.dtype == "uint8":
                 reader = replace(reader, scaled_before=scaling_from_tags(dataset.tags()))
-            point = None if lat is None or lon is None else (lon, lat)
-            place = find_place(dataset, own_crs, point=point)
+            place = find_place(dataset, own_crs, point=options.point)
             return replace(
                 reader,
                 grid=place.grid,

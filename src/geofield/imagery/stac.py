@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin
@@ -18,6 +18,7 @@ from geofield.errors import ImageryError, PointOutsideError
 from geofield.imagery.bands import find_roles
 from geofield.imagery.collection import open_collection
 from geofield.imagery.gdal import gdal_env, is_remote, open_picture
+from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import ImagerySource
@@ -47,17 +48,7 @@ def is_stac(path: Path) -> bool:
     return bool(features) and all(isinstance(f, dict) and "assets" in f for f in features)
 
 
-def open_stac(
-    path: Path,
-    *,
-    lat: float | None = None,
-    lon: float | None = None,
-    bands: Sequence[str] | None = None,
-    crs: Any = None,
-    scaling: tuple[float, float] | None = None,
-    source: ImagerySource | None = None,
-    reach: Reach | None = None,
-) -> SceneReader:
+def open_stac(path: Path, options: OpenOptions) -> SceneReader:
     """A reader over the items of a file that hold the point, the newest first.
 
     Raises
@@ -67,10 +58,11 @@ def open_stac(
     ImageryError
         No item has a picture.
     """
-    reach = (reach or Reach()).of(path)
+    reach, point = options.reach.of(path), options.point
     document = _document(path)
     features = document.get("features", [document])
-    if lat is not None and lon is not None:
+    if point is not None:
+        lon, lat = point
         here = [f for f in features if _holds(f, lat, lon)]
         if not here:
             raise PointOutsideError(
@@ -90,23 +82,14 @@ def open_stac(
             hint="Give items with assets of the role `data` or `visual`.",
         )
     first = items[0]
-    known = source or ImagerySource(
+    source = options.source or ImagerySource(
         name=first.identifier,
         date=first.date,
         attribution=first.attribution,
         licence=first.licence,
     )
-    return open_collection(
-        [item.path for item in items],
-        lat=lat,
-        lon=lon,
-        bands=bands or first.bands,
-        crs=crs,
-        scaling=scaling,
-        reach=reach,
-        source=known,
-        name=path.name,
-    )
+    known = replace(options, bands=options.bands or first.bands, source=source, reach=reach)
+    return open_collection([item.path for item in items], known, name=path.name)
 
 
 def _document(path: Path) -> Any:
