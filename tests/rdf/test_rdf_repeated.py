@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import pyoxigraph as ox
 import pytest
-from rdf_plans import long_plan
+from rdf_plans import long_plan, small_plan
 
 from geofield.formats.rdf import write
 from geofield.formats.rdf.graph import Graph
-from geofield.formats.rdf.namespaces import GF
+from geofield.formats.rdf.namespaces import GF, PREFIXES, STUDY_PREFIXES
 from geofield.formats.rdf.read import load, read
 from geofield.formats.rdf.repeated import repeated
+from geofield.formats.rdf.triples import triples
 
 
 def told(graph: Graph) -> set[tuple[str, str, str]]:
@@ -88,3 +89,17 @@ def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, old, new
     assert told(graph) == parsed(path)
     points = [q.subject.value for q in ox.parse(path=path) if q.object.value == GF + "TrackPoint"]
     assert graph.of_type("gf:TrackPoint") == points
+
+
+def test_points_are_written_as_pyoxigraph_writes_them(tmp_path):
+    name = "a \"b\" 'c' <d> &amp; %s \u00e9"
+    dataset = small_plan(spacing_m=2.0, step_m=1.0, name=name)
+    for profile in write.PROFILES:
+        options = {"rdf_profile": profile, "points": True, "plan_name": name}
+        *_, path = write.write_rdfxml(dataset, tmp_path, options=options)
+        groups = write.describe(dataset, options).product("tracks")
+        whole = tmp_path / "whole.rdf"
+        prefixes = {**PREFIXES, **STUDY_PREFIXES} if profile == "study" else PREFIXES
+        ox.serialize(triples(groups), whole, ox.RdfFormat.RDF_XML, prefixes=prefixes)
+        assert whole.stat().st_size > 500_000
+        assert path.read_bytes() == whole.read_bytes()

@@ -14,6 +14,7 @@ from geofield.formats.rdf.describe import PRODUCTS, Description
 from geofield.formats.rdf.jsonld import write_jsonld as write_json
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import PREFIXES, STRING, STUDY_PREFIXES
+from geofield.formats.rdf.repeated import write_xml
 from geofield.formats.rdf.study import StudyDescription
 from geofield.formats.rdf.triples import Group, triples
 from geofield.model.dataset import Dataset
@@ -140,8 +141,9 @@ def _write(
     path: Path, syntax: ox.RdfFormat, groups: Iterable[Group], options: Mapping[str, Any]
 ) -> None:
     prefixes = _prefixes(options)
-    if syntax == ox.RdfFormat.JSON_LD:
+    own = {ox.RdfFormat.JSON_LD: write_json, ox.RdfFormat.RDF_XML: write_xml}.get(syntax)
+    if own is not None:
         with path.open("wb") as file:
-            write_json(groups, file, prefixes)
+            own(groups, file, prefixes)
     else:
         ox.serialize(triples(groups), path, syntax, prefixes=prefixes)
