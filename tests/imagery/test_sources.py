@@ -7,6 +7,8 @@ import json
 import logging
 import pickle
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +24,13 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from geofield.crs import parse_crs
-from geofield.errors import ImageryError, NetworkError, PointOutsideError, TermsError
+from geofield.errors import (
+    ImageryError,
+    ImageryWarning,
+    NetworkError,
+    PointOutsideError,
+    TermsError,
+)
 from geofield.grid import Grid
 from geofield.imagery import FetchOptions, Where, acquire, find_source, open_reader, read_scene
 from geofield.imagery.cache import cache_infos
@@ -536,13 +544,11 @@ def sheets(folder: Path) -> np.ndarray:
 def test_a_folder_of_sheets_is_one_picture(tmp_path: Path) -> None:
     values = sheets(tmp_path / "sheets")
     (tmp_path / "sheets" / "notes.txt").write_text("not a picture")
-    (tmp_path / "sheets" / "broken.tif").write_text("not a picture")
     whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
     lon, lat = whole.to_lonlat(120.5, 100.5)
     scene = read_scene(tmp_path / "sheets", lat=lat, lon=lon, size_px=101)
     assert np.array_equal(scene.bands, values[:, 50:151, 70:171])
     assert scene.valid.all()
-    assert any("broken.tif was left out" in note for note in scene.notes)
     assert any("Joined from 4 pictures" in note for note in scene.notes)
     everything = read_scene(tmp_path / "sheets", lat=lat, lon=lon)
     assert np.array_equal(everything.bands, values)
@@ -554,6 +560,39 @@ def test_a_folder_of_sheets_is_one_picture(tmp_path: Path) -> None:
         read_scene(tmp_path / "sheets", lat=lat + 1, lon=lon)
     reader = pickle.loads(pickle.dumps(open_reader(str(tmp_path / "sheets"), lat=lat, lon=lon)))
     assert np.array_equal(reader.read().bands, values)
+
+
+def test_a_damaged_picture_of_a_folder_is_told(tmp_path: Path) -> None:
+    folder = tmp_path / "sheets"
+    sheets(folder)
+    whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    lon, lat = whole.to_lonlat(30.5, 30.5)
+
+    def field() -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "geofield", "field", str(folder), "--overwrite"]
+        command += ["--lat", str(lat), "--lon", str(lon), "--output", str(tmp_path / "out.gpkg")]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert "left out" not in field().stderr
+    (folder / "sheet_100_120.tif").write_bytes(b"not a picture")
+    told = field()
+    assert told.returncode == 0
+    assert told.stderr.count("sheet_100_120.tif was left out") == 1
+    assert "not recognized as being in a supported file format" in told.stderr
+    with pytest.warns(ImageryWarning, match=r"sheet_100_120\.tif was left out"):
+        scene = read_scene(folder, lat=lat, lon=lon)
+    assert any("sheet_100_120.tif was left out" in note for note in scene.notes)
+    # The only one that shows the place: nothing else is taken for it.
+    (folder / "sheet_0_0.tif").write_bytes(b"not a picture")
+    refused = field()
+    assert refused.returncode == 1
+    assert "outside all 2 pictures" in refused.stderr
+    assert "sheet_0_0.tif was left out" in refused.stderr
+    # Of many, a few are named.
+    for name in "abcd":
+        (folder / f"{name}.tif").write_bytes(b"not a picture")
+    assert "c.tif was left out" in field().stderr
+    assert "So were 3 more." in field().stderr
 
 
 def test_sheets_of_another_zone_fit_to_a_pixel(tmp_path: Path) -> None:

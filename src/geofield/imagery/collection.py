@@ -8,6 +8,7 @@ sheets in another UTM zone.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from geofield.errors import GeofieldError, ImageryError, PointOutsideError
+from geofield.errors import GeofieldError, ImageryError, ImageryWarning, PointOutsideError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
@@ -27,6 +28,8 @@ from geofield.imagery.reader import SceneReader
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
 _MOST_KNOWN = 10_000
+#: So many damaged pictures are named.
+_TOLD = 3
 #: Lattices this near to each other (px) are the same.
 _SAME_PX = 1e-3
 
@@ -112,21 +115,29 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
     ImageryError
         None of them can be read.
     PointOutsideError
-        None of them holds the point.
+        None of those that can be read holds the point.
+
+    Warns
+    -----
+    ImageryWarning
+        When some cannot be read.
     """
     readers: list[SceneReader] = []
-    notes: list[str] = []
+    damaged: list[str] = []
     for path in paths:
         try:
             readers.append(_looked_at(path, options))
         except GeofieldError as error:
-            notes.append(f"{display_name(path)} was left out: {error.message}")
+            damaged.append(f"{display_name(path)} was left out: {error.message}")
+    notes, told = list(damaged), _told(damaged)
     if not readers:
         raise ImageryError(
             f"{name or 'The collection'} holds no picture that can be read.",
-            hint=notes[0] if notes else "Give a folder with GeoTIFF files.",
+            hint=told or "Give a folder with GeoTIFF files.",
         )
-    reference = _reference(readers, options.point, name)
+    reference = _reference(readers, options.point, name, told)
+    if damaged:
+        warnings.warn(told, ImageryWarning, stacklevel=2)
     usable = [each for each in readers if _fits(each, reference)]
     if len(usable) < len(readers):
         notes.append(f"{len(readers) - len(usable)} pictures with other bands were left out.")
@@ -161,6 +172,12 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         palette=reference.palette,
         parts=tuple(parts),
     )
+
+
+def _told(damaged: Sequence[str]) -> str:
+    """What was left out: all of it where that is little."""
+    more = [f"So were {len(damaged) - _TOLD} more."] if len(damaged) > _TOLD else []
+    return " ".join([*damaged[:_TOLD], *more])
 
 
 def _version(path: str) -> tuple[int, int] | None:
@@ -200,14 +217,14 @@ def on_grid(reader: SceneReader, grid: Grid) -> SceneReader:
 
 
 def _reference(
-    readers: list[SceneReader], point: tuple[float, float] | None, name: str
+    readers: list[SceneReader], point: tuple[float, float] | None, name: str, left_out: str
 ) -> SceneReader:
     """The finest picture at the point; the first of equals."""
     here = readers
     if point is not None:
         here = [each for each in readers if each.grid.contains_px(*each.grid.from_lonlat(*point))]
         if not here:
-            raise PointOutsideError(_outside(readers, *point, name))
+            raise PointOutsideError(_outside(readers, *point, name), hint=left_out)
     return min(here, key=lambda each: round(each.grid.ground_resolution_m, 4))
 
 
