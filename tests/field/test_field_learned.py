@@ -40,7 +40,7 @@ def several():
     for corners in OUTLINES:
         outline = shapely.Polygon(corners)
         inside = surface.members(ring(outline))
-        agrees = agreement(likely, surface.size_px, inside)
+        agrees = agreement(likely, surface.size_px, [inside])[0]
         found.append({**measure(surface, outline, inside), **agrees})
     return found
 
@@ -178,10 +178,14 @@ def test_the_division_follows_the_border_that_the_picture_shows():
     # The network is 20 pixels off, and far from sure.
     likely = parted.mean(np.where(np.arange(160) < 70, 0.75, 0.3)[None, :].repeat(100, 0))
     wanted, barred = parted.at(((20.5, 50.5),)), parted.at(((60.5, 10.5),))
-    found = divided(likely, parted.size_px, parted.pairs, wanted, [], 60.0, 0.8)
+    found, free = divided(
+        likely, parted.size_px, parted.pairs, wanted, [], [(60.0, 0.8), (0.0, 0.0)]
+    )
     inside = found[parted.labels]
     assert inside[:, :87].mean() > 0.98
     assert inside[:, 93:].mean() < 0.02
-    obeys = divided(likely, parted.size_px, parted.pairs, wanted, barred, 60.0, 0.8)
+    # Where borders cost nothing, the network alone decides.
+    assert np.array_equal(free, likely > 0.5)
+    (obeys,) = divided(likely, parted.size_px, parted.pairs, wanted, barred, [(60.0, 0.8)])
     assert obeys[wanted].all()
     assert not obeys[barred].any()

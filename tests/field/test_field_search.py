@@ -201,7 +201,7 @@ def test_sides_move_onto_the_border():
     row, column = np.indices((160, 160)) + 0.5
     stack[0, shapely.contains_xy(truth, column, row)] += 10
     crooked = Polygon([(31.5, 38), (116, 29.5), (131.5, 118.5), (42.5, 132.5)])
-    found = aligned(crooked, stack, 3.0)
+    found = aligned(crooked, np.moveaxis(stack, 0, -1).copy(), 3.0)
     assert overlap(crooked, truth) < 0.965
     assert overlap(found, truth) > 0.985
     assert len(found.exterior.coords) == 5
@@ -210,7 +210,8 @@ def test_sides_move_onto_the_border():
 def test_a_side_beside_the_frame_is_the_frame():
     stack = picture()
     stack[0, 40:120] += 10
-    found = aligned(Polygon([(2, 41), (158, 39), (157.8, 121), (1.5, 119)]), stack, 2.0)
+    beside = Polygon([(2, 41), (158, 39), (157.8, 121), (1.5, 119)])
+    found = aligned(beside, np.moveaxis(stack, 0, -1).copy(), 2.0)
     assert found.bounds[::2] == (0, 160)
     assert overlap(found, box(0, 40, 160, 120)) > 0.98
 

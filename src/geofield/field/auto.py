@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geofield.field.morphology import inner, plump
 from geofield.field.ranking import WEIGHED, Figures, expected_overlaps, log_odds, trained
@@ -64,8 +65,10 @@ def segment(
     if not found:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
+    likely = likely_outlines(found[:WEIGHED], search)
+    masks = carried(scene, [one.candidate.polygon for one in likely], search.factor, search.seed_px)
     chosen, *others = (
-        _carried(scene, search, one) for one in likely_outlines(found[:WEIGHED], search)
+        _told(scene, search, one, mask) for one, mask in zip(likely, masks, strict=True)
     )
     return replace(chosen, alternatives=tuple(others))
 
@@ -119,9 +122,10 @@ def evidence_of(
     }
 
 
-def _carried(scene: Scene, search: FieldSearch, likely: Likely) -> Segmentation:
+def _told(
+    scene: Scene, search: FieldSearch, likely: Likely, mask: NDArray[np.bool_]
+) -> Segmentation:
     """An outline on the picture's own pixels, with what is to be told of it."""
-    mask = carried(scene, likely.candidate.polygon, search.factor, search.seed_px)
     things = plump(likely.candidate.holes | search.surface.things)
     holes = inner(enlarged(things, search.factor, mask.shape), mask)
     figures = likely.candidate.figures

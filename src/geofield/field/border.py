@@ -15,6 +15,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.median import median
 from geofield.field.straight import on_frame, ring
 from geofield.field.surface import Surface
 
@@ -52,31 +53,33 @@ def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> dict[str, 
         The superpixels in it, see `Surface.members`.
     """
     vertices = ring(outline)
-    places, outward, frame = _places(vertices, surface.shape)
+    side = np.concatenate([vertices[1:], vertices[:1]]) - vertices
+    length = np.hypot(*side.T)
+    places, outward, frame = _places(vertices, side, length, surface.shape)
     if len(places) < 12 or inside.sum() < 5:
         return None
     means = surface.means[:, inside]
-    usual = np.array([_median(one) for one in means])
+    usual = median(means)
     along = _along(surface, places, outward, usual)
     interior = _interior(surface, inside, means, usual)
     interior["rough_outside_above_inside"] = along.pop("rough_outside") - interior["rough_inside"]
     for share in (50, 25):
         above = along[f"strength_{share}"] - interior["interior_80"]
         interior[f"strength_{share}_above_interior"] = above
-    return along | _shape(outline, vertices, frame, surface.shape) | interior
+    return along | _shape(outline, side, length, frame, surface.shape) | interior
 
 
-def _places(vertices: FloatArray, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray, float]:
+def _places(
+    vertices: FloatArray, side: FloatArray, length: FloatArray, shape: tuple[int, int]
+) -> tuple[FloatArray, FloatArray, float]:
     """Points along an outline, a pixel apart, with outward directions; share on the frame."""
-    side = np.roll(vertices, -1, axis=0) - vertices
-    length = np.hypot(*side.T)
     steps = np.maximum(np.rint(length).astype(int), (length > 1e-6).astype(int))
     index = np.repeat(np.arange(len(vertices)), steps)
     number = np.arange(len(index)) - np.repeat(np.cumsum(steps) - steps, steps)
     places = vertices[index] + ((number + 0.5) / steps[index])[:, None] * side[index]
     outward = (side[:, ::-1] * [1, -1] / np.maximum(length, 1e-9)[:, None])[index]
     kept = ~on_frame(places, shape, 2.0)
-    frame = 1.0 - float(kept.mean())
+    frame = 1.0 - _share(kept)
     places, outward = places[kept], outward[kept]
     if len(places) > _MOST_PLACES:
         chosen = np.linspace(0, len(places) - 1, _MOST_PLACES).astype(int)
@@ -90,10 +93,12 @@ def _look(
     """The layers at distances outward of places, (distances, places, layers)."""
     import cv2
 
-    at = (places + np.array(away_px)[:, None, None] * outward - 0.5).astype(np.float32)
-    seen = cv2.remap(
-        surface.layers, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    away = np.array(away_px)[:, None]
+    x, y = (
+        (place + away * out - 0.5).astype(np.float32)
+        for place, out in zip(places.T, outward.T, strict=True)
     )
+    seen = cv2.remap(surface.layers, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(seen, np.float32).reshape(len(away_px), len(places), -1)
 
 
@@ -105,69 +110,67 @@ def _along(
     away = [offset + across for across in (-_ACROSS_PX, 0.0, _ACROSS_PX) for offset in offsets]
     strips = [*(-one for one in _STRIP_PX), *_STRIP_PX]
     layers = _look(surface, places, outward, [*away, *strips, *_ROUGH_PX])
-    beyond = layers[-len(_ROUGH_PX) :, :, -1]
-    seen, count = layers[..., :-1], len(offsets)
-    low, middle, high = seen[:count], seen[count : 2 * count], seen[2 * count : 3 * count]
-    step, ridge = high - low, middle - 0.5 * (low + high)
-    strength = np.maximum(*(_norm(_smoothed(one, _ALONG_PX)) for one in (step, ridge)))
+    across, beside, beyond = np.split(layers, [len(away), len(away) + len(strips)])
+    low, middle, high = across.reshape(3, len(offsets), *across.shape[1:])
+    steps = np.stack([high - low, middle - 0.5 * (low + high)])
+    strength = _norm(_smoothed(steps, _ALONG_PX)[..., :-1]).max(axis=0)
     own, within, outside = (
         strength[part].max(axis=0) for part in (slice(0, 3), slice(3, 5), slice(5, 7))
     )
-    noise = max(_median(strength[3:5]), 0.4)
+    noise = max(float(median(strength[3:5].ravel())), 0.4)
     own_log, base = np.log(own + 0.3), math.log(noise + 0.3)
     mean, quantiles = float(own_log.mean()), _ranked(own_log, [0.1, 0.25, 0.5])
     inner = _ranked(np.log(within + 0.3), [0.8, 0.95]) - mean
     longest = _longest(own < _FAINT)
-    half = 3 * count + len(_STRIP_PX)
-    rim, around = (
-        _smoothed(part.mean(axis=0), _STRIP_ALONG_PX)
-        for part in (layers[3 * count : half], layers[half : half + len(_STRIP_PX)])
-    )
-    step_beside = around - rim
-    beside = np.log(_ranked(_norm(step_beside[:, :-1]), [0.1, 0.25, 0.5]) + 0.3)
-    texture = np.log(_ranked(np.abs(step_beside[:, -1]), [0.25, 0.5]) + 0.1)
-    rim_strange, strange = (_norm(part[:, :-1] - usual_inside) for part in (rim, around))
+    # The field's rim, and what is around it.
+    strip = _smoothed(beside.reshape(2, -1, *beside.shape[1:]).mean(axis=1), _STRIP_ALONG_PX)
+    step = strip[1] - strip[0]
+    step_beside = np.log(_ranked(_norm(step[:, :-1]), [0.1, 0.25, 0.5]) + 0.3)
+    texture = np.log(_ranked(np.abs(step[:, -1]), [0.25, 0.5]) + 0.1)
+    rim_strange, strange = _norm(strip[..., :-1] - usual_inside)
     return {
         "strength_mean": mean,
         **_named("strength", (10, 25, 50), quantiles),
         "strength_mean_above_inside": mean - base,
         **_named("strength", (10, 25, 50), quantiles - base, "_above_inside"),
         "inside_strength": base,
-        "share_like_inside": float(np.mean(own < 1.5 * noise)),
-        "share_faint": float(np.mean(own < _FAINT)),
-        "share_stronger_inside": float(np.mean(within > own)),
-        "share_stronger_outside": float(np.mean(outside > own)),
+        "share_like_inside": _share(own < 1.5 * noise),
+        "share_faint": _share(own < _FAINT),
+        "share_stronger_inside": _share(within > own),
+        "share_stronger_outside": _share(outside > own),
         **_named("inside", (80, 95), inner, "_above_border"),
         "outside_above_border": float(np.log(outside + 0.3).mean()) - mean,
         "longest_faint_share": longest / len(places),
         "longest_faint_px": math.log1p(longest),
-        **_named("strips", (10, 25, 50), beside),
-        "strips_whole": math.log(float(np.linalg.norm(step_beside[:, :-1].mean(axis=0))) + 0.3),
+        **_named("strips", (10, 25, 50), step_beside),
+        "strips_whole": math.log(float(np.linalg.norm(step[:, :-1].mean(axis=0))) + 0.3),
         **_named("rim_strange", (50, 80, 95), np.log(_ranked(rim_strange, [0.5, 0.8, 0.95]) + 0.3)),
         **_named("around_strange", (10, 25, 50), np.log(_ranked(strange, [0.1, 0.25, 0.5]) + 0.3)),
-        "share_around_like_rim": float(np.mean(strange < rim_strange + 0.5)),
+        "share_around_like_rim": _share(strange < rim_strange + 0.5),
         **_named("texture_step", (25, 50), texture),
-        "texture_step_whole": float(step_beside[:, -1].mean()),
-        "rough_outside": math.log(_median(beyond) + 0.3),
+        "texture_step_whole": float(step[:, -1].mean()),
+        "rough_outside": math.log(float(median(beyond[..., -1].ravel())) + 0.3),
     }
 
 
 def _shape(
-    outline: Polygon, vertices: FloatArray, frame: float, shape: tuple[int, int]
+    outline: Polygon,
+    side: FloatArray,
+    length: FloatArray,
+    frame: float,
+    shape: tuple[int, int],
 ) -> dict[str, float]:
     """How plain the outline is."""
-    side = np.roll(vertices, -1, axis=0) - vertices
-    length = np.hypot(*side.T)
     around, area = float(length.sum()), outline.area
     turn = np.exp(4j * np.arctan2(side[:, 1], side[:, 0]))
     return {
         "compactness": math.log(4 * math.pi * area / around**2),
         "area_share": math.log(area / (shape[0] * shape[1])),
         "frame_share": frame,
-        "vertices": math.log(len(vertices)),
+        "vertices": math.log(len(side)),
         "convexity": area / shapely.convex_hull(outline).area,
         "long_sides_share": float(length[length >= 0.15 * math.sqrt(area)].sum()) / around,
-        "short_sides_share": float(np.mean(length < _SHORT_PX)),
+        "short_sides_share": _share(length < _SHORT_PX),
         "area_px": math.log(area),
         "right_angles": float(abs(length @ turn)) / around,
     }
@@ -187,11 +190,11 @@ def _interior(
     distance = np.linalg.norm(means - usual[:, None], axis=0)
     uneven = np.log(_ranked(distance, [0.5, 0.8, 0.95]) + 0.3)
     rows, columns = surface.centres
-    rough = _median(surface.layers[rows[inside], columns[inside], -1])
+    rough = float(median(surface.layers[rows[inside], columns[inside], -1]))
     return {
         **_named("interior", (50, 80, 95, 99), inner),
         **_named("uneven", (50, 80, 95), uneven),
-        "strange_share": float(np.mean(distance > 6.0)),
+        "strange_share": _share(distance > 6.0),
         "rough_inside": math.log(rough + 0.3),
     }
 
@@ -206,19 +209,29 @@ def _named(
 
 
 def _smoothed(values: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    """Running means along the places, the axis before the last."""
+    """Running means along the places, the axis before the last; shorter ones at the ends."""
+    import cv2
+
     count = values.shape[-2]
-    at = np.arange(count)
     half = min(width, count) // 2
-    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, count)
-    total = np.cumsum(values, axis=-2, dtype=np.float64)
-    total = np.concatenate([np.zeros_like(total[..., :1, :]), total], axis=-2)
-    mean = (total[..., high, :] - total[..., low, :]) / (high - low)[:, None]
-    return np.asarray(mean, np.float32)
+    at = np.arange(count)
+    held = np.minimum(at, half) + np.minimum(at[::-1], half) + 1
+    total = cv2.boxFilter(
+        values.reshape(-1, *values.shape[-2:]),
+        cv2.CV_64F,
+        (2 * half + 1, 1),
+        normalize=False,
+        borderType=cv2.BORDER_CONSTANT,
+    )
+    return np.asarray(total.reshape(values.shape) / held[:, None], np.float32)
 
 
 def _norm(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(np.sqrt(np.einsum("...c,...c->...", values, values)))
+
+
+def _share(flags: BoolArray) -> float:
+    return np.count_nonzero(flags) / len(flags)
 
 
 def _ranked(values: NDArray[np.floating], shares: list[float]) -> NDArray[np.float64]:
@@ -226,12 +239,6 @@ def _ranked(values: NDArray[np.floating], shares: list[float]) -> NDArray[np.flo
     ordered = np.sort(values)
     at = (np.array(shares) * len(ordered)).astype(int)
     return np.asarray(ordered[at], float)
-
-
-def _median(values: NDArray[np.floating]) -> float:
-    """The same as NumPy's, without its care for what these arrays never hold."""
-    ordered = np.sort(values, axis=None)
-    return float(ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1].mean())
 
 
 def _longest(flags: BoolArray) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from geofield.field.median import median
 from geofield.field.morphology import plump
 
 BoolArray = NDArray[np.bool_]
@@ -81,9 +82,9 @@ def _painted(stack: FloatArray, painted: BoolArray) -> FloatArray:
         ground = _ring(own) & ~painted[rows, columns]
         if not ground.any():
             continue
-        even = _like_most(part, ground)
-        if even.sum() > _AROUND_PAINT * ground.sum():
-            ground = even
+        even = _like_most(part[:, ground])
+        if np.count_nonzero(even) > _AROUND_PAINT * len(even):
+            ground[ground] = even
         at = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
         near = np.moveaxis(part[:, at[0], at[1]], 0, -1)
         soft = cv2.GaussianBlur(near, (0, 0), _SOFT_PX).reshape(near.shape)
@@ -110,16 +111,10 @@ def _ring(own: BoolArray) -> BoolArray:
     return np.asarray(cv2.dilate(own.view(np.uint8), ellipse) > 0)
 
 
-def _like_most(stack: FloatArray, ground: BoolArray) -> BoolArray:
-    """Of some ground what is like most of it."""
-    around = stack[:, ground]
-    ordered, count = np.sort(around, axis=1), around.shape[1]
-    median = ordered[:, (count - 1) // 2 : count // 2 + 1].mean(axis=1)  # NumPy's takes longer
-    away = around - median[:, None]
-    distance = np.sqrt(np.einsum("cn,cn->n", away, away))
-    even = np.zeros_like(ground)
-    even[ground] = distance < _EVEN
-    return even
+def _like_most(ground: FloatArray) -> BoolArray:
+    """Which places of some ground (channels, places) are like most of it."""
+    away = ground - median(ground)[:, None]
+    return np.asarray(np.sqrt(np.einsum("cn,cn->n", away, away)) < _EVEN)
 
 
 def _standing_out(stack: FloatArray, pixel_m: float) -> FloatArray:
@@ -131,8 +126,8 @@ def _standing_out(stack: FloatArray, pixel_m: float) -> FloatArray:
         # The median filter wants bytes: thirds of a unit are fine enough.
         middle = float(np.median(layer))
         levels = np.clip((layer - middle) * 3 + 128, 0, 255).astype(np.uint8)
-        median = (cv2.medianBlur(levels, side).astype(np.float32) - 128) / 3 + middle
-        total += np.square(layer - median)
+        usual = (cv2.medianBlur(levels, side).astype(np.float32) - 128) / 3 + middle
+        total += np.square(layer - usual)
     return np.sqrt(total)
 
 
@@ -150,7 +145,7 @@ def _inside_surfaces(stack: FloatArray, away: BoolArray, pixel_m: float) -> Bool
             continue
         rows, columns = _around(stats[number])
         ground = _ring(labels[rows, columns] == number) & ~beside[rows, columns]
-        if ground.sum() >= 15:
-            even = _like_most(stack[:, rows, columns], ground)
-            kept[number] = even.sum() > _AROUND_THING * ground.sum()
+        if np.count_nonzero(ground) >= 15:
+            even = _like_most(stack[:, rows, columns][:, ground])
+            kept[number] = np.count_nonzero(even) > _AROUND_THING * len(even)
     return np.asarray(kept[labels])

@@ -31,10 +31,9 @@ def divided(
     pairs: tuple[IntArray, IntArray, FloatArray, FloatArray],
     wanted: Sequence[int],
     unwanted: Sequence[int],
-    price: float,
-    favour: float,
-) -> BoolArray:
-    """The superpixels of the field.
+    terms: Sequence[tuple[float, float]],
+) -> list[BoolArray]:
+    """The superpixels of the field, on each of some terms.
 
     Parameters
     ----------
@@ -44,31 +43,36 @@ def divided(
         Neighbours.
     wanted, unwanted : sequence of int
         Superpixels that belong and that do not, whatever else speaks.
-    price : float
-        Of a pixel of border where the picture shows none, in pixels of log odds of one.
-    favour : float
-        Log odds added everywhere.
+    terms : sequence of (price, favour)
+        The price of a pixel of border where the picture shows none, in pixels of log odds of
+        one; and log odds added everywhere.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
     first, second, length, strength = pairs
     count = len(size_px)
-    field, other = count, count + 1
-    across = np.rint(_PARTS * price * length * np.exp(-strength / _SOFT))
-    odds = logit(np.clip(likely, 1e-6, 1 - 1e-6)) + favour
-    own = np.rint(_PARTS * size_px * np.clip(odds, -_SURE, _SURE))
-    own[list(unwanted)], own[list(wanted)] = -_NEVER, _NEVER
-    belong, apart = np.flatnonzero(own > 0), np.flatnonzero(own < 0)
-    start = [first, second, np.full(len(belong), field), apart]
-    end = [second, first, belong, np.full(len(apart), other)]
-    capacity = np.concatenate([across, across, own[belong], -own[apart]]).astype(np.int32)
-    graph = csr_array(
-        (capacity, (np.concatenate(start), np.concatenate(end))), shape=(count + 2, count + 2)
+    everyone, field, other = np.arange(count), np.full(count, count), np.full(count, count + 1)
+    ends = (
+        np.concatenate([first, second, field, everyone]),
+        np.concatenate([second, first, everyone, other]),
     )
-    left = graph - maximum_flow(graph, field, other).flow
-    left.data[left.data < 0] = 0
-    left.eliminate_zeros()
-    members = np.zeros(count + 2, bool)
-    members[breadth_first_order(left, field, return_predecessors=False)] = True
-    return members[:count]
+    # The terms change what edges carry, not which there are.
+    number = csr_array((np.arange(len(ends[0])), ends), shape=(count + 2, count + 2))
+    shape = number.indices, number.indptr
+    soft = length * np.exp(-strength / _SOFT)
+    odds = logit(np.clip(likely, 1e-6, 1 - 1e-6))
+    found = []
+    for price, favour in terms:
+        across = np.rint(_PARTS * price * soft)
+        own = np.rint(_PARTS * size_px * np.clip(odds + favour, -_SURE, _SURE))
+        own[list(unwanted)], own[list(wanted)] = -_NEVER, _NEVER
+        capacity = np.concatenate([across, across, np.maximum(own, 0), np.maximum(-own, 0)])
+        graph = csr_array((capacity[number.data].astype(np.int32), *shape))
+        left = graph - maximum_flow(graph, count, count + 1).flow
+        left.data[left.data < 0] = 0
+        left.eliminate_zeros()
+        members = np.zeros(count + 2, bool)
+        members[breadth_first_order(left, count, return_predecessors=False)] = True
+        found.append(members[:count])
+    return found

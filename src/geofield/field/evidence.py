@@ -53,7 +53,7 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
     return stack
 
 
-def block_mean(band: NDArray[np.generic], factor: int) -> FloatArray:
+def block_mean(band: NDArray[np.bool_ | np.uint8 | np.float32], factor: int) -> FloatArray:
     """Means of blocks of ``factor x factor`` pixels; the last ones may be smaller."""
     if factor == 1:
         return band.astype(np.float32)
@@ -61,8 +61,14 @@ def block_mean(band: NDArray[np.generic], factor: int) -> FloatArray:
     more = ((-rows) % factor, (-columns) % factor)
     if any(more):
         band = np.pad(band, ((0, more[0]), (0, more[1])), mode="edge")
-    blocks = band.reshape(band.shape[0] // factor, factor, band.shape[1] // factor, factor)
-    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float32))
+    # Strided sums are several times faster than a mean over reshaped blocks.
+    tall = band[::factor].astype(np.float32)
+    for start in range(1, factor):
+        tall += band[start::factor]
+    total = tall[:, ::factor].copy()
+    for start in range(1, factor):
+        total += tall[:, start::factor]
+    return total / np.float32(factor**2)
 
 
 def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:

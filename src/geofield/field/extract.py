@@ -12,6 +12,7 @@ from shapely import Polygon
 from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
+from geofield.field.plausible import look
 from geofield.field.points import obeying
 from geofield.field.quality import judge
 from geofield.field.search import FieldSearch, search_field
@@ -114,6 +115,7 @@ def extract_field(
     found: Segmentation = method_of(FIELD, method)(picture, *seed, **chosen)
     keep = holes == "keep" or (holes is None and method == "study")
     smallest = min_hole_m2 / scene.grid.ground_resolution_m**2 if keep else None
+    seen = look(scene)
 
     def outlined(one: Segmentation) -> tuple[Polygon, FieldQuality]:
         """Outline, pixel coordinates, and its quality."""
@@ -128,7 +130,7 @@ def extract_field(
         outline_px = straight_outline(filled, tolerance_px=tolerance_px)
         if belong or apart:
             outline_px = obeying(outline_px, (seed, *belong), apart)
-        return outline_px, judge(scene, filled, outline_px, one, seed)
+        return outline_px, judge(scene, seen, filled, outline_px, one, seed)
 
     outline_px, quality = outlined(found)
     others = [outlined(one) for one in found.alternatives]

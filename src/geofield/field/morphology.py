@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 
 #: Openings and notches narrower than twice this are no part of an outline, pixels.
-_OPEN_PX, _CLOSE_PX = 5.0, 6.0
+_OPEN_PX, _CLOSE_PX = 5, 6
 #: Area of what is no mere line, in squares of its longer side.
 _PLUMP = 0.12
 
@@ -48,7 +50,7 @@ def _tidied(mask: BoolArray, x: int, y: int) -> BoolArray:
 
 def _around(mask: BoolArray) -> tuple[slice, slice]:
     """The rows and columns that a mask and its closing need."""
-    margin = int(_CLOSE_PX) + 2
+    margin = _CLOSE_PX + 2
 
     def span(used: BoolArray) -> slice:
         at = np.flatnonzero(used)
@@ -90,15 +92,20 @@ def inner(parts: BoolArray, mask: BoolArray) -> BoolArray:
     return within & ~np.isin(labels, np.unique(labels[beside & within]))
 
 
-def _shrunk(mask: BoolArray, radius: float) -> BoolArray:
+def _shrunk(mask: BoolArray, radius: int) -> BoolArray:
     """Erosion by a disc; the picture's edge does not erode."""
     import cv2
 
-    if mask.all():
-        return mask
-    distance = cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.asarray(distance > radius)
+    return cv2.erode(mask.view(np.uint8), _disc(radius)).view(bool)
 
 
-def _grown(mask: BoolArray, radius: float) -> BoolArray:
-    return ~_shrunk(~mask, radius) if mask.any() else mask
+def _grown(mask: BoolArray, radius: int) -> BoolArray:
+    import cv2
+
+    return cv2.dilate(mask.view(np.uint8), _disc(radius)).view(bool)
+
+
+@cache
+def _disc(radius: int) -> NDArray[np.uint8]:
+    at = np.square(np.arange(-radius, radius + 1))
+    return (at[:, None] + at <= radius * radius).astype(np.uint8)

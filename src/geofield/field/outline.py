@@ -14,10 +14,10 @@ from typing import cast
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 from shapely import Polygon
 
 from geofield.errors import FieldError
+from geofield.field.median import median
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
@@ -42,19 +42,32 @@ def mask_polygon(mask: BoolArray) -> Polygon:
     FieldError
         When the mask is empty.
     """
+    import cv2
+    from affine import Affine
     from rasterio.features import shapes
 
-    labels, count = ndimage.label(mask)
-    if count == 0:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        np.asarray(mask, bool).view(np.uint8), connectivity=4
+    )
+    if count == 1:
         raise FieldError("No pixel belongs to the field.", hint="Choose another point or method.")
-    largest = 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
-    part = (labels == largest).astype(np.uint8)
-    geometry, _ = next(shapes(part, mask=part.astype(bool), connectivity=4))
-    polygon = shapely.geometry.shape(geometry)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    left, top, width, height = stats[largest, :4].tolist()
+    part = labels[top : top + height, left : left + width] == largest
+    geometry, _ = next(
+        shapes(
+            part.view(np.uint8),
+            mask=part,
+            connectivity=4,
+            transform=Affine.translation(left, top),
+        )
+    )
+    shell, *holes = (shapely.linearrings(one) for one in geometry["coordinates"])
+    polygon = Polygon(shell, holes)
     if not polygon.is_valid:  # rings that touch at a corner
         parts = shapely.get_parts(shapely.make_valid(polygon))
         polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
-    return cast(Polygon, polygon)
+    return polygon
 
 
 def straight_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
@@ -217,7 +230,7 @@ def _fit(points: FloatArray) -> _Line:
     centre, direction = _least_squares(points)
     for _ in range(3 if len(points) >= _ROBUST_FROM else 0):
         offset = np.abs((points - centre) @ np.array([-direction[1], direction[0]]))
-        near = offset <= max(0.75, 1.5 * float(np.median(offset)))
+        near = offset <= max(0.75, 1.5 * float(median(offset)))
         if near.sum() < len(points) // 2:
             break
         centre, direction = _least_squares(points[near])
@@ -236,13 +249,15 @@ def _least_squares(points: FloatArray) -> _Line:
 
 def _edge_line(points: FloatArray, width: int, height: int) -> _Line | None:
     """The picture's edge, where most of a piece lies on it."""
-    for axis, limit in ((0, 0.0), (0, float(width)), (1, 0.0), (1, float(height))):
-        if np.mean(np.abs(points[:, axis] - limit) < 0.25) > 0.6:
-            centre, direction = points.mean(axis=0), np.zeros(2)
-            centre[axis] = limit
-            direction[1 - axis] = 1.0
-            return centre, direction
-    return None
+    limits = np.array([[0.0, 0.0], [width, height]])
+    share = np.mean(np.abs(points[:, None] - limits) < 0.25, axis=0)
+    far, axis = np.unravel_index(np.argmax(share), share.shape)
+    if share[far, axis] <= 0.6:
+        return None
+    centre, direction = points.mean(axis=0), np.zeros(2)
+    centre[axis] = limits[far, axis]
+    direction[1 - axis] = 1.0
+    return centre, direction
 
 
 def _corner(before: _Line, after: _Line, turn: FloatArray, reach: float) -> list[FloatArray]:

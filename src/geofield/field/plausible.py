@@ -8,6 +8,7 @@ infrared.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,28 +29,62 @@ _LIFELESS, _LIFELESS_COSTS = -0.13, 0.55
 _NARROW_M, _NARROW_COSTS = 7.0, 0.55
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A scene, reduced, as its fields are judged by.
+
+    Attributes
+    ----------
+    factor : int
+        Pixels of the scene along one of these.
+    pixel_m : float
+        Ground size of a pixel, metres.
+    spread : float array (rows, columns)
+        Variance of brightness around each pixel, grey levels squared.
+    vegetation : float32 array (rows, columns) or None
+        The vegetation index, where there is near infrared.
+    """
+
+    factor: int
+    pixel_m: float
+    spread: NDArray[np.float64]
+    vegetation: NDArray[np.float32] | None
+
+
+def look(scene: Scene) -> Look:
+    """What `doubts` needs of a scene."""
+    factor = max(1, math.ceil(max(scene.grid.shape) / _LOOK_PX))
+    grey = block_mean(scene.grey, factor).astype(np.float64)
+    mean = ndimage.uniform_filter(grey, _ROUGH_PX)
+    spread = ndimage.uniform_filter(grey * grey, _ROUGH_PX) - mean * mean
+    red, nir = scene.band("red"), scene.nir
+    vegetation = None
+    if red is not None and nir is not None:
+        red_mean, nir_mean = (block_mean(band, factor) for band in (red, nir))
+        vegetation = (nir_mean - red_mean) / (nir_mean + red_mean + 1.0)
+    return Look(factor, scene.grid.ground_resolution_m * factor, spread, vegetation)
+
+
 def doubts(
-    scene: Scene, mask: NDArray[np.bool_]
+    scene: Look, mask: NDArray[np.bool_]
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
     """What speaks against a field, in words and with what it costs, and the figures behind it.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Look
     mask : bool array (rows, columns)
-        The outlined pixels, holes filled.
+        The outlined pixels of the scene itself, holes filled.
     """
-    factor = max(1, math.ceil(max(scene.grid.shape) / _LOOK_PX))
-    inside = block_mean(mask, factor) > 0.5
+    import cv2
+
+    inside = block_mean(mask, scene.factor) > 0.5
     if not inside.any():
         return (), ()
-    grey = block_mean(scene.grey, factor).astype(np.float64)
-    mean = ndimage.uniform_filter(grey, _ROUGH_PX)
-    spread = ndimage.uniform_filter(grey * grey, _ROUGH_PX) - mean * mean
-    roughness = float(np.sqrt(np.median(np.maximum(spread[inside], 0))))
-    padded = np.pad(inside, 1, mode="edge")
-    depth_px = float(ndimage.distance_transform_edt(padded).max()) if not padded.all() else math.inf
-    half_width_m = depth_px * factor * scene.grid.ground_resolution_m
+    roughness = float(np.sqrt(np.median(np.maximum(scene.spread[inside], 0))))
+    padded = np.pad(inside, 1, mode="edge").view(np.uint8)
+    depth = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    half_width_m = math.inf if padded.all() else float(depth.max()) * scene.pixel_m
     reasons = []
     figures = [("roughness", roughness)]
     if roughness > _ROUGH:
@@ -59,10 +94,8 @@ def doubts(
         if half_width_m < _NARROW_M:
             narrow = f"it is only {2 * half_width_m:.0f} m wide (a road, a strip?)"
             reasons.append((narrow, _NARROW_COSTS))
-    red, nir = scene.band("red"), scene.nir
-    if red is not None and nir is not None:
-        red_in, nir_in = (block_mean(band, factor)[inside] for band in (red, nir))
-        index = float(np.median((nir_in - red_in) / (nir_in + red_in + 1.0)))
+    if scene.vegetation is not None:
+        index = float(np.median(scene.vegetation[inside]))
         figures.append(("vegetation_index", index))
         if index < _LIFELESS:
             reasons.append(("nothing grows on it (water, pavement, a roof?)", _LIFELESS_COSTS))

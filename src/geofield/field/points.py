@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
@@ -19,13 +21,16 @@ Points = Sequence[tuple[float, float]]
 _AROUND_PX = 3.0
 
 
-def obeys(polygon: Polygon, include: Points, exclude: Points) -> bool:
-    """Whether an outline holds all points that belong and none of those that do not."""
-    if polygon.is_empty or not polygon.is_valid:
-        return False
-    return all(shapely.contains_xy(polygon, x, y) for x, y in include) and not any(
-        shapely.intersects_xy(polygon, x, y) for x, y in exclude
-    )
+def obeys(
+    polygons: Polygon | NDArray[np.object_], include: Points, exclude: Points
+) -> NDArray[np.bool_]:
+    """Whether outlines hold all points that belong and none of those that do not."""
+    good = shapely.is_valid(polygons) & ~shapely.is_empty(polygons)
+    for x, y in include:
+        good &= shapely.contains_xy(polygons, x, y)
+    for x, y in exclude:
+        good &= ~shapely.intersects_xy(polygons, x, y)
+    return np.asarray(good)
 
 
 def obeying(polygon: Polygon, include: Points, exclude: Points) -> Polygon:

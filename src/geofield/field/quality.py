@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from geofield.field.plausible import doubts
+from geofield.field.plausible import Look, doubts
 from geofield.model import FieldQuality, Scene
 from geofield.model.frame import outside_in_words
 from geofield.model.segmentation import Segmentation
@@ -23,6 +23,7 @@ _TRUSTED = 0.45
 
 def judge(
     scene: Scene,
+    look: Look,
     mask: BoolArray,
     outline_px: Polygon,
     found: Segmentation,
@@ -33,6 +34,8 @@ def judge(
     Parameters
     ----------
     scene : Scene
+    look : Look
+        Of the scene.
     mask : bool array (rows, columns)
         The field's pixels.
     outline_px : shapely.Polygon
@@ -43,7 +46,7 @@ def judge(
         The point, pixel coordinates.
     """
     area_m2 = outline_px.area * scene.grid.ground_resolution_m**2
-    strange, look = doubts(scene, mask)
+    strange, seen = doubts(look, mask)
     touching = edge_share(outline_px, mask.shape[1], mask.shape[0])
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
@@ -66,7 +69,7 @@ def judge(
         ("edge_share", touching),
         ("covered_share", covered),
         ("area_m2", area_m2),
-        *look,
+        *seen,
         *found.figures,
     )
     return FieldQuality(score, tuple(reasons), figures, trusted=score >= _TRUSTED)

@@ -36,31 +36,37 @@ _SMALL_PX = 96
 WEIGHED = 200
 
 
-def agreement(likely: FloatArray, size_px: FloatArray, inside: BoolArray) -> dict[str, float]:
-    """How well an outline agrees with what the network takes for the field, by name.
+def agreement(
+    likely: FloatArray, size_px: FloatArray, inside: Sequence[BoolArray]
+) -> list[dict[str, float]]:
+    """How well outlines agree with what the network takes for the field, by name.
 
     Parameters
     ----------
     likely, size_px : float array (superpixels,)
         How likely each belongs to the field; its pixels.
-    inside : bool array (superpixels,)
-        Which the outline holds; at least one.
+    inside : sequence of bool array (superpixels,)
+        Which each outline holds; at least one.
     """
-    area, everywhere = float(size_px[inside].sum()), float(size_px @ likely)
-    common = float(size_px[inside] @ likely[inside])
-    field = size_px * (likely > 0.5)
-    both, either = float(field[inside].sum()), area + float(field[~inside].sum())
-    sure = np.clip(likely, 0.005, 0.995)
-    fit = size_px[inside] @ np.log(sure[inside]) + size_px[~inside] @ np.log1p(-sure[~inside])
-    return {
-        "network_overlap": float(log_odds(common / (area + everywhere - common))),
-        "network_field_overlap": float(log_odds(both / either)),
+    sure, field = np.clip(likely, 0.005, 0.995), likely > 0.5
+    without = np.log1p(-sure)
+    counted = size_px[:, None] * np.column_stack(
+        [np.ones_like(likely), likely, field, likely < 0.3, np.log(sure) - without]
+    )
+    area, common, both, unlikely, gain = (np.array(inside) @ counted).T
+    everywhere, fields = size_px @ likely, size_px @ field
+    fit = size_px @ without + gain
+    figures = {
+        "network_overlap": log_odds(common / (area + everywhere - common)),
+        "network_field_overlap": log_odds(both / (area + fields - both)),
         "network_inside": common / area,
         "network_missed": 1.0 - common / max(everywhere, 1e-9),
-        "network_unlikely_share": float(size_px[inside] @ (likely[inside] < 0.3)) / area,
-        "network_fit": float(np.log(0.02 - fit / size_px.sum())),
-        "network_fit_of_area": float(np.log(0.02 - fit / area)),
+        "network_unlikely_share": unlikely / area,
+        "network_fit": np.log(0.02 - fit / size_px.sum()),
+        "network_fit_of_area": np.log(0.02 - fit / area),
     }
+    rows = np.column_stack(list(figures.values())).tolist()
+    return [dict(zip(figures, row, strict=True)) for row in rows]
 
 
 def log_odds(share: FloatArray | float) -> FloatArray:

@@ -7,6 +7,7 @@ of its length; the sides' meetings are the new corners.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,15 @@ _FRAME_PX = 2.5
 _PARALLEL = 0.12
 
 
-def carried(scene: Scene, outline: Polygon, factor: int, seed_px: tuple[float, float]) -> BoolArray:
-    """The pixels of a scene within an outline that was found in its reduced picture.
+def carried(
+    scene: Scene, outlines: Sequence[Polygon], factor: int, seed_px: tuple[float, float]
+) -> list[BoolArray]:
+    """The pixels of a scene within each of some outlines that were found in its reduced picture.
 
     Parameters
     ----------
     scene : Scene
-    outline : Polygon
+    outlines : sequence of Polygon
         Pixel coordinates of the reduced picture.
     factor : int
         Pixels of the scene along one of the reduced picture.
@@ -59,13 +62,15 @@ def carried(scene: Scene, outline: Polygon, factor: int, seed_px: tuple[float, f
         stack = whiten(
             channels(scene, size), (seed_px[0] * factor / size, seed_px[1] * factor / size)
         )
-        outline = aligned(outline, stack, reach)
+        layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
+        outlines = [aligned(one, layers, reach) for one in outlines]
         if size <= finest:
-            whole = scale(outline, size, size, origin=(0, 0))
-            return within(whole, scene.grid.shape)
+            return [
+                within(scale(one, size, size, origin=(0, 0)), scene.grid.shape) for one in outlines
+            ]
         finer = finest if size <= 4 * finest else math.ceil(size / 4)
         ratio = size / finer
-        outline = scale(outline, ratio, ratio, origin=(0, 0))
+        outlines = [scale(one, ratio, ratio, origin=(0, 0)) for one in outlines]
         size, reach = finer, _REACH_COARSE * ratio
 
 
@@ -84,24 +89,23 @@ def enlarged(mask: BoolArray, factor: int, shape: tuple[int, ...]) -> BoolArray:
     return np.ascontiguousarray(large[: shape[0], : shape[1]])
 
 
-def aligned(outline: Polygon, stack: NDArray[np.float32], reach_px: float) -> Polygon:
+def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> Polygon:
     """An outline with its sides moved onto the strongest border within reach.
 
     Parameters
     ----------
     outline : Polygon
-        Pixel coordinates of the stack.
-    stack : float32 array (channels, rows, columns)
+        Pixel coordinates of the layers.
+    layers : float32 array (rows, columns, channels)
         Whitened channels.
     reach_px : float
     """
-    shape = stack.shape[1], stack.shape[2]
+    shape = layers.shape[0], layers.shape[1]
     start = _framed(np.clip(ring(outline), 0, [shape[1], shape[0]]), shape)
     end = np.roll(start, -1, axis=0)
     framed = on_frame(start, shape, 0.75) & on_frame(end, shape, 0.75)
     framed &= on_frame(0.5 * (start + end), shape, 0.75)
     long = (np.hypot(*(end - start).T) >= _MOVED_PX) & ~framed
-    layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
     sides = [
         _moved(a, b, layers, reach_px) if moves else (a, b)
         for a, b, moves in zip(start, end, long, strict=True)

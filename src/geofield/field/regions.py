@@ -133,10 +133,7 @@ def regions(
     likelier = likely > 0.5
     likelier[wanted], likelier[list(unwanted)] = True, False
     chosen.append(likelier)
-    chosen += [
-        divided(likely, size, parted.pairs, wanted, sorted(unwanted), price, favour)
-        for price, favour in _DIVISIONS
-    ]
+    chosen += divided(likely, size, parted.pairs, wanted, sorted(unwanted), _DIVISIONS)
     gain = size * logit(np.clip(likely, 0.02, 0.98))
     chosen += [
         _mended(parted.tree, one, gain * worth, wanted, unwanted)
@@ -144,7 +141,7 @@ def regions(
         for worth in (1.0, 0.0)
     ]
     found: list[Region] = []
-    for members in chosen:
+    for members in {one.tobytes(): one for one in chosen}.values():
         raw = members[parted.labels]
         whole = filled(raw)
         part = tidy(whole, include[0])

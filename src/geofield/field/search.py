@@ -8,7 +8,7 @@ that a further point costs the network's answer to it and a few new outlines.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -116,7 +116,7 @@ class FieldSearch:
     seed_px: tuple[float, float]
     moved: bool
     part: int | None = None
-    known: dict[bytes, Held] = field(default_factory=dict)
+    known: dict[Polygon, Held] = field(default_factory=dict)
 
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
@@ -136,60 +136,58 @@ class FieldSearch:
         points = (self.seed_px, *include), exclude
         ground = self.surface.parted.mean(likely)
         earlier = self._earlier(ground) if include or exclude else []
-        found: dict[bytes, Candidate] = {}
+        found: dict[Polygon, Candidate] = {}
 
-        def add(outlines: Iterable[tuple[Polygon, BoolArray]]) -> None:
-            """Those that obey the points, with their scores."""
-            new = {}
-            for polygon, holes in outlines:
-                key = polygon.wkb
-                if key not in found and obeys(polygon, *points):
-                    held = self._held(key, polygon, holes)
-                    if held.figures is not None:
-                        agrees = agreement(ground, self.surface.size_px, held.inside)
-                        new[key] = held, {**held.figures, **agrees}
-            if new:
-                scores = trained(self.part).scores([figures for _, figures in new.values()])
-                for (key, (held, figures)), score in zip(new.items(), scores.tolist(), strict=True):
-                    found[key] = Candidate(held.polygon, held.holes, figures, score)
+        def add(outlines: Mapping[Polygon, BoolArray]) -> None:
+            """Outlines with what was filled in them: those that obey the points get scores."""
+            new = [polygon for polygon in outlines if polygon not in found]
+            obeying = np.array(new)[obeys(np.array(new), *points)] if new else ()
+            held = [self._held(polygon, outlines[polygon]) for polygon in obeying]
+            for one, figures, score in self._scored(held, ground):
+                found[one.polygon] = Candidate(one.polygon, one.holes, figures, score)
 
-        add((one.polygon, one.holes) for one in list(self.known.values()))
+        add({polygon: one.holes for polygon, one in self.known.items()})
         second = self.second.mean(likely)
         around = [
             *regions(self.surface.parted, ground, *points, earlier),
             *regions(self.second, second, *points),
         ]
         rough = {rough_outline(one.mask): one for one in around}
-        add((polygon, one.holes) for polygon, one in rough.items())
-        ranked = sorted(
-            (polygon for polygon in rough if polygon.wkb in found),
-            key=lambda polygon: -found[polygon.wkb].score,
-        )
-        for polygon in self._different(ranked, _FITTED):
+        add({polygon: one.holes for polygon, one in rough.items()})
+        fitted = {}
+        for polygon in self._different([one for one in best_first(found) if one in rough], _FITTED):
             with suppress(FieldError):
-                fitted = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
-                add([(Polygon(fitted.exterior), rough[polygon].holes)])
-        tried: set[bytes] = set()
+                outline = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
+                fitted[Polygon(outline.exterior)] = rough[polygon].holes
+        add(fitted)
+        tried: set[Polygon] = set()
         for _ in range(_ROUNDS):
-            best = self._different([found[key].polygon for key in best_first(found)], _BREADTH)
-            for one in [found[polygon.wkb] for polygon in best if polygon.wkb not in tried]:
-                tried.add(one.polygon.wkb)
-                others = redrawn(one.polygon, self.seed_px, self.surface.shape)
-                add((other, one.holes) for other in self._agreeing(others, ground))
-        return [found[key] for key in best_first(found)]
+            best = self._different(best_first(found), _BREADTH)
+            for polygon in [one for one in best if one not in tried]:
+                tried.add(polygon)
+                others = redrawn(polygon, self.seed_px, self.surface.shape)
+                add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
+        return [found[polygon] for polygon in best_first(found)]
+
+    def _scored(
+        self, held: Sequence[Held], ground: FloatArray
+    ) -> Iterator[tuple[Held, Figures, float]]:
+        """Outlines that are no scraps, with all their figures and their scores."""
+        some = [one for one in held if one.figures is not None]
+        if not some:
+            return
+        agrees = agreement(ground, self.surface.size_px, [one.inside for one in some])
+        figures = [{**(one.figures or {}), **more} for one, more in zip(some, agrees, strict=True)]
+        scores = trained(self.part).scores(figures).tolist()
+        yield from zip(some, figures, scores, strict=True)
 
     def _earlier(self, ground: FloatArray) -> list[BoolArray]:
         """The best of what is known, also where it does not obey the points."""
         if not self.known:
             self.candidates()  # points correct what is found without them
-        some = [one for one in self.known.values() if one.figures is not None]
-        if not some:
-            return []
-        size = self.surface.size_px
-        scores = trained(self.part).scores(
-            [{**(one.figures or {}), **agreement(ground, size, one.inside)} for one in some]
-        )
-        return [some[at].inside for at in np.argsort(-scores, kind="stable")[:_MENDED]]
+        scored = self._scored(list(self.known.values()), ground)
+        ranked = sorted(((one.inside, score) for one, _, score in scored), key=lambda one: -one[1])
+        return [inside for inside, _ in ranked[:_MENDED]]
 
     def _different(self, ranked: Sequence[Polygon], most: int) -> list[Polygon]:
         """The first outlines that hold different ground: each gets its well drawn sides."""
@@ -197,7 +195,7 @@ class FieldSearch:
         chosen: list[Polygon] = []
         grounds: list[BoolArray] = []
         for polygon in ranked:
-            inside = self.known[polygon.wkb].inside
+            inside = self.known[polygon].inside
             if all(size @ (inside & one) < _ALIKE * (size @ (inside | one)) for one in grounds):
                 chosen.append(polygon)
                 grounds.append(inside)
@@ -215,18 +213,18 @@ class FieldSearch:
         overlap = common / (area + float(size @ ground) - common)
         return [polygons[at] for at in np.argsort(-overlap, kind="stable")[:_SUGGESTED]]
 
-    def _held(self, key: bytes, polygon: Polygon, holes: BoolArray) -> Held:
+    def _held(self, polygon: Polygon, holes: BoolArray) -> Held:
         """What is known of an outline; it is measured once."""
-        if key not in self.known:
+        if polygon not in self.known:
             inside = self.surface.members(ring(polygon))
             figures = measure(self.surface, polygon, inside)
-            self.known[key] = Held(polygon, holes, inside, figures)
-        return self.known[key]
+            self.known[polygon] = Held(polygon, holes, inside, figures)
+        return self.known[polygon]
 
 
-def best_first(found: dict[bytes, Candidate]) -> list[bytes]:
-    """The keys of candidates by score."""
-    return sorted(found, key=lambda key: -found[key].score)
+def best_first(found: Mapping[Polygon, Candidate]) -> list[Polygon]:
+    """The outlines of candidates by score."""
+    return sorted(found, key=lambda polygon: -found[polygon].score)
 
 
 def search_field(

@@ -13,7 +13,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 #: Sides from this length on are drawn on, pixels.
 _LONG_PX = 14.0
@@ -31,10 +33,9 @@ _AREAS = (0.35, 1.6)
 
 def ring(polygon: Polygon) -> FloatArray:
     """Vertices (n, 2) of a polygon's border, the inside to the left in pixel coordinates."""
-    vertices = shapely.get_coordinates(polygon.exterior)[:-1]
-    x, y = vertices.T
-    turned = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0
-    return vertices[::-1] if turned else vertices
+    border = polygon.exterior
+    vertices = shapely.get_coordinates(border)[:-1]
+    return vertices if shapely.is_ccw(border) else vertices[::-1]
 
 
 def on_frame(points: FloatArray, shape: tuple[int, int], near_px: float) -> NDArray[np.bool_]:
@@ -63,18 +64,19 @@ def redrawn(
     sides = _Sides(vertices, shape)
     count, area, length = len(vertices), polygon.area, float(sides.length.sum())
     travelled = np.concatenate([[0.0], np.cumsum(np.tile(sides.length, 2))])
+    i, skip = (one.ravel() for one in np.indices((count, count - 1)))
+    j = (i + skip) % count
+    near = travelled[i + skip] - travelled[i + 1] <= _REPLACED * length
+    tried = (skip >= 2) & near & (sides.drawn[i] | sides.drawn[j])
+    i, j, skip = i[tried], j[tried], skip[tried]
+    onward, met, corner = sides.meeting(i, j)
     rings: list[FloatArray] = []
-    for i in range(count):
-        for skip in range(2, count - 1):
-            if travelled[i + skip] - travelled[i + 1] > _REPLACED * length:
-                break
-            j = (i + skip) % count
-            if not (sides.drawn[i] or sides.drawn[j]):
-                continue
-            kept = vertices[(j + 1 + np.arange(count - skip)) % count]
-            for corner in sides.meeting(i, j):
-                if len(kept) + len(corner) > 2:
-                    rings.append(np.vstack([kept, *corner]))
+    for at in np.flatnonzero(onward | met).tolist():
+        kept = vertices[(j[at] + 1 + np.arange(count - skip[at])) % count]
+        if onward[at] and len(kept) > 2:
+            rings.append(kept)
+        if met[at]:
+            rings.append(np.vstack([kept, corner[at]]))
     if not rings:
         return []
     index = np.repeat(np.arange(len(rings)), [len(one) for one in rings])
@@ -104,33 +106,36 @@ class _Sides:
         self.frame = np.any(on_edge, axis=0)
         self.drawn = (self.length >= _LONG_PX) | self.frame
 
-    def meeting(self, i: int, j: int) -> list[list[FloatArray]]:
-        """Ways from side i to side j: straight on, or by the corner where their lines meet."""
-        ways: list[list[FloatArray]] = []
+    def meeting(self, i: IntArray, j: IntArray) -> tuple[BoolArray, BoolArray, FloatArray]:
+        """Ways from sides i to sides j: straight on, or by the corner where their lines meet.
+
+        Returns
+        -------
+        (bool array, bool array, float array (n, 2))
+            Where it goes straight on; where there is a corner; the corners.
+        """
         u, v = self.direction[i], self.direction[j]
         gap = self.start[j] - self.end[i]
-        cross = float(u[0] * v[1] - u[1] * v[0])
-        if self.drawn[i] and self.drawn[j] and abs(cross) < _SAME_DIRECTION and u @ v > 0:
-            aside = max(abs(u[0] * gap[1] - u[1] * gap[0]), abs(v[0] * gap[1] - v[1] * gap[0]))
-            if aside < _SAME_LINE_PX and gap @ u > 0:
-                ways.append([])
-        if abs(cross) > _PARALLEL:
-            onward = float(gap[0] * v[1] - gap[1] * v[0]) / cross
-            back = float(gap[0] * u[1] - gap[1] * u[0]) / cross
-            corner = self.end[i] + onward * u
-            reach = max(_REACH_PX, _REACH_SHARE * float(self.length[i] + self.length[j]))
-            inside = np.all((corner > -1) & (corner < self.limit + 1))
-            if (
-                inside
-                and max(abs(onward), abs(back)) < reach
-                and self._open(i, -onward)
-                and self._open(j, back)
-            ):
-                ways.append([np.clip(corner, 0, self.limit)])
-        return ways
+        cross = _cross(u, v)
+        across, behind = _cross(gap, v), _cross(gap, u)
+        onward = self.drawn[i] & self.drawn[j] & (np.abs(cross) < _SAME_DIRECTION)
+        onward &= (np.sum(u * v, axis=1) > 0) & (np.sum(gap * u, axis=1) > 0)
+        onward &= np.maximum(np.abs(behind), np.abs(across)) < _SAME_LINE_PX
+        met = np.abs(cross) > _PARALLEL
+        slope = np.where(met, cross, 1.0)
+        ahead, back = across / slope, behind / slope
+        corner = self.end[i] + ahead[:, None] * u
+        reach = np.maximum(_REACH_PX, _REACH_SHARE * (self.length[i] + self.length[j]))
+        met &= np.all((corner > -1) & (corner < self.limit + 1), axis=1)
+        met &= np.maximum(np.abs(ahead), np.abs(back)) < reach
+        met &= self._open(i, -ahead) & self._open(j, back)
+        return onward, met, np.clip(corner, 0, self.limit)
 
-    def _open(self, side: int, within: float) -> bool:
-        """Whether a side may end so far within itself (below zero: be drawn on so far)."""
-        if within < 0:
-            return bool(self.drawn[side])
-        return within <= float(self.length[side])
+    def _open(self, side: IntArray, within: FloatArray) -> BoolArray:
+        """Whether sides may end so far within themselves (below zero: be drawn on so far)."""
+        return np.asarray(np.where(within < 0, self.drawn[side], within <= self.length[side]))
+
+
+def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Cross products of plane vectors (n, 2)."""
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

@@ -113,8 +113,8 @@ class Scene:
     @property
     def is_blank(self) -> bool:
         """Whether all pixels with data have one and the same value, or none has data."""
-        values = self.bands[:, self.valid]
-        return values.size == 0 or bool((values == values[:, :1]).all())
+        row, column = np.unravel_index(np.argmax(self.valid), self.valid.shape)
+        return not any(((band != band[row, column]) & self.valid).any() for band in self.bands)
 
     @property
     def is_colour(self) -> bool:
