@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
     from geofield.schema import Column, Layer
 
-_SINGLE = {"Point": 0, "LineString": 1, "Polygon": 3, "MultiLineString": 5, "MultiPolygon": 6}
+#: Numbers of geometry types, as GEOS has them.
+TYPE_IDS = {"Point": 0, "LineString": 1, "Polygon": 3, "MultiLineString": 5, "MultiPolygon": 6}
 _PART = {"MultiLineString": 1, "MultiPolygon": 3}
 _WHOLE = {"Point": 4, "LineString": 5, "Polygon": 6}
 _NEARLY_FULL = 2**26
@@ -76,19 +77,8 @@ def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:
     geometry = np.asarray(table.geometry.to_numpy(), dtype=object)
     if not len(geometry):
         return geometry
-    wanted = _SINGLE[of.geometry]
-    kind = shapely.get_type_id(geometry)
-    if of.geometry in _PART:
-        single = kind == _PART[of.geometry]
-        if single.any():
-            geometry = geometry.copy()
-            promote = shapely.multilinestrings if wanted == 5 else shapely.multipolygons
-            geometry[single] = promote(geometry[single], indices=np.arange(single.sum()))
-    else:
-        alone = (kind == _WHOLE[of.geometry]) & (shapely.get_num_geometries(geometry) == 1)
-        if alone.any():
-            geometry = geometry.copy()
-            geometry[alone] = shapely.get_geometry(geometry[alone], 0)
+    wanted, kind = TYPE_IDS[of.geometry], shapely.get_type_id(geometry)
+    geometry = promoted(of, geometry)
     wrong = (shapely.get_type_id(geometry) != wanted) | shapely.is_empty(geometry)
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
@@ -104,6 +94,21 @@ def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:
     if wanted in (3, 6):
         geometry = shapely.orient_polygons(geometry)
     return np.asarray(geometry, dtype=object)
+
+
+def promoted(of: Layer, geometry: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Single geometries as multi ones where a layer wants those; single parts out of multi ones."""
+    kind, geometry = shapely.get_type_id(geometry), geometry.copy()
+    if of.geometry in _PART:
+        single = kind == _PART[of.geometry]
+        lines = of.geometry == "MultiLineString"
+        promote = shapely.multilinestrings if lines else shapely.multipolygons
+        if single.any():
+            geometry[single] = promote(geometry[single], indices=np.arange(single.sum()))
+    else:
+        alone = (kind == _WHOLE[of.geometry]) & (shapely.get_num_geometries(geometry) == 1)
+        geometry[alone] = shapely.get_geometry(geometry[alone], 0)
+    return geometry
 
 
 def arrow_type(column: Column) -> Any:

@@ -25,16 +25,12 @@ from geofield.model.dataset import Dataset
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: Licences by the words a source gives them, lower case, to the document they mean.
+#: Licences by the words a source gives them, lower case, hyphens for spaces, to the document.
 LICENCES = {
     "cc0": "https://creativecommons.org/publicdomain/zero/1.0/",
-    "cc0 1.0": "https://creativecommons.org/publicdomain/zero/1.0/",
     "cc0-1.0": "https://creativecommons.org/publicdomain/zero/1.0/",
-    "cc by 4.0": "https://creativecommons.org/licenses/by/4.0/",
     "cc-by-4.0": "https://creativecommons.org/licenses/by/4.0/",
-    "cc by-sa 4.0": "https://creativecommons.org/licenses/by-sa/4.0/",
     "cc-by-sa-4.0": "https://creativecommons.org/licenses/by-sa/4.0/",
-    "odbl 1.0": "https://opendatacommons.org/licenses/odbl/1-0/",
     "odbl-1.0": "https://opendatacommons.org/licenses/odbl/1-0/",
     "dl-de-zero-2.0": "https://www.govdata.de/dl-de/zero-2-0",
     "dl-de-by-2.0": "https://www.govdata.de/dl-de/by-2-0",
@@ -295,7 +291,7 @@ def licence_iri(licence: str) -> str | None:
     text = licence.strip()
     if text.startswith(("http://", "https://")) and not NOT_IN_IRI.search(text):
         return text
-    return LICENCES.get(text.lower())
+    return LICENCES.get(text.lower().replace(" ", "-"))
 
 
 def _json(value: Any) -> str:

@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, ground_areas_m2, northing_first, reproject
+from geofield.crs import LONLAT, ground_areas_m2, reproject
 from geofield.errors import FormatError
 from geofield.formats.rdf.layers import (
     CANDIDATE,
@@ -35,6 +35,7 @@ from geofield.formats.rdf.triples import (
     text_term,
     typed,
 )
+from geofield.formats.rdf.wkt import in_order
 from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
@@ -113,14 +114,6 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
     layer = layer_map(schema.TRACK_POINTS.name)
     iris = row_iris(layer, frame, names)
     places = [f"{iri}/geometry" for iri in iris]
-    segments = {
-        key: ox.NamedNode(f"{names.plan}/track/{key[0]}/segment/{key[1]}")
-        for key in set(zip(frame["track_no"].tolist(), frame["segment_no"].tolist(), strict=True))
-    }
-    on_segment = [
-        segments[key]
-        for key in zip(frame["track_no"].tolist(), frame["segment_no"].tolist(), strict=True)
-    ]
     positions = zip(frame["lon"].tolist(), frame["lat"].tolist(), strict=True)
     wkt = [
         f"<{CRS84}> POINT ({lon:.{POINT_DECIMALS}f} {lat:.{POINT_DECIMALS}f})"
@@ -133,7 +126,7 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
             [
                 (node("rdf:type"), [node("gf:TrackPoint")] * count),
                 (node("gf:pointNo"), typed(map(str, frame["point_no"].tolist()), "xsd:integer")),
-                (node("gf:onSegment"), on_segment),
+                (node("gf:onSegment"), named(row_iris(layer_map("segments"), frame, names))),
                 (node("geo:hasDefaultGeometry"), places_of),
             ],
         ),
@@ -237,12 +230,9 @@ def _geometries(
     decimals = LONLAT_DECIMALS if identifier else -1
     nodes = [_geometry_nodes(default, lonlat, CRS84, decimals, accuracy_m)]
     if identifier:
-        swapped = geometry
-        if northing_first(crs):
-            swapped = shapely.transform(geometry, lambda c: c[:, ::-1])
         code = identifier.rpartition("/")[2]
         metric = [f"{iri}/EPSG-{code}" for iri in default]
-        nodes.append(_geometry_nodes(metric, swapped, identifier, -1, accuracy_m))
+        nodes.append(_geometry_nodes(metric, in_order(geometry, crs), identifier, -1, accuracy_m))
     every = list(zip(*(each.subjects for each in nodes), strict=True))
     return nodes, [
         (node("geo:hasDefaultGeometry"), nodes[0].subjects),

@@ -15,6 +15,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
+from geofield.formats.arrow import TYPE_IDS, promoted
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
 from geofield.formats.rdf.graph import Graph
@@ -291,24 +292,13 @@ class _Rows:
 
     def promoted(self, geometry: Any) -> Any:
         """Geometries of the layer's type: multi ones from single ones, and back."""
-        wanted = self.layer.layer.geometry
-        multi: dict[str, Any] = {
-            "MultiLineString": shapely.multilinestrings,
-            "MultiPolygon": shapely.multipolygons,
-        }
-        single = getattr(shapely.GeometryType, wanted.removeprefix("Multi").upper())
-        for index in np.flatnonzero(shapely.get_type_id(geometry) != single).tolist():
-            kind, shape = geometry[index].geom_type, geometry[index]
-            if kind == f"Multi{wanted}" and len(shape.geoms) == 1:
-                geometry[index] = shape.geoms[0]
-            elif kind != wanted:
-                raise FormatError(
-                    f"<{self.subjects[index]}> is a {kind}; the layer {self.layer.layer.name!r} "
-                    f"holds geometries of type {wanted}."
-                )
-        if wanted in multi:
-            for index in np.flatnonzero(shapely.get_type_id(geometry) == single).tolist():
-                geometry[index] = multi[wanted]([geometry[index]])
+        of = self.layer.layer
+        geometry = promoted(of, geometry)
+        for index in np.flatnonzero(shapely.get_type_id(geometry) != TYPE_IDS[of.geometry])[:1]:
+            raise FormatError(
+                f"<{self.subjects[index]}> is a {geometry[index].geom_type}; the layer "
+                f"{of.name!r} holds geometries of type {of.geometry}."
+            )
         return geometry
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pyproj import CRS, Transformer
+from pyproj import CRS
 from shapely.errors import ShapelyError
 
-from geofield.crs import northing_first, transformer
+from geofield.crs import northing_first, reproject
 from geofield.errors import FormatError
 from geofield.formats.rdf.namespaces import CRS84, crs_of_iri
 
@@ -60,13 +60,14 @@ def geometry_of(text: str, subject: str) -> tuple[Any, CRS]:
         raise FormatError(f"<{subject}>: {error.message}", hint=error.hint) from error
     if not np.isfinite(shapely.get_coordinates(geometry)).all():
         raise FormatError(f"<{subject}>: a coordinate is not a finite number.")
+    return in_order(geometry, crs), crs
+
+
+def in_order(geometry: Any, crs: CRS) -> Any:
+    """Geometries between geofield's order of axes and the authority's, either way."""
     if northing_first(crs):
-        geometry = shapely.transform(geometry, lambda c: c[:, ::-1])
-    return geometry, crs
-
-
-def _with(project: Transformer) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    return lambda c: np.column_stack(project.transform(c[:, 0], c[:, 1]))
+        return shapely.transform(geometry, lambda xy: xy[:, ::-1])
+    return geometry
 
 
 def geometries_of(
@@ -91,15 +92,9 @@ def geometries_of(
                 [geometry_of(t, subjects[r])[0] for t, r in zip(known, rows, strict=True)]
             )
             crs = known_crs(iri)
-        elif northing_first(crs):
-            shapes = shapely.transform(shapes, lambda c: c[:, ::-1])
-        if crs != target:
-            project = _with(transformer(crs, target))
-            if (shapely.get_type_id(shapes) == shapely.GeometryType.POINT).all():
-                shapes = np.asarray(shapely.points(project(shapely.get_coordinates(shapes))))
-            else:
-                shapes = shapely.transform(shapes, project)
-        result[rows] = shapes
+        else:
+            shapes = in_order(shapes, crs)
+        result[rows] = reproject(shapes, crs, target)
     lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
     for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
         raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")
