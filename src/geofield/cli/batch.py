@@ -11,7 +11,7 @@ from geofield.cli.claiming import claim_folder
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
-from geofield.cli.options import section_options, section_values, settings_option
+from geofield.cli.options import acknowledge_option, section_values, stage_options
 from geofield.cli.place_options import place_options, places_of
 from geofield.errors import FieldError, GeofieldError
 
@@ -82,19 +82,10 @@ Examples (on the project's own sample):
     show_default=True,
     help="Of a worker, megabytes.",
 )
-@click.option(
-    "--acknowledge-terms",
-    is_flag=True,
-    help="You have permission to derive geodata, though the source's terms forbid it.",
-)
+@acknowledge_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 @place_options
-@settings_option
-@section_options("fetch", only=("allow",))
-@section_options("imagery")
-@section_options("field")
-@section_options("obstacles")
-@section_options("tracks")
+@stage_options("imagery", "field", "obstacles", "tracks")
 def batch(
     places: Path,
     imagery: str | None,

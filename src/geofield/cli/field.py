@@ -9,13 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import (
-    name_option,
-    point_options,
-    section_options,
-    section_values,
-    settings_option,
-)
+from geofield.cli.options import name_option, point_options, section_values, stage_options
 from geofield.cli.parcels import boundary_options, own_parcel
 from geofield.cli.refresh import say_outdated
 
@@ -78,10 +72,7 @@ Examples (on the project's own sample):
 @name_option
 @boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
-@settings_option
-@section_options("fetch", only=("allow",))
-@section_options("imagery")
-@section_options("field")
+@stage_options("imagery", "field")
 def field(
     imagery: str,
     lat: float,

@@ -9,7 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import section_options, section_values, settings_option
+from geofield.cli.options import section_values, stage_options
 from geofield.cli.refresh import say_outdated
 
 
@@ -34,9 +34,7 @@ Examples (on the project's own sample):
 )
 @click.option("--overwrite", is_flag=True, help="Replace another file than the one that was read.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
-@settings_option
-@section_options("fetch", only=("allow",))
-@section_options("obstacles")
+@stage_options("obstacles")
 def obstacles(
     imagery: str,
     plan_file: Path,

@@ -1,6 +1,6 @@
 """Options that commands share, and options made from a section of the settings.
 
-A setting is described once, in `geofield.settings`; :func:`section_options` turns a
+A setting is described once, in `geofield.settings`; :func:`stage_options` turns a
 section into click options with the same types, defaults and help.
 """
 
@@ -63,6 +63,15 @@ def point_options(command: Command) -> Command:
     )(command)
 
 
+def acknowledge_option(command: Command) -> Command:
+    """Add ``--acknowledge-terms``."""
+    return click.option(
+        "--acknowledge-terms",
+        is_flag=True,
+        help="You have permission to derive geodata, though the source's terms forbid it.",
+    )(command)
+
+
 def name_option(command: Command) -> Command:
     """Add ``--name``."""
     return click.option("--name", help="The field's name; its place when not given.")(command)
@@ -87,8 +96,8 @@ def settings_option(command: Command) -> Command:
     )(command)
 
 
-def section_options(section: Stage, *, only: tuple[str, ...] = ()) -> Callable[[Command], Command]:
-    """Add an option for each setting of a section, or for some of them.
+def stage_options(*sections: Stage, imagery: bool = True) -> Callable[[Command], Command]:
+    """Add ``--settings FILE``, ``--allow`` where pictures are read, and all settings of stages.
 
     ``tracks.spacing_m`` becomes ``--spacing``; its value arrives as ``tracks__spacing_m`` and
     is None when not given, so that file and environment keep their say.
@@ -96,18 +105,19 @@ def section_options(section: Stage, *, only: tuple[str, ...] = ()) -> Callable[[
     """
 
     def add(command: Command) -> Command:
-        model = Settings.model_fields[section].annotation
-        for name, field in reversed(model.model_fields.items()):  # type: ignore[union-attr]
-            if not only or name in only:
-                names, arguments = option_of(section, name, field)
-                command = click.option(*names, **arguments)(command)
-        return command
+        for section in reversed(("fetch", *sections) if imagery else sections):
+            model: Any = Settings.model_fields[section].annotation
+            for name, field in reversed(model.model_fields.items()):
+                if section != "fetch" or name == "allow":
+                    names, arguments = option_of(section, name, field)
+                    command = click.option(*names, **arguments)(command)
+        return settings_option(command)
 
     return add
 
 
 def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The values of :func:`section_options`, by section; those not given are left out."""
+    """The values of :func:`stage_options`, by section; those not given are left out."""
     sections: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
         section, separator, name = key.partition(SEPARATOR)

@@ -10,11 +10,11 @@ import click
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
+    acknowledge_option,
     name_option,
     point_options,
-    section_options,
     section_values,
-    settings_option,
+    stage_options,
 )
 from geofield.cli.parcels import boundary_options, own_parcel
 from geofield.cli.refresh import say_outdated
@@ -49,20 +49,11 @@ Examples (on the project's own sample):
     help="Replace earlier products there; reviewed obstacles and a moved outline are kept.",
 )
 @click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
-@click.option(
-    "--acknowledge-terms",
-    is_flag=True,
-    help="You have permission to derive geodata, though the source's terms forbid it.",
-)
+@acknowledge_option
 @name_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON on stdout.")
 @boundary_options
-@settings_option
-@section_options("fetch", only=("allow",))
-@section_options("imagery")
-@section_options("field")
-@section_options("obstacles")
-@section_options("tracks")
+@stage_options("imagery", "field", "obstacles", "tracks")
 @click.option(
     "--format", "export__formats", multiple=True, help="Format to write; repeat for several."
 )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar
-from geofield.cli.options import Degrees, section_options, section_values, settings_option
+from geofield.cli.options import Degrees, acknowledge_option, section_values, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
@@ -87,11 +87,7 @@ Examples (the first one on the project's own sample):
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder of the tile caches.",
 )
-@click.option(
-    "--acknowledge-terms",
-    is_flag=True,
-    help="You have permission to derive geodata, though the source's terms forbid it.",
-)
+@acknowledge_option
 @click.option(
     "-o",
     "--output",
@@ -101,8 +97,7 @@ Examples (the first one on the project's own sample):
 )
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was made as JSON on stdout.")
-@settings_option
-@section_options("fetch", only=("allow",))
+@stage_options()
 def tiles(
     source: str,
     lat: float | None,

@@ -10,7 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import name_option, section_options, section_values, settings_option
+from geofield.cli.options import name_option, section_values, stage_options
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ Examples (the first two on the project's own sample):
 @name_option
 @click.option("--overwrite", is_flag=True, help="Replace files that are there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
-@settings_option
-@section_options("tracks")
+@stage_options("tracks", imagery=False)
 def tracks(
     file: Path,
     output: Path,

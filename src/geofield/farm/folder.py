@@ -179,16 +179,6 @@ def _geo(layer: str, bounds: Any) -> dict[str, Any]:
     return {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
 
 
-def read_layer(
-    store: Store, layer: str, chunks: Sequence[int], columns: Sequence[str] | None = None
-) -> pa.Table | None:
-    """A layer of some chunks, in order; None where none of them has it."""
-    import pyarrow as pa
-
-    parts = [part for chunk in chunks if (part := read_part(store, layer, chunk, columns))]
-    return pa.concat_tables(parts, promote_options="permissive") if parts else None
-
-
 def read_part(
     store: Store, layer: str, chunk: int, columns: Sequence[str] | None = None
 ) -> pa.Table | None:

@@ -21,7 +21,6 @@ from geofield.formats.qgis.symbols import (
     marker,
 )
 
-_NONE = "0,0,0,0"
 _BLACK = "0,0,0,190"
 _WHITE = "255,255,255,255"
 _DARK = "20,20,20,255"

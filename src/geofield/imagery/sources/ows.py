@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
 from xml.etree import ElementTree as ET
@@ -12,9 +13,56 @@ from pyproj.exceptions import CRSError as ProjCRSError
 
 from geofield.errors import FormatError, ImageryError
 from geofield.imagery.client import Client
+from geofield.imagery.reach import OWN_FOLDER, Reach
+from geofield.imagery.terms import Terms
 from geofield.strangers import parse_xml
 
 _XLINK = "{http://www.w3.org/1999/xlink}href"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service:
+    """A WMS or WMTS as a user or the catalogue names it.
+
+    Attributes
+    ----------
+    address : str
+        Of the capabilities document or of the service; a layer (and a style) may stand in it as
+        ``layer=NAME`` (WMS: ``layers=NAME``, ``styles=NAME``).
+    client : Client or None
+        None offline.
+    name, layer : str
+        For people, and as the service calls it; empty for what the document says.
+    terms : Terms, optional
+        Better known than the document's own words.
+    key, key_parameter : str
+        Added to each request as ``key_parameter=key``.
+    reach : Reach
+        Hosts that the document may lead to besides its own.
+    """
+
+    address: str = field(repr=False)
+    client: Client | None
+    name: str = ""
+    layer: str = ""
+    terms: Terms | None = None
+    key: str = field(default="", repr=False)
+    key_parameter: str = ""
+    reach: Reach = OWN_FOLDER
+
+    def capabilities(self, **query: str) -> ET.Element:
+        """The document, asked for with a query where the address is one of the web."""
+        document = self.address
+        if document.startswith(("http://", "https://")):
+            if self.key and self.key_parameter:
+                query[self.key_parameter] = self.key
+            document = with_query(document, **query) if query else document
+        return read_document(document, self.client)
+
+    def require(self, target: str) -> None:
+        """Refuse an address of the document that is none of the web, or of a foreign host."""
+        require_web_address(target, self.address)
+        self.reach.of(self.address).require(target, plain_address(self.address))
 
 
 def read_document(address: str, client: Client | None) -> ET.Element:

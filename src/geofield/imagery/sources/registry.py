@@ -15,7 +15,7 @@ from geofield.imagery.sources.base import PictureSource, Source
 from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
 from geofield.imagery.sources.google import GoogleStaticSource
 from geofield.imagery.sources.mbtiles import MBTilesSource
-from geofield.imagery.sources.ows import query_value
+from geofield.imagery.sources.ows import Service, query_value
 from geofield.imagery.sources.wms import open_wms
 from geofield.imagery.sources.wmts import open_wmts
 from geofield.imagery.sources.xyz import XYZSource
@@ -128,30 +128,18 @@ def open_entry(
     if kind == "mbtiles":
         known = entry.terms if entry.terms.attribution else None
         return MBTilesSource.open(entry.address, known)
-    given = entry.terms if entry.terms != _OWN else None
-    if kind == "wmts":
-        return open_wmts(
-            entry.address,
-            client,
+    if kind in ("wmts", "wms"):
+        service = Service(
+            address=entry.address,
+            client=client,
             name=name,
             layer=layer or entry.layer,
-            terms=given,
+            terms=entry.terms if entry.terms != _OWN else None,
             key=key,
             key_parameter=entry.key_parameter,
             reach=Reach(tuple(allow)),
         )
-    if kind == "wms":
-        return open_wms(
-            entry.address,
-            client,
-            name=name,
-            layer=layer or entry.layer,
-            terms=given,
-            key=key,
-            key_parameter=entry.key_parameter,
-            reach=Reach(tuple(allow)),
-            point=point,
-        )
+        return open_wmts(service) if kind == "wmts" else open_wms(service, point)
     return PictureSource(name, entry.terms, entry.address, entry.bands, entry.date)
 
 

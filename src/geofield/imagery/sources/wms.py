@@ -9,18 +9,15 @@ from pyproj import CRS
 
 from geofield.crs import WEB_MERCATOR, is_metric, metric_crs, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.client import Client
-from geofield.imagery.reach import Reach
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
+    Service,
     children,
     choose_layer,
     link,
     parse_ogc_crs,
     plain_address,
     query_value,
-    read_document,
-    require_web_address,
     text,
     with_query,
 )
@@ -91,19 +88,7 @@ class WMSSource:
         return Request(with_query(self.service, **values))
 
 
-def open_wms(
-    address: str,
-    client: Client | None,
-    *,
-    name: str = "",
-    layer: str = "",
-    terms: Terms | None = None,
-    key: str = "",
-    key_parameter: str = "",
-    point: tuple[float, float] | None = None,
-    service: str = "",
-    reach: Reach | None = None,
-) -> WMSSource:
+def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSSource:
     """A WMS source from the address or path of its capabilities.
 
     Web Mercator is asked for where the service knows it, so that the windows are those of
@@ -111,58 +96,42 @@ def open_wms(
 
     Parameters
     ----------
-    address : str
-        Of the service; ``layers=NAME`` in it chooses the layer.
+    service : Service
     point : (lon, lat), optional
         Where the picture will be, for the choice of the CRS.
-    service : str
-        Where maps are asked for, when the document's own address is wrong.
-
-    reach : Reach, optional
-        Hosts that the document may lead to besides its own.
 
     Raises
     ------
     ImageryError
     """
-    wanted = layer or query_value(address, "layers")
-    document = address
-    if address.startswith(("http://", "https://")):
-        version = query_value(address, "version") or "1.3.0"
-        document = with_query(address, SERVICE="WMS", REQUEST="GetCapabilities", VERSION=version)
-        if key and key_parameter:
-            document = with_query(document, **{key_parameter: key})
-    root = read_document(document, client)
+    address = service.address
+    version = query_value(address, "version") or "1.3.0"
+    root = service.capabilities(SERVICE="WMS", REQUEST="GetCapabilities", VERSION=version)
     named = _layers(children(root, "Capability", "Layer"), [])
+    wanted = service.layer or query_value(address, "layers")
     chosen = choose_layer(sorted(named), wanted, address)
     names, _ = named[chosen]
     crs_name, pyramid = _pyramid(names, point, address)
     get_map = children(root, "Capability", "Request", "GetMap")
-    target = service
-    if get_map and not target:
+    target, offered = address, []
+    if get_map:
         links = children(get_map[0], "DCPType", "HTTP", "Get", "OnlineResource")
-        target = link(links[0]) if links else ""
-    offered = (
-        [(each.text or "").strip() for each in children(get_map[0], "Format")] if get_map else []
-    )
+        target = (link(links[0]) if links else "") or address
+        offered = [(each.text or "").strip() for each in children(get_map[0], "Format")]
     form = next((f for f in _FORMATS if f in offered), "image/png")
-    target = target or address
-    require_web_address(target, address)
-    if not service:
-        (reach or Reach()).of(address).require(target, plain_address(address))
-    own = with_query(target, SERVICE="WMS")
+    service.require(target)
     return WMSSource(
-        name=name or chosen,
-        service=own,
+        name=service.name or chosen,
+        service=with_query(target, SERVICE="WMS"),
         layer=chosen,
         pyramid=pyramid,
-        terms=terms or _terms(root, named[chosen][1]),
+        terms=service.terms or _terms(root, named[chosen][1]),
         version=root.get("version", "1.3.0"),
         crs_name=crs_name,
         style=query_value(address, "styles"),
         form=form,
-        key=key,
-        key_parameter=key_parameter,
+        key=service.key,
+        key_parameter=service.key_parameter,
     )
 
 

@@ -11,18 +11,15 @@ from pyproj import CRS
 
 from geofield.crs import WEB_MERCATOR, is_metric, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.client import Client
-from geofield.imagery.reach import Reach
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
+    Service,
     children,
     choose_layer,
     link,
     parse_ogc_crs,
     plain_address,
     query_value,
-    read_document,
-    require_web_address,
     text,
     with_query,
 )
@@ -74,63 +71,35 @@ class WMTSSource:
         return Request(address)
 
 
-def open_wmts(
-    address: str,
-    client: Client | None,
-    *,
-    name: str = "",
-    layer: str = "",
-    terms: Terms | None = None,
-    key: str = "",
-    key_parameter: str = "",
-    reach: Reach | None = None,
-) -> WMTSSource:
+def open_wmts(service: Service) -> WMTSSource:
     """A WMTS source from the address or path of its capabilities.
-
-    Parameters
-    ----------
-    address : str
-        Of the capabilities document, or of a key-value service.
-    client : Client or None
-    name, layer : str
-        The layer may also stand in the address as ``layer=NAME``.
-    terms : Terms, optional
-        Better known than the document's own words.
-    key, key_parameter : str
-        Added to each request as ``key_parameter=key``.
-    reach : Reach, optional
-        Hosts that the document may lead to besides its own.
 
     Raises
     ------
     ImageryError
         No such layer; no tile matrix set in a CRS of use.
     """
-    wanted = layer or query_value(address, "layer")
-    document = address
-    if address.startswith(("http://", "https://")):
-        if not address.partition("?")[0].lower().endswith(".xml"):
-            document = with_query(address, SERVICE="WMTS", REQUEST="GetCapabilities")
-        if key and key_parameter:
-            document = with_query(document, **{key_parameter: key})
-    root = read_document(document, client)
+    address = service.address
+    whole = address.partition("?")[0].lower().endswith(".xml")
+    query = {} if whole else {"SERVICE": "WMTS", "REQUEST": "GetCapabilities"}
+    root = service.capabilities(**query)
     layers = {text(each, "Identifier"): each for each in children(root, "Contents", "Layer")}
+    wanted = service.layer or query_value(address, "layer")
     chosen = choose_layer(sorted(layers), wanted, address)
     element = layers[chosen]
     sets = {text(each, "Identifier"): each for each in children(root, "Contents", "TileMatrixSet")}
     links = [text(each, "TileMatrixSet") for each in children(element, "TileMatrixSetLink")]
     set_id, pyramid = _best_set([(i, sets[i]) for i in links if i in sets], address)
     template = _template(root, element, set_id, address)
-    require_web_address(template, address)
-    (reach or Reach()).of(address).require(template, plain_address(address))
+    service.require(template)
     return WMTSSource(
-        name=name or chosen,
+        name=service.name or chosen,
         layer=chosen,
         pyramid=pyramid,
         template=template,
-        terms=terms or _terms(root),
-        key=key,
-        key_parameter=key_parameter,
+        terms=service.terms or _terms(root),
+        key=service.key,
+        key_parameter=service.key_parameter,
     )
 
 
