@@ -29,11 +29,11 @@ from geofield.formats.rdf.triples import (
     Column,
     Group,
     Nodes,
+    Typed,
     date_term,
     named,
     term,
     text_term,
-    typed,
 )
 from geofield.formats.rdf.wkt import in_order
 from geofield.model.obstacles import active
@@ -114,6 +114,10 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
     layer = layer_map(schema.TRACK_POINTS.name)
     iris = row_iris(layer, frame, names)
     places = [f"{iri}/geometry" for iri in iris]
+    keys = list(zip(frame["track_no"].tolist(), frame["segment_no"].tolist(), strict=True))
+    segments = {
+        key: ox.NamedNode(f"{names.plan}/track/{key[0]}/segment/{key[1]}") for key in set(keys)
+    }
     positions = zip(frame["lon"].tolist(), frame["lat"].tolist(), strict=True)
     wkt = [
         f"<{CRS84}> POINT ({lon:.{POINT_DECIMALS}f} {lat:.{POINT_DECIMALS}f})"
@@ -125,8 +129,8 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
             named(iris),
             [
                 (node("rdf:type"), [node("gf:TrackPoint")] * count),
-                (node("gf:pointNo"), typed(map(str, frame["point_no"].tolist()), "xsd:integer")),
-                (node("gf:onSegment"), named(row_iris(layer_map("segments"), frame, names))),
+                (node("gf:pointNo"), Typed(map(str, frame["point_no"].tolist()), "xsd:integer")),
+                (node("gf:onSegment"), list(map(segments.__getitem__, keys))),
                 (node("geo:hasDefaultGeometry"), places_of),
             ],
         ),
@@ -134,7 +138,7 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
             places_of,
             [
                 (node("rdf:type"), [node("sf:Point")] * count),
-                (node("geo:asWKT"), typed(wkt, "geo:wktLiteral")),
+                (node("geo:asWKT"), Typed(wkt, "geo:wktLiteral")),
             ],
         ),
     )
@@ -170,9 +174,9 @@ def _column_terms(
                     f"Layer {layer!r}, row {row}: {column.name} is infinite.",
                     hint="Correct the value, or leave it empty.",
                 )
-        return [None if value is None else term(float(value)) for value in values]
+        return Typed([None if v is None else repr(float(v)) for v in values], "xsd:double")
     if column.type == "int":
-        return typed([None if v is None else str(int(v)) for v in values], "xsd:integer")
+        return Typed([None if v is None else str(int(v)) for v in values], "xsd:integer")
     texts = [None if value is None else str(value) for value in values]
     if name in CODE_LISTS and all(t in column.values for t in texts if t is not None):
         return [None if t is None else node(value_iri(t)) for t in texts]
@@ -247,7 +251,7 @@ def _geometry_nodes(
     kinds = [node(f"sf:{shape.geom_type}") for shape in geometry]
     columns: list[Column] = [
         (node("rdf:type"), [(kind, node("geo:Geometry")) for kind in kinds]),
-        (node("geo:asWKT"), typed([f"<{crs}> {text}" for text in wkt], "geo:wktLiteral")),
+        (node("geo:asWKT"), Typed([f"<{crs}> {text}" for text in wkt], "geo:wktLiteral")),
     ]
     if accuracy_m is not None:
         accuracy = term(float(accuracy_m))

@@ -26,7 +26,8 @@ from geofield.formats.rdf.namespaces import (
     expand,
 )
 from geofield.formats.rdf.resources import context
-from geofield.formats.rdf.triples import Group, Nodes
+from geofield.formats.rdf.triples import Group, Nodes, Typed
+from geofield.formats.rdf.triples import terms as terms_of
 
 #: Short names by predicate and kind of value.
 Terms = dict[tuple[str, str], str]
@@ -64,15 +65,14 @@ def _lines(nodes: Nodes, terms: Terms) -> list[str]:
 
 def _told(iri: str, values: Sequence[Any], terms: Terms) -> list[str]:
     """Of each row the predicate's short name with its value or values; empty for none."""
-    if len(types := set(map(type, values))) == 1 and not types & {tuple, type(None)}:
-        kinds = {_kind_of(values[0])} if ox.NamedNode in types else set(map(_kind_of, values))
-        if len(kinds) == 1:
-            # All alike: one look-up for the column.
-            name, before, after = _frame(iri, kinds.pop(), terms)
-            head = f'"{name}": {before}'
-            if ox.NamedNode in types:
-                return [f"{head}{_short(iri, each.value)}{after}" for each in values]
-            return [f"{head}{_quoted(each.value)}{after}" for each in values]
+    # All alike: one look-up for the column.
+    if isinstance(values, Typed) and None not in values:
+        name, before, after = _frame(iri, values.datatype.value, terms)
+        return [f'"{name}": {before}{_quoted(text)}{after}' for text in values]
+    values = terms_of(values)
+    if set(map(type, values)) == {ox.NamedNode}:
+        name, before, after = _frame(iri, "@id", terms)
+        return [f'"{name}": {before}{_short(iri, each.value)}{after}' for each in values]
     return ["" if value is None else _entry(iri, value, terms) for value in values]
 
 

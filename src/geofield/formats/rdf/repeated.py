@@ -16,7 +16,7 @@ import pyoxigraph as ox
 
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.guard import MAX_PLAIN_BYTES
-from geofield.formats.rdf.triples import Group, Nodes, triples
+from geofield.formats.rdf.triples import Group, Nodes, Typed, triples
 
 #: Fewer nodes than this are not worth it.
 _MANY: Final = 200
@@ -33,6 +33,7 @@ _PLAIN: Final = re.compile(
 )
 #: A term that stands for a value; the number is that of its column.
 _PLACE: Final = "urn:x-place:"
+_SEVERAL: Final = {tuple, type(None)}
 _QUOTES: Final = {'"': "&quot;", "'": "&apos;"}
 
 
@@ -60,28 +61,29 @@ def _one(group: Group) -> tuple[Group, list[list[str]]]:
     """The first row with places for its values, and the values; all rows where one differs."""
     columns: list[list[str]] = []
 
-    def place(terms: Sequence[Any]) -> Any:
-        kinds: set[Any] = set(map(type, terms))
-        if kinds == {ox.Literal}:
-            kinds = {each.datatype for each in terms}
-        if len(kinds) > 1 or kinds & {tuple, type(None)}:
+    def place(values: Sequence[Any]) -> Any:
+        own = isinstance(values, Typed)
+        kinds: set[Any] = {values.datatype} if isinstance(values, Typed) else set(map(type, values))
+        if kinds & _SEVERAL or (own and None in values):
             raise ValueError(kinds)
-        if terms[0] == terms[-1] and len(set(terms)) == 1:
-            return terms[0]
-        columns.append(escape("\0".join(each.value for each in terms), _QUOTES).split("\0"))
-        name = f"{_PLACE}{len(columns) - 1}."
-        return (
-            ox.NamedNode(name)
-            if kinds == {ox.NamedNode}
-            else ox.Literal(name, datatype=kinds.pop())
-        )
+        if kinds == {ox.Literal}:
+            kinds = {each.datatype for each in values}
+        texts: Sequence[str] = values if own else [each.value for each in values]
+        (kind,) = kinds
+        alike = texts[0] == texts[-1] and len(set(texts)) == 1
+        if not alike:
+            columns.append(escape("\0".join(texts), _QUOTES).split("\0"))
+        text = texts[0] if alike else f"{_PLACE}{len(columns) - 1}."
+        return ox.NamedNode(text) if kind is ox.NamedNode else ox.Literal(text, datatype=kind)
 
     try:
         one = [
-            Nodes([place(each.subjects)], [(name, [place(terms)]) for name, terms in each.columns])
+            Nodes(
+                [place(each.subjects)], [(name, [place(values)]) for name, values in each.columns]
+            )
             for each in group
         ]
-    except ValueError:
+    except ValueError:  # terms of several kinds in one column, too
         return group, []
     return tuple(one), columns
 

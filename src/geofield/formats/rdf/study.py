@@ -45,7 +45,7 @@ from geofield.formats.rdf.namespaces import (
     expand,
     node,
 )
-from geofield.formats.rdf.triples import Column, Group, Nodes, named, typed
+from geofield.formats.rdf.triples import Column, Group, Nodes, Typed, named
 
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
@@ -126,8 +126,8 @@ class StudyDescription(Description):
         columns: list[Column] = [
             (node("rdf:type"), [node(GML + "point")] * len(frame)),
             *_study_columns(rounded, STUDY_POINT_TERMS),
-            (node(GML + "pos"), typed([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
-            (node("gf:segmentNo"), typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
+            (node(GML + "pos"), Typed([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
+            (node("gf:segmentNo"), Typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
         points = named(iris)
         yield _members(STUDY_TRAJECTORY, points)
@@ -146,5 +146,5 @@ def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column
         texts: list[str | None] = list(map(repr, values))
         for row in np.flatnonzero(missing).tolist():
             texts[row] = None
-        result.append((node(predicate), typed(texts, datatype)))
+        result.append((node(predicate), Typed(texts, datatype)))
     return result

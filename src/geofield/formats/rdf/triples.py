@@ -38,11 +38,33 @@ class Nodes:
     columns: Sequence[Column]
 
 
+class Typed(list[Any]):
+    """Texts of one datatype (a prefixed name or IRI), as literals when those are asked for."""
+
+    __slots__ = ("datatype",)
+
+    def __init__(self, texts: Iterable[str | None], datatype: str) -> None:
+        super().__init__(texts)
+        self.datatype = node(datatype)
+
+    def literals(self) -> list[ox.Literal | None]:
+        """The terms; None stays none."""
+        kind = self.datatype
+        return [None if text is None else ox.Literal(text, datatype=kind) for text in self]
+
+
+def terms(values: Sequence[Value]) -> Sequence[Value]:
+    """The terms of a column."""
+    return values.literals() if isinstance(values, Typed) else values
+
+
 def triples(groups: Iterable[Group]) -> Iterator[ox.Triple]:
     """The triples of groups, row by row: a feature, then its geometries, then the next."""
     triple = ox.Triple
     for group in groups:
-        columns = [(nodes.subjects, *column) for nodes in group for column in nodes.columns]
+        columns = [
+            (each.subjects, name, terms(values)) for each in group for name, values in each.columns
+        ]
         if not any(_MANY_OR_NONE & set(map(type, values)) for *_, values in columns):
             # One value in every row: no step of Python for each.
             made = (map(triple, s, repeat(p), values) for s, p, values in columns)
@@ -96,12 +118,6 @@ def date_term(text: str) -> ox.Literal:
 def xml_text(text: str) -> str:
     """A text for an XML element, without the characters that XML cannot hold."""
     return escape(_NOT_IN_XML.sub("\ufffd", text), {"\r": "&#13;"})
-
-
-def typed(texts: Iterable[str | None], datatype: str) -> list[ox.Literal | None]:
-    """Texts as literals of a datatype (a prefixed name or IRI)."""
-    kind = node(datatype)
-    return [None if text is None else ox.Literal(text, datatype=kind) for text in texts]
 
 
 def named(iris: Iterable[str | None]) -> list[Any]:
