@@ -177,7 +177,7 @@ class _Canvas:
             strokes = (
                 [points.ravel().tolist()]
                 if dash is None
-                else [[*a, *b] for a, b in _dashes(points, *(n * _OVERSAMPLING for n in dash))]
+                else _dashes(points, *(n * _OVERSAMPLING for n in dash))
             )
             # Dark below, so that a light line shows on light ground, too.
             for stroke in strokes:
@@ -201,8 +201,8 @@ class _Canvas:
             if dash is None:
                 self.draw.line(flat, fill=_CASING, width=round(width * 2), joint="curve")
             if dash is not None:
-                for a, b in _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING):
-                    self.draw.line([*a, *b], fill=colour, width=round(width))
+                for piece in _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING):
+                    self.draw.line(piece, fill=colour, width=round(width))
             else:
                 self.draw.line(flat, fill=colour, width=round(width), joint="curve")
 
@@ -228,11 +228,9 @@ class _Canvas:
         return image
 
 
-def _dashes(
-    points: NDArray[np.float64], on: float, off: float
-) -> list[tuple[list[float], list[float]]]:
-    """The drawn pieces of a dashed line through points."""
-    pieces = []
+def _dashes(points: NDArray[np.float64], on: float, off: float) -> list[list[float]]:
+    """The drawn pieces of a dashed line through points, each x, y, x, y."""
+    pieces: list[list[float]] = []
     for a, b in itertools.pairwise(points):
         length = float(np.hypot(*(b - a)))
         if length == 0:
@@ -240,10 +238,7 @@ def _dashes(
         starts = np.arange(0.0, length, on + off)
         ends = np.minimum(starts + on, length)
         direction = (b - a) / length
-        pieces += [
-            ((a + s * direction).tolist(), (a + e * direction).tolist())
-            for s, e in zip(starts, ends, strict=True)
-        ]
+        pieces += np.hstack([a + at[:, None] * direction for at in (starts, ends)]).tolist()
     return pieces
 
 
@@ -278,8 +273,8 @@ def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) ->
     font = ImageFont.load_default(14)
     for index, (color, text, dash) in enumerate(_legend_entries(dataset)):
         x, y = left + 190 * (index // 3), top + 22 * (index % 3)
-        for a, b in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
-            draw.line([*a, *b], fill=theme.rgb(color), width=3)
+        for piece in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
+            draw.line(piece, fill=theme.rgb(color), width=3)
         draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
 
 

@@ -46,14 +46,13 @@ def mask_polygon(mask: BoolArray) -> Polygon:
     from affine import Affine
     from rasterio.features import shapes
 
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        np.asarray(mask, bool).view(np.uint8), connectivity=4
-    )
-    if count == 1:
+    down, right = (np.flatnonzero(np.any(mask, axis=axis)) for axis in (1, 0))
+    if not len(down):
         raise FieldError("No pixel belongs to the field.", hint="Choose another point or method.")
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    left, top, width, height = stats[largest, :4].tolist()
-    part = labels[top : top + height, left : left + width] == largest
+    top, left = int(down[0]), int(right[0])
+    window = np.asarray(mask[top : down[-1] + 1, left : right[-1] + 1], np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(window, connectivity=4)
+    part = labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     geometry, _ = next(
         shapes(
             part.view(np.uint8),
