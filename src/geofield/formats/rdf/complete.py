@@ -31,7 +31,8 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
     """
     _field(tables["field"], crs)
     _obstacles(tables["obstacles"], crs)
-    _numbers(tables)
+    numbered(tables["tracks"], "track_no")
+    numbered(tables["track_points"], "point_no")
     if len(tables["tracks"]) and not len(tables["segments"]):
         tables["segments"] = _segments(tables["tracks"], crs)
     _tracks(tables)
@@ -65,17 +66,15 @@ def _obstacles(frame: gpd.GeoDataFrame, crs: CRS) -> None:
     _fill(frame, "kind", np.full(len(frame), "other", dtype=object))
     _fill(frame, "status", np.full(len(frame), "added", dtype=object))
     _fill(frame, "buffer_m", np.zeros(len(frame)))
-    _fill(frame, "obstacle_no", _free_numbers(frame, "obstacle_no"))
+    numbered(frame, "obstacle_no")
     _positions(frame, crs)
 
 
-def _free_numbers(frame: gpd.GeoDataFrame, column: str) -> object:
+def numbered(frame: gpd.GeoDataFrame, column: str) -> None:
+    """Give the next free numbers to rows without one, in place."""
     numbers = frame[column].to_numpy(dtype="float64", na_value=np.nan)
-    missing = np.isnan(numbers)
-    start = int(np.nanmax(numbers, initial=0)) + 1
-    result = np.zeros(len(frame), dtype=np.int64)
-    result[missing] = np.arange(start, start + int(missing.sum()))
-    return result
+    last = int(np.nanmax(numbers, initial=0))
+    _fill(frame, column, last + np.cumsum(np.isnan(numbers)))
 
 
 def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
@@ -93,11 +92,6 @@ def _pixels(frame: gpd.GeoDataFrame, grid: Grid, crs: CRS) -> None:
     x_px, y_px = grid.from_crs(shapely.get_x(shapes), shapely.get_y(shapes), crs)
     _fill(frame, "x_px", x_px)
     _fill(frame, "y_px", y_px)
-
-
-def _numbers(tables: dict[str, gpd.GeoDataFrame]) -> None:
-    for name, column in (("tracks", "track_no"), ("track_points", "point_no")):
-        _fill(tables[name], column, _free_numbers(tables[name], column))
 
 
 def _segments(tracks: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:

@@ -15,6 +15,7 @@ import shapely
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
+from geofield.formats.rdf.complete import numbered
 from geofield.formats.rdf.features import feature_group, point_group, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
@@ -272,9 +273,7 @@ def keyed(layer: LayerMap, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     last = keys[-1]
     if layer.layer.column(last).type == "int" and frame[last].isna().any():
         frame = frame.copy()
-        start = int(frame[last].max()) + 1 if frame[last].notna().any() else 1
-        missing = frame[last].isna()
-        frame.loc[missing, last] = np.arange(start, start + int(missing.sum()))
+        numbered(frame, last)
     twice = frame.duplicated(keys)
     if twice.any():
         row = frame[twice].iloc[0]

@@ -6,7 +6,7 @@ import json
 import re
 from functools import cache, lru_cache
 from importlib.resources import files
-from typing import Final
+from typing import Any, Final
 
 import pyoxigraph as ox
 from pyproj import CRS
@@ -18,9 +18,11 @@ GF: Final = "https://w3id.org/geofield#"
 DEFAULT_BASE: Final = "https://example.org/geofield/"
 
 _DATA: Final = files(__package__) / "data"
-_CONTEXT: Final = json.loads((_DATA / "context.jsonld").read_text("utf-8"))["@context"]
+CONTEXT_TERMS: Final[dict[str, Any]] = json.loads((_DATA / "context.jsonld").read_text("utf-8"))[
+    "@context"
+]
 #: Prefixes of every product, by name: those of the context.
-PREFIXES: Final = {name: iri for name, iri in _CONTEXT.items() if isinstance(iri, str)}
+PREFIXES: Final = {name: iri for name, iri in CONTEXT_TERMS.items() if isinstance(iri, str)}
 # The source study's vocabulary (METHOD.md, section 5).
 STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
 STUDY_TRAJECTORY: Final = "http://www.DLC.org/Trajectory#"

@@ -6,7 +6,6 @@ and everything that is written against them.
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import pyoxigraph as ox
 
 from geofield.formats.rdf.graph import Graph
-from geofield.formats.rdf.namespaces import expand
+from geofield.formats.rdf.namespaces import CONTEXT_TERMS, expand
 
 #: File names in the package's folder ``data``.
 ONTOLOGY, SHAPES, CONTEXT = "ontology.ttl", "shapes.ttl", "context.jsonld"
@@ -34,10 +33,9 @@ def ontology() -> Graph:
     return graph
 
 
-@cache
 def context() -> dict[str, Any]:
     """The JSON-LD context: prefixes, and a short term with its type for each property."""
-    return dict(json.loads(resource(CONTEXT))["@context"])
+    return CONTEXT_TERMS
 
 
 def label(name: str) -> str:

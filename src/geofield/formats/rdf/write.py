@@ -96,7 +96,7 @@ def to_graph(dataset: Dataset, options: Mapping[str, Any]) -> rdflib.Graph:
         return rdflib.Literal(each.value, datatype=None if kind == STRING else rdflib.URIRef(kind))
 
     graph = rdflib.Graph()
-    for prefix, namespace in _prefixes(options).items():
+    for prefix, namespace in _profile(options)[2].items():
         graph.bind(prefix, namespace, replace=True)
     for each in triples(describe(dataset, options).everything()):
         graph.add((term(each.subject), term(each.predicate), term(each.object)))
@@ -111,7 +111,7 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     FormatError
         When there is no such profile, or the base cannot name features.
     """
-    kind, points = (StudyDescription, True) if _is_study(options) else (Description, False)
+    kind, points, _ = _profile(options)
     names = Names.of(
         dataset, base=options.get("base_iri"), plan=str(options.get("plan_name") or "")
     )
@@ -124,23 +124,22 @@ def _each(fields: Fields) -> Sequence[Dataset]:
     return [fields] if isinstance(fields, Dataset) else fields
 
 
-def _is_study(options: Mapping[str, Any]) -> bool:
+def _profile(options: Mapping[str, Any]) -> tuple[type[Description], bool, dict[str, str]]:
+    """What describes a dataset, whether its points are told unless asked, and the prefixes."""
     profile = str(options.get("rdf_profile") or PROFILES[0])
     if profile not in PROFILES:
         raise FormatError(
             f"There is no RDF profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
         )
-    return profile == "study"
-
-
-def _prefixes(options: Mapping[str, Any]) -> dict[str, str]:
-    return {**PREFIXES, **STUDY_PREFIXES} if _is_study(options) else PREFIXES
+    if profile == "study":
+        return StudyDescription, True, {**PREFIXES, **STUDY_PREFIXES}
+    return Description, False, PREFIXES
 
 
 def _write(
     path: Path, syntax: ox.RdfFormat, groups: Iterable[Group], options: Mapping[str, Any]
 ) -> None:
-    prefixes = _prefixes(options)
+    *_, prefixes = _profile(options)
     own = {ox.RdfFormat.JSON_LD: write_json, ox.RdfFormat.RDF_XML: write_xml}.get(syntax)
     if own is not None:
         with path.open("wb") as file:
