@@ -106,8 +106,8 @@ def test_a_search_is_kept_for_further_points(sample):
     options = {"lat": truth.lat, "lon": truth.lon}
 
     def timed(**more):
-        start = time.process_time()
-        return extract_field(scene, **options, **more), time.process_time() - start
+        start = time.thread_time()
+        return extract_field(scene, **options, **more), time.thread_time() - start
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
