@@ -5,10 +5,9 @@
 Learned from fields drawn by eye on sites that the network has not seen, and from simulated ones:
 the curves over the figures of the outlines make beliefs as likely as their overlaps with the
 truth say. Part K of the table is learned without the sites of fold K, and what certainty is worth
-from outlines taken by such parts. The curves move a step on from those of the table that is there.
-CACHE keeps the searches. These follow the table, and a ranking sees other outlines where it has
-led the search itself: so learn and write, search into one more CACHE, then put the first table
-back, learn from all of them and write.
+from outlines taken by such parts. CACHE keeps the searches. These follow the table that is there,
+and a ranking sees other outlines where it has led the search itself: so learn and write, search
+into one more CACHE, learn from both and write.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import pickle
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -39,17 +38,30 @@ from outline_cases import (
 from scipy.optimize import minimize
 
 from geofield.field.auto import evidence_of
-from geofield.field.ranking import BEND, END, WEIGHED, Ranking, bends, expected_overlaps, trained
+from geofield.field.ranking import (
+    BEND,
+    END,
+    SAME_GROUND,
+    WEIGHED,
+    Ranking,
+    bends,
+    exact,
+    expected_overlaps,
+    trained,
+)
 from geofield.field.search import Candidate, search_field
 
 TABLE = Path(__file__).resolve().parent.parent / "src/geofield/learned/outline_ranking.json"
 #: Pull towards zero, of curves and of what certainty is worth.
 RIDGE, CALM = 1e-2, 1.0
-#: What is learned moves the table before by so much; and both are believed so much more, as
-#: outlines that are much alike are many, and would outweigh a single better one.
-STEP, SURER = 0.5, 2.0
+#: What is learned is believed so much more, as outlines that are much alike are many, and would
+#: outweigh a single better one.
+SURER = 2.0
 #: How much likelier an outline is believed to be for its overlap; less than half is nothing.
 SHARPNESS, WORST = 20.0, 0.5
+#: The same among outlines of one ground, and the pull towards zero there; from which overlap such
+#: a ground teaches anything, and from which it counts whole.
+EXACT_SHARPNESS, EXACT_RIDGE, EXACT_FROM, EXACT_WHOLE = 50.0, 1e-3, 0.5, 0.8
 #: Simulated pictures, and what one counts against a real one.
 SIMULATED, SIMULATED_COUNTS = 20, 4.0
 #: Other pictures of the fields.
@@ -127,19 +139,37 @@ def weights(known: Sequence[Searched]) -> np.ndarray:
     return share / share.sum()
 
 
-def learn(known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """Slopes (3, names) under which beliefs follow overlaps (cross entropy, ridge; convex)."""
-    bent, wanted = [], []
-    for one in known:
-        bent.append(np.concatenate(list(bends((one.figures - mean) / spread)), axis=1))
+#: Weight, figures bent (outlines, 3 x names), beliefs that are wanted.
+Lesson = tuple[float, np.ndarray, np.ndarray]
+
+
+def lessons(known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray) -> Iterator[Lesson]:
+    """Which ground is meant."""
+    for weight, one in zip(weights(known), known, strict=True):
         regret = np.minimum(one.overlap.max() - one.overlap, WORST)
         belief = np.exp(-SHARPNESS * regret)
-        wanted.append(belief / belief.sum())
-    share = weights(known)
+        yield weight, bent(one, mean, spread), belief / belief.sum()
+
+
+def exact_lessons(known: Sequence[Searched], rankings: Sequence[Ranking]) -> Iterator[Lesson]:
+    """Where it ends: the outlines of the ground that a ranking takes, each judged by its part."""
+    for weight, one in zip(weights(known), known, strict=True):
+        ranking = rankings[one.fold]
+        order, _, expected, overlap = weighed(one, ranking)
+        order = order[overlap[int(np.argmax(expected))] >= SAME_GROUND]
+        regret = np.minimum(one.overlap[order].max() - one.overlap[order], WORST)
+        belief = np.exp(-EXACT_SHARPNESS * regret)
+        share = (one.overlap[order].max() - EXACT_FROM) / (EXACT_WHOLE - EXACT_FROM)
+        own = bent(one, ranking.mean, ranking.spread)[order]
+        yield weight * min(max(share, 0.0), 1.0), own, belief / belief.sum()
+
+
+def learn(some: Sequence[Lesson], ridge: float) -> np.ndarray:
+    """Slopes (3, names) under which beliefs follow lessons (cross entropy, ridge; convex)."""
 
     def loss(slope: np.ndarray) -> tuple[float, np.ndarray]:
-        total, gradient = RIDGE * float(slope @ slope), 2 * RIDGE * slope
-        for weight, part, target in zip(share, bent, wanted, strict=True):
+        total, gradient = ridge * float(slope @ slope), 2 * ridge * slope
+        for weight, part, target in some:
             score = part @ slope
             score -= score.max()
             belief = np.exp(score)
@@ -148,9 +178,13 @@ def learn(known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray) -> np
             gradient = gradient + weight * (part.T @ (belief / mass - target))
         return total, gradient
 
-    size = bent[0].shape[1]
-    found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": 150})
+    size = some[0][1].shape[1]
+    found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": 200})
     return found.x.reshape(3, -1)
+
+
+def bent(one: Searched, mean: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    return np.concatenate(list(bends((one.figures - mean) / spread)), axis=1)
 
 
 @dataclass
@@ -162,14 +196,20 @@ class Chosen:
     evidence: dict[str, float]
 
 
+def weighed(
+    one: Searched, ranking: Ranking
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The best outlines' order, beliefs in them, their expected overlaps and overlaps."""
+    score = bent(one, ranking.mean, ranking.spread) @ ranking.slope.ravel()
+    order = np.argsort(-score, kind="stable")[:WEIGHED]
+    return order, *expected_overlaps([one.polygons[k] for k in order], score[order])
+
+
 def chosen(one: Searched, ranking: Ranking) -> Chosen:
     """What a ranking takes of a search."""
-    at = [one.names.index(name) for name in ranking.names]
-    bent = bends((one.figures[:, at] - ranking.mean) / ranking.spread)
-    score = np.einsum("bon,bn->o", bent, ranking.slope)
-    order = np.argsort(-score, kind="stable")[:WEIGHED]
-    belief, expected, overlap = expected_overlaps([one.polygons[k] for k in order], score[order])
-    best = int(np.argmax(expected))
+    order, belief, expected, overlap = weighed(one, ranking)
+    exactness = bent(one, ranking.mean, ranking.spread)[order] @ ranking.edge.ravel()
+    best = exact(expected, overlap, exactness)
     figures = dict(zip(one.names, one.figures[order[best]].tolist(), strict=True))
     candidate = Candidate(one.polygons[order[best]], None, figures, 0.0)  # type: ignore[arg-type]
     evidence = evidence_of(candidate, float(expected[best]), belief, overlap[best])
@@ -210,14 +250,15 @@ def table_of(known: Sequence[Searched]) -> tuple[dict, list[Chosen]]:
     for one in known:
         one.figures = one.figures[:, at]
         one.names = names
-    before = [trained(k) for k in range(FOLDS)]
-    mean, spread = before[0].mean, before[0].spread
-    learned = [learn([one for one in known if one.fold != k], mean, spread) for k in range(FOLDS)]
-    slopes = [
-        rounded(SURER * (one.slope + STEP * more))
-        for one, more in zip(before, learned, strict=True)
-    ]
-    taken = [chosen(one, Ranking(names, mean, spread, slopes[one.fold], {})) for one in known]
+    every = np.concatenate([one.figures for one in known])
+    mean, spread = every.mean(axis=0).round(5), (every.std(axis=0) + 1e-5).round(5)
+    left_out = [[one for one in known if one.fold != k] for k in range(FOLDS)]
+    slopes = [rounded(SURER * learn(list(lessons(some, mean, spread)), RIDGE)) for some in left_out]
+    none = np.zeros_like(slopes[0])
+    coarse = [Ranking(names, mean, spread, slope, none, {}) for slope in slopes]
+    edges = [rounded(learn(list(exact_lessons(some, coarse)), EXACT_RIDGE)) for some in left_out]
+    parts = [replace(one, edge=edge) for one, edge in zip(coarse, edges, strict=True)]
+    taken = [chosen(one, parts[one.fold]) for one in known]
     real = [one for one in taken if not one.of.mark.startswith("simulated")]
     calibration = {"all": calibrated(real)}
     for k in range(FOLDS):
@@ -228,6 +269,7 @@ def table_of(known: Sequence[Searched]) -> tuple[dict, list[Chosen]]:
             "mean": float(mean[n]),
             "spread": float(spread[n]),
             "slopes": [part[:, n].tolist() for part in slopes],
+            "edges": [part[:, n].tolist() for part in edges],
         }
         for n, name in enumerate(names)
     ]

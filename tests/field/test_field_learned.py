@@ -13,7 +13,7 @@ from geofield.field import ranking
 from geofield.field.border import measure
 from geofield.field.cuts import divided
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
-from geofield.field.ranking import agreement, trained
+from geofield.field.ranking import agreement, exact, trained
 from geofield.field.regions import partition
 from geofield.field.straight import ring
 from geofield.field.surface import Surface
@@ -93,6 +93,30 @@ def test_two_names_swapped_in_the_table_are_noticed(several, monkeypatch, tmp_pa
 
         again = table(monkeypatch, tmp_path, swap).scores(several)
         assert not np.array_equal(again, scores), (one, other)
+
+
+def test_two_names_swapped_among_the_edges_are_noticed(several, monkeypatch, tmp_path):
+    """Where a field ends is decided by curves of their own, by name as well."""
+    names = trained().names
+    exactness = trained().exactness(several)
+    assert not np.allclose(exactness, trained().scores(several))
+    for one, other in zip(names, names[1:] + names[:1], strict=True):
+
+        def swap(known, one=one, other=other):
+            rows = {row["name"]: row for row in known["figures"]}
+            first, second = rows[one], rows[other]
+            first["edges"], second["edges"] = second["edges"], first["edges"]
+
+        again = table(monkeypatch, tmp_path, swap).exactness(several)
+        assert not np.array_equal(again, exactness), (one, other)
+
+
+def test_of_the_likeliest_ground_the_most_exact_outline_is_taken():
+    # Two of one ground, and a rival that is more exact but holds other ground.
+    overlap = np.array([[1.0, 0.95, 0.5], [0.95, 1.0, 0.5], [0.5, 0.5, 1.0]])
+    expected = np.array([0.9, 0.88, 0.6])
+    assert exact(expected, overlap, np.array([0.1, 0.4, 9.0])) == 1
+    assert exact(expected, overlap, np.array([0.4, 0.1, 9.0])) == 0
 
 
 def test_two_names_swapped_in_the_calibration_are_noticed(figures, monkeypatch, tmp_path):

@@ -4,7 +4,6 @@ import json
 import pickle
 import subprocess
 import sys
-import time
 import warnings
 from typing import Any
 
@@ -105,20 +104,17 @@ def test_a_search_is_kept_for_further_points(sample):
     search = prepare_field(scene, lat=truth.lat, lon=truth.lon)
     options = {"lat": truth.lat, "lon": truth.lon}
 
-    def timed(**more):
-        start = time.thread_time()
-        return extract_field(scene, **options, **more), time.thread_time() - start
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        whole_s = min(timed()[1] for _ in range(2))
         extract_field(scene, **options, search=search)
+        measured = len(search.known)
         again = pickle.loads(pickle.dumps(search))
         apart = [scene.grid.to_lonlat(20.0, 20.0)]
-        kept, one_s = timed(search=search, exclude=apart)
-        other, other_s = timed(search=again, exclude=apart)
-        fresh, _ = timed(exclude=apart)
-    assert min(one_s, other_s) < 0.75 * whole_s
+        kept = extract_field(scene, **options, search=search, exclude=apart)
+        other = extract_field(scene, **options, search=again, exclude=apart)
+        fresh = extract_field(scene, **options, exclude=apart)
+    # The search that was given is asked, and what it measured is not measured again.
+    assert measured < len(search.known) == len(again.known) < 2 * measured
     assert kept.polygon.equals(other.polygon)
     overlap = kept.polygon.intersection(fresh.polygon).area / kept.polygon.union(fresh.polygon).area
     assert overlap > 0.9

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.field.morphology import inner, plump
-from geofield.field.ranking import WEIGHED, Figures, expected_overlaps, log_odds, trained
+from geofield.field.ranking import WEIGHED, Figures, exact, expected_overlaps, log_odds, trained
 from geofield.field.refine import carried, enlarged
 from geofield.field.search import Candidate, FieldSearch, search_field
 from geofield.model import Scene
@@ -84,13 +84,13 @@ class Likely:
 
 
 def likely_outlines(found: Sequence[Candidate], search: FieldSearch) -> list[Likely]:
-    """The most likely different outlines: the first is the one with the largest expected overlap.
+    """The most likely different outlines; of the likeliest ground, the most exact one first.
 
     What the first leaves of certainty is dealt to the others by the beliefs in what is like them.
     """
     scores = np.array([one.score for one in found])
     belief, expected, overlap = expected_overlaps([one.polygon for one in found], scores)
-    best = int(np.argmax(expected))
+    best = exact(expected, overlap, trained(search.part).exactness([one.figures for one in found]))
     evidence = evidence_of(found[best], float(expected[best]), belief, overlap[best])
     certain, ground, border = (
         trained(search.part).certainty(what, evidence) for what in ("field", "ground", "border")

@@ -2,9 +2,10 @@
 
 An outline's score is a sum of curves, one for each figure that is measured on it: bent twice,
 so that a figure can count more on one side of what is usual than on the other. Scores become
-beliefs (their exponentials, to add up to one), and the outline taken is the one with the largest
-expected overlap with the others under these beliefs. `tools/train_ranking.py` learned the curves
-on sites that the network, whose answer is among the figures, had not seen.
+beliefs (their exponentials, to add up to one), and the outline with the largest expected overlap
+with the others under these beliefs holds the ground that is meant. Where exactly it ends, curves of
+their own decide among the outlines of that ground. `tools/train_ranking.py` learned all curves on
+sites that the network, whose answer is among the figures, had not seen.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ BEND, END = 0.5, 4.0
 _SMALL_PX = 96
 #: So many of the best are weighed against each other.
 WEIGHED = 200
+#: Outlines that overlap as much hold the same ground, and differ in where exactly it ends.
+SAME_GROUND = 0.92
 
 
 def agreement(
@@ -84,8 +87,9 @@ class Ranking:
         Of the figures that count.
     mean, spread : float array (names,)
         Over the outlines learned from.
-    slope : float array (3, names)
-        Everywhere; above the upper bend; below the lower one.
+    slope, edge : float array (3, names)
+        Everywhere; above the upper bend; below the lower one. For which ground is meant; and for
+        where exactly it ends.
     calibration : mapping
         By what is asked (see `certainty`): weights of named evidence.
     """
@@ -94,13 +98,20 @@ class Ranking:
     mean: FloatArray
     spread: FloatArray
     slope: FloatArray
+    edge: FloatArray
     calibration: Mapping[str, Mapping[str, float]]
 
     def scores(self, outlines: Sequence[Figures]) -> FloatArray:
         """Scores of outlines; only differences mean something."""
+        return self._sums(outlines, self.slope)
+
+    def exactness(self, outlines: Sequence[Figures]) -> FloatArray:
+        """How exact outlines of the same ground are; only differences mean something."""
+        return self._sums(outlines, self.edge)
+
+    def _sums(self, outlines: Sequence[Figures], slope: FloatArray) -> FloatArray:
         values = np.array([[one[name] for name in self.names] for one in outlines])
-        bent = bends((values - self.mean) / self.spread)
-        return np.asarray(np.einsum("bon,bn->o", bent, self.slope))
+        return np.asarray(np.einsum("bon,bn->o", bends((values - self.mean) / self.spread), slope))
 
     def certainty(self, what: str, evidence: Figures) -> float:
         """Probability that an outline is right, from a logistic regression on left-out sites.
@@ -140,14 +151,29 @@ def trained(part: int | None = None) -> Ranking:
     try:
         rows = table["figures"]
         mean, spread = (np.array([row[key] for row in rows]) for key in ("mean", "spread"))
-        # Of each figure, the slopes of all parts: (parts, 3, names).
-        slopes = np.moveaxis(np.array([row["slopes"] for row in rows]), 0, -1)
         names = tuple(row["name"] for row in rows)
-        slope = slopes.mean(axis=0) if part is None else slopes[part]
+        # Of each figure, the slopes of all parts: (parts, 3, names).
+        slope, edge = (
+            each.mean(axis=0) if part is None else each[part]
+            for key in ("slopes", "edges")
+            for each in [np.moveaxis(np.array([row[key] for row in rows]), 0, -1)]
+        )
         calibration = table["calibration"]["all" if part is None else str(part)]
-        return Ranking(names, mean, spread, slope, calibration)
+        return Ranking(names, mean, spread, slope, edge, calibration)
     except (KeyError, IndexError) as error:
         raise FieldError("The table outline_ranking.json cannot be read.") from error
+
+
+def exact(expected: FloatArray, overlap: FloatArray, exactness: FloatArray) -> int:
+    """Which outline is taken: of those that hold the likeliest ground, the most exact one.
+
+    Parameters
+    ----------
+    expected, exactness : float array (outlines,)
+    overlap : float array (outlines, outlines)
+    """
+    same = overlap[int(np.argmax(expected))] >= SAME_GROUND
+    return int(np.argmax(np.where(same, exactness, -np.inf)))
 
 
 def expected_overlaps(
