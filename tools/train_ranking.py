@@ -209,7 +209,7 @@ def chosen(one: Searched, ranking: Ranking) -> Chosen:
     """What a ranking takes of a search."""
     order, belief, expected, overlap = weighed(one, ranking)
     exactness = bent(one, ranking.mean, ranking.spread)[order] @ ranking.edge.ravel()
-    best = exact(expected, overlap, exactness)
+    best = exact(expected, overlap, exactness, [one.polygons[k] for k in order])
     figures = dict(zip(one.names, one.figures[order[best]].tolist(), strict=True))
     candidate = Candidate(one.polygons[order[best]], None, figures, 0.0)  # type: ignore[arg-type]
     evidence = evidence_of(candidate, float(expected[best]), belief, overlap[best])

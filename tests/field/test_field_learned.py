@@ -115,8 +115,13 @@ def test_of_the_likeliest_ground_the_most_exact_outline_is_taken():
     # Two of one ground, and a rival that is more exact but holds other ground.
     overlap = np.array([[1.0, 0.95, 0.5], [0.95, 1.0, 0.5], [0.5, 0.5, 1.0]])
     expected = np.array([0.9, 0.88, 0.6])
-    assert exact(expected, overlap, np.array([0.1, 0.4, 9.0])) == 1
-    assert exact(expected, overlap, np.array([0.4, 0.1, 9.0])) == 0
+    plain = [shapely.box(0, 0, 9, 9)] * 3
+    assert exact(expected, overlap, np.array([0.1, 0.4, 9.0]), plain) == 1
+    assert exact(expected, overlap, np.array([0.4, 0.1, 9.0]), plain) == 0
+    # Nearly as exact: the one without the corner cut off.
+    cut = shapely.Polygon([(0, 2), (2, 0), (9, 0), (9, 9), (0, 9)])
+    assert exact(expected, overlap, np.array([0.42, 0.4, 9.0]), [cut, *plain[1:]]) == 1
+    assert exact(expected, overlap, np.array([0.6, 0.4, 9.0]), [cut, *plain[1:]]) == 0
 
 
 def test_two_names_swapped_in_the_calibration_are_noticed(figures, monkeypatch, tmp_path):

@@ -89,8 +89,10 @@ def likely_outlines(found: Sequence[Candidate], search: FieldSearch) -> list[Lik
     What the first leaves of certainty is dealt to the others by the beliefs in what is like them.
     """
     scores = np.array([one.score for one in found])
-    belief, expected, overlap = expected_overlaps([one.polygon for one in found], scores)
-    best = exact(expected, overlap, trained(search.part).exactness([one.figures for one in found]))
+    polygons = [one.polygon for one in found]
+    belief, expected, overlap = expected_overlaps(polygons, scores)
+    exactness = trained(search.part).exactness([one.figures for one in found])
+    best = exact(expected, overlap, exactness, polygons)
     evidence = evidence_of(found[best], float(expected[best]), belief, overlap[best])
     certain, ground, border = (
         trained(search.part).certainty(what, evidence) for what in ("field", "ground", "border")

@@ -37,6 +37,8 @@ _SMALL_PX = 96
 WEIGHED = 200
 #: Outlines that overlap as much hold the same ground, and differ in where exactly it ends.
 SAME_GROUND = 0.92
+#: Outlines whose exactness differs less are as exact.
+_NEARLY = 0.1
 
 
 def agreement(
@@ -164,16 +166,25 @@ def trained(part: int | None = None) -> Ranking:
         raise FieldError("The table outline_ranking.json cannot be read.") from error
 
 
-def exact(expected: FloatArray, overlap: FloatArray, exactness: FloatArray) -> int:
+def exact(
+    expected: FloatArray, overlap: FloatArray, exactness: FloatArray, polygons: Sequence[Polygon]
+) -> int:
     """Which outline is taken: of those that hold the likeliest ground, the most exact one.
+
+    Of such as are nearly as exact, the one with the fewest corners: a corner that is cut off
+    across a crown makes one more, and the picture does not show what lies beneath.
 
     Parameters
     ----------
     expected, exactness : float array (outlines,)
     overlap : float array (outlines, outlines)
+    polygons : sequence of Polygon
     """
     same = overlap[int(np.argmax(expected))] >= SAME_GROUND
-    return int(np.argmax(np.where(same, exactness, -np.inf)))
+    exactness = np.where(same, exactness, -np.inf)
+    near = np.flatnonzero(exactness >= exactness.max() - _NEARLY).tolist()
+    corners = shapely.get_num_coordinates([polygons[at] for at in near])
+    return int(near[int(np.lexsort((-exactness[near], corners))[0])])
 
 
 def expected_overlaps(

@@ -23,7 +23,7 @@ from geofield.field.evidence import channels, whiten
 from geofield.field.network import Seen, seen
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.points import obeys
-from geofield.field.ranking import Figures, agreement, trained
+from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures, agreement, trained
 from geofield.field.regions import (
     SMALLEST_PX,
     SMALLEST_SHARE,
@@ -47,6 +47,8 @@ _STRAY_PX = 20
 _TOLERANCE_PX = 3.0
 #: So many of the regions' outlines get well fitted sides; so many are redrawn, so many times.
 _FITTED, _BREADTH, _ROUNDS = 5, 4, 2
+#: So many times the most exact one is redrawn once more.
+_POLISHED = 2
 #: Outlines that overlap more than this are alike.
 _ALIKE = 0.95
 #: So many earlier outlines are mended at new points.
@@ -167,7 +169,24 @@ class FieldSearch:
                 tried.add(polygon)
                 others = redrawn(polygon, self.seed_px, self.surface.shape)
                 add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
+        for _ in range(_POLISHED if found else 0):
+            polygon = self._most_exact(found)
+            if polygon in tried:
+                break
+            tried.add(polygon)
+            others = redrawn(polygon, self.seed_px, self.surface.shape)
+            add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
         return [found[polygon] for polygon in best_first(found)]
+
+    def _most_exact(self, found: Mapping[Polygon, Candidate]) -> Polygon:
+        """Of the outlines that hold much the same ground as the best, the most exact one."""
+        size = self.surface.size_px
+        ranked = best_first(found)[:WEIGHED]
+        inside = np.array([self.known[polygon].inside for polygon in ranked])
+        common = inside @ (size * inside[0])
+        alike = common >= SAME_GROUND * (inside @ size + size @ inside[0] - common)
+        exactness = trained(self.part).exactness([found[polygon].figures for polygon in ranked])
+        return ranked[int(np.argmax(np.where(alike, exactness, -np.inf)))]
 
     def _scored(
         self, held: Sequence[Held], ground: FloatArray
