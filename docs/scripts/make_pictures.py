@@ -40,8 +40,18 @@ def demo_map() -> None:
         _keep(Path(folder) / "out" / "map.png", "demo_map.jpg", width_px=1100)
 
 
+def wrong_outline() -> None:
+    """The second sample field, with a piece of another one."""
+    sample = SAMPLE.with_name("field_2.tif")
+    settings = gf.load_settings(overrides={"tracks": {"spacing_m": 6.0}})
+    with tempfile.TemporaryDirectory() as folder:
+        plan = gf.plan_field(sample, lat=35.07543, lon=33.53115, settings=settings)
+        plan.write(Path(folder) / "out", formats=["gpkg"])
+        _keep(Path(folder) / "out" / "map.png", "wrong_outline.jpg", width_px=900)
+
+
 def review() -> None:
-    """The same field after a person's review."""
+    """The first field after a person's review."""
     settings = gf.Settings(tracks={"spacing_m": 8.0})
     plan = gf.plan_field(SAMPLE, **POINT, settings=settings)
     obstacles = plan.obstacles
@@ -144,7 +154,7 @@ def _shrink(path: Path) -> None:
 
 def main() -> int:
     IMAGES.mkdir(exist_ok=True)
-    for draw in (demo_map, review, meadow, tracks, detection):
+    for draw in (demo_map, wrong_outline, review, meadow, tracks, detection):
         draw()
     for path in sorted(IMAGES.iterdir()):
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1024:.0f} kB")

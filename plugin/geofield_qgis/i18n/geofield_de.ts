@@ -25,6 +25,11 @@
     </message>
     <message>
       <location filename="algorithm.py" />
+      <source>Obstacles to avoid: polygons, points with radius_m, lines</source>
+      <translation>Zu meidende Hindernisse: Flächen, Punkte mit radius_m, Linien</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
       <source>Plan: a layer of its GeoPackage</source>
       <translation>Plan: ein Layer seines GeoPackage</translation>
     </message>
@@ -132,11 +137,6 @@
       <location filename="algorithms.py" />
       <source>Points in the fields, or parcels</source>
       <translation>Punkte in den Feldern, oder Schläge</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Obstacles to avoid: polygons, points with radius_m, lines</source>
-      <translation>Zu meidende Hindernisse: Flächen, Punkte mit radius_m, Linien</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
