@@ -53,7 +53,6 @@ def test_parcels_beside_each_other_have_different_ids() -> None:
 
 
 @pytest.mark.real
-@pytest.mark.filterwarnings("ignore::geofield.errors.FieldWarning")
 def test_a_meadow_in_three_years() -> None:
     ids = set()
     for year in (2016, 2018, 2020):

@@ -8,8 +8,9 @@ from, so that figures can be taken of the others.
 
 The file that is shipped was trained with ``--steps 5500`` by PyTorch 2.15 (45 minutes of one
 core) on 354 outlines, when the last tenth of `field_labels_further.csv` was still to be drawn:
-learning again sees some more. What gained nothing: 4 000 steps on the 165 outlines there were
-before; a picture seen in four or eight turns; the mean with the network that was shipped before.
+learning again sees some more. What gained nothing: 2 500 of 4 000 steps on the 165 outlines there
+were before, where it was broken off; a picture seen in four or eight turns; the mean with the
+network that was shipped before.
 """
 
 from __future__ import annotations

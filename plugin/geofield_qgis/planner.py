@@ -88,9 +88,8 @@ class Planner(QObject):
 
     def go_on(self) -> None:
         """Plan what was clicked before there was an engine."""
-        if self.waits and self._here is not None:
-            self.awake.wake()
-            self._begin()
+        self.awake.wake()
+        self._begin()
 
     def stop(self) -> None:
         """End what runs; what was planned before stays."""
@@ -105,7 +104,7 @@ class Planner(QObject):
         for each in self._sketch.values():
             each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
-        self._here = None
+        self._here, self.waits = None, False
 
     def remove(self) -> None:
         """Leave nothing on the map, and no process."""

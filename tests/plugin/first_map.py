@@ -1,44 +1,22 @@
 """From a QGIS without an engine to the first map, by clicks alone; run by `qgis --code`.
 
-GEOFIELD_TEST names a JSON file with `picture`, `lat`, `lon`, `folder` and `requirements`; the
-answer goes into `answer.json` of that folder.
+See `by_hand` for what is asked and answered; `requirements` is a file of locked ones, too.
 """
 
-import json
-import os
-import time
-import traceback
 from pathlib import Path
 
+from by_hand import ANSWER, ASKED, FOLDER, pixel_of, run, until
 from geofield_qgis import engine, install
-from qgis.core import (
-    QgsCoordinateReferenceSystem,
-    QgsCoordinateTransform,
-    QgsPointXY,
-    QgsProject,
-    QgsRasterLayer,
-)
-from qgis.PyQt.QtCore import QPoint, Qt, QTimer
+from qgis.core import QgsProject, QgsRasterLayer
+from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QPushButton
 from qgis.utils import iface, plugins
 
-ASKED = json.loads(Path(os.environ["GEOFIELD_TEST"]).read_text())
-FOLDER = Path(ASKED["folder"])
-ANSWER = {"clicks": []}
-
-
-def until(true, seconds, what):
-    begun = time.monotonic()
-    while not true():
-        if time.monotonic() - begun > seconds:
-            raise TimeoutError(what)
-        QTest.qWait(20)
-
 
 def click(widget, place, what):
     """One click of the left button, counted."""
-    ANSWER["clicks"].append(what)
+    ANSWER.setdefault("clicks", []).append(what)
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, place)
     QTest.qWait(100)
 
@@ -64,12 +42,18 @@ def work():
     ANSWER["engine_before"] = engine.find_engine()
     finished = []
     ours.planner.finished.connect(finished.append)
+    # A click that was taken back waits for nothing.
+    ours.plan.trigger()
+    place = pixel_of(ASKED["lon"], ASKED["lat"])
+    QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    waited = ours.planner.waits
+    QTest.keyClick(canvas, Qt.Key.Key_Escape)
+    ANSWER["waits"] = [waited, ours.planner.waits]
+    iface.messageBar().clearWidgets()
+    canvas.unsetMapTool(ours.tool)
+    QTest.qWait(500)
     press(ours.toolbar.widgetForAction(ours.plan), "tool")
-    turned = QgsCoordinateTransform(
-        QgsCoordinateReferenceSystem("EPSG:4326"), project.crs(), project
-    ).transform(QgsPointXY(ASKED["lon"], ASKED["lat"]))
-    place = canvas.getCoordinateTransform().transform(turned)
-    click(canvas.viewport(), QPoint(round(place.x()), round(place.y())), "field")
+    click(canvas.viewport(), place, "field")
     (button,) = (each for each in iface.messageBar().findChildren(QPushButton) if each.isVisible())
     press(button, "engine")
     iface.mainWindow().grab().save(str(FOLDER / "before.png"))
@@ -86,14 +70,4 @@ def work():
     ANSWER["messages"] = [each.text() for each in iface.messageBar().items()]
 
 
-def begin():
-    try:
-        work()
-    except BaseException:  # noqa: BLE001 - told to the test
-        ANSWER["error"] = traceback.format_exc()
-        iface.mainWindow().grab().save(str(FOLDER / "error.png"))
-    (FOLDER / "answer.json").write_text(json.dumps(ANSWER, default=str))
-    os._exit(0)
-
-
-QTimer.singleShot(2000, begin)
+run(work)

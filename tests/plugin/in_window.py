@@ -1,44 +1,26 @@
 """What a person does with the plugin, in QGIS's real window; run by `qgis --code`.
 
-GEOFIELD_TEST names a JSON file with `picture`, `lat`, `lon`, `folder`; the answer goes into
-`answer.json` of that folder, pictures of the window beside it.
+See `by_hand` for what is asked and answered; pictures of the window lie beside the answer.
 """
 
-import json
-import os
 import time
-import traceback
 from pathlib import Path
 
+from by_hand import ANSWER, ASKED, FOLDER, pixel_of, run, until
 from qgis.core import (
     Qgis,
     QgsApplication,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsPointXY,
     QgsProject,
     QgsRasterLayer,
     QgsRectangle,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtCore import QPoint, Qt, QTimer
+from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QApplication
 from qgis.utils import iface, plugins, reloadPlugin
-
-ASKED = json.loads(Path(os.environ["GEOFIELD_TEST"]).read_text())
-FOLDER = Path(ASKED["folder"])
-ANSWER = {"steps": []}
-
-
-def until(true, seconds, what):
-    """Let QGIS work until something is so."""
-    begun = time.monotonic()
-    while not true():
-        if time.monotonic() - begun > seconds:
-            raise TimeoutError(what)
-        QTest.qWait(20)
-    return time.monotonic() - begun
 
 
 def screenshot(name):
@@ -48,17 +30,6 @@ def screenshot(name):
     until(lambda: not canvas.isDrawing(), 60, "drawing")
     QTest.qWait(300)
     iface.mainWindow().grab().save(str(FOLDER / f"{name}.png"))
-
-
-def pixel_of(lon, lat):
-    canvas = iface.mapCanvas()
-    turned = QgsCoordinateTransform(
-        QgsCoordinateReferenceSystem("EPSG:4326"),
-        canvas.mapSettings().destinationCrs(),
-        QgsProject.instance(),
-    ).transform(QgsPointXY(lon, lat))
-    place = canvas.getCoordinateTransform().transform(turned)
-    return QPoint(round(place.x()), round(place.y()))
 
 
 def key(which, modifier=Qt.KeyboardModifier.NoModifier):
@@ -296,14 +267,4 @@ def in_batch(given, spacings_m):
     return outputs
 
 
-def begin():
-    try:
-        work()
-    except BaseException:  # noqa: BLE001 - told to the test
-        ANSWER["error"] = traceback.format_exc()
-        iface.mainWindow().grab().save(str(FOLDER / "error.png"))
-    (FOLDER / "answer.json").write_text(json.dumps(ANSWER, default=str))
-    os._exit(0)
-
-
-QTimer.singleShot(2000, begin)
+run(work)

@@ -45,7 +45,12 @@ def in_window(script, environment, folder, variables=None, **asked):
             "xvfb-run", "-a", "-s", "-screen 0 1440x900x24", "/usr/bin/qgis", "--nologo",
             "--noversioncheck", "--profiles-path", folder / "p", "--code", script,
         ],
-        env={**environment, "GEOFIELD_TEST": str(folder / "asked.json"), **(variables or {})},
+        env={
+            **environment,
+            "GEOFIELD_TEST": str(folder / "asked.json"),
+            "PYTHONPATH": str(script.parent),
+            **(variables or {}),
+        },
         capture_output=True,
         text=True,
         timeout=540,
@@ -79,6 +84,7 @@ def test_from_no_engine_to_the_first_map_in_four_clicks(qgis_environment, tmp_pa
         requirements=str(requirements),
     )
     assert answer["engine_before"] is None
+    assert answer["waits"] == [True, False]
     assert answer["clicks"] == ["tool", "field", "engine", "install"]
     assert answer["engine"].endswith("/geofield/engine/bin/geofield")
     assert not answer["dialog_open"]

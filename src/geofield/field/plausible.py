@@ -66,25 +66,26 @@ def look(scene: Scene) -> Look:
 
 
 def doubts(
-    scene: Look, mask: NDArray[np.bool_]
+    seen: Look, mask: NDArray[np.bool_]
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
     """What speaks against a field, in words and with what it costs, and the figures behind it.
 
     Parameters
     ----------
-    scene : Look
+    seen : Look
+        Of the scene.
     mask : bool array (rows, columns)
         The outlined pixels of the scene itself, holes filled.
     """
     import cv2
 
-    inside = block_mean(mask, scene.factor) > 0.5
+    inside = block_mean(mask, seen.factor) > 0.5
     if not inside.any():
         return (), ()
-    roughness = float(np.sqrt(np.median(np.maximum(scene.spread[inside], 0))))
+    roughness = float(np.sqrt(np.median(np.maximum(seen.spread[inside], 0))))
     padded = np.pad(inside, 1, mode="edge").view(np.uint8)
     depth = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    half_width_m = math.inf if padded.all() else float(depth.max()) * scene.pixel_m
+    half_width_m = math.inf if padded.all() else float(depth.max()) * seen.pixel_m
     reasons = []
     figures = [("roughness", roughness)]
     if roughness > _ROUGH:
@@ -94,8 +95,8 @@ def doubts(
         if half_width_m < _NARROW_M:
             narrow = f"it is only {2 * half_width_m:.0f} m wide (a road, a strip?)"
             reasons.append((narrow, _NARROW_COSTS))
-    if scene.vegetation is not None:
-        index = float(np.median(scene.vegetation[inside]))
+    if seen.vegetation is not None:
+        index = float(np.median(seen.vegetation[inside]))
         figures.append(("vegetation_index", index))
         if index < _LIFELESS:
             reasons.append(("nothing grows on it (water, pavement, a roof?)", _LIFELESS_COSTS))

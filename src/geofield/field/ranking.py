@@ -182,9 +182,8 @@ def exact(
     """
     same = overlap[int(np.argmax(expected))] >= SAME_GROUND
     exactness = np.where(same, exactness, -np.inf)
-    near = np.flatnonzero(exactness >= exactness.max() - _NEARLY).tolist()
-    corners = shapely.get_num_coordinates([polygons[at] for at in near])
-    return int(near[int(np.lexsort((-exactness[near], corners))[0])])
+    near: list[int] = np.flatnonzero(exactness >= exactness.max() - _NEARLY).tolist()
+    return min(near, key=lambda at: (len(polygons[at].exterior.coords), -exactness[at]))
 
 
 def expected_overlaps(

@@ -8,7 +8,7 @@ that a further point costs the network's answer to it and a few new outlines.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -163,19 +163,18 @@ class FieldSearch:
                 fitted[Polygon(outline.exterior)] = rough[polygon].holes
         add(fitted)
         tried: set[Polygon] = set()
-        for _ in range(_ROUNDS):
-            best = self._different(best_first(found), _BREADTH)
+
+        def redraw(best: Iterable[Polygon]) -> None:
+            """Add what the best suggest, unless they were asked before."""
             for polygon in [one for one in best if one not in tried]:
                 tried.add(polygon)
                 others = redrawn(polygon, self.seed_px, self.surface.shape)
                 add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
+
+        for _ in range(_ROUNDS):
+            redraw(self._different(best_first(found), _BREADTH))
         for _ in range(_POLISHED if found else 0):
-            polygon = self._most_exact(found)
-            if polygon in tried:
-                break
-            tried.add(polygon)
-            others = redrawn(polygon, self.seed_px, self.surface.shape)
-            add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
+            redraw([self._most_exact(found)])
         return [found[polygon] for polygon in best_first(found)]
 
     def _most_exact(self, found: Mapping[Polygon, Candidate]) -> Polygon:
