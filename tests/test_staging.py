@@ -83,7 +83,7 @@ def test_a_stop_before_the_lock_is_taken_leaves_nothing_for_longer_than_the_next
         "try:",
         "import os, signal, tempfile\nmake = tempfile.mkdtemp\n"
         "def stop(*_):\n    raise KeyboardInterrupt\n"
-        "signal.signal(signal.SIGTERM, stop)\n"
+        "signal.signal(signal.SIGTERM, stop)\nsignal.signal(signal.SIGINT, stop)\n"
         f"def stopped(**given):\n    made = make(**given)\n"
         f"    os.kill(os.getpid(), signal.{kind})\n    return made\n"
         "tempfile.mkdtemp = stopped\ntry:",

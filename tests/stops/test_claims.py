@@ -14,10 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from geofield.claims import claimed
 from geofield.plan import read_plan
 from geofield.simulate import SimulatedField
-from geofield.staging import staged_folder
+from geofield.staging import claimed, staged_folder
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="claims need flock")

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from geofield.errors import OutputExistsError
-from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import PREFIX, alone, is_living, sweep, working_folder
+from geofield.staging.folders import cannot_write, made_folder
+from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_folder
 
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
@@ -46,13 +46,8 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
     """Be the only geofield that works on a folder's products until the block ends.
 
     What the block then writes there by `staging` replaces nothing that was changed since it began.
-
-    Parameters
-    ----------
-    folder : Path
-        Made when it is missing, and removed again when nothing comes into it.
-    names : collection of str, optional
-        Files and folders in it that are claimed; all of it when not given.
+    `names` are the files and folders in it that are claimed; all of it without. A missing folder is
+    made, and removed again when nothing comes into it.
 
     Raises
     ------
@@ -117,11 +112,7 @@ def before_work(folder: Path) -> Seen:
 def seen(target: Path, places: Iterable[Path] | None = None) -> Seen:
     """What tells one version of the files in a folder, and one below, from another.
 
-    Parameters
-    ----------
-    target : Path
-    places : iterable of Path, optional
-        Only these files of it.
+    With `places` only of these files of it.
     """
     if places is None:
         upper = [place for place in _listed(target) if not place.name.startswith(PREFIX)]

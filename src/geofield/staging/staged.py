@@ -16,10 +16,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from geofield.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.errors import FormatError, OutputExistsError
-from geofield.folders import cannot_write, made_folder
-from geofield.leftovers import MOVING, alone, sweep, unstopped, working_folder
+from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
+from geofield.staging.folders import cannot_write, made_folder
+from geofield.staging.leftovers import MOVING, alone, sweep, unstopped, working_folder
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
 

@@ -40,10 +40,6 @@ def working_folder(target: Path) -> Iterator[Path]:
     """A hidden folder that others leave alone until the block ends, or its process does.
 
     To be entered by who is :func:`alone` with the target.
-
-    Yields
-    ------
-    Path
     """
     with ExitStack() as held:
         with unstopped():
@@ -59,7 +55,7 @@ def working_folder(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def unstopped() -> Iterator[None]:
-    """Let a stop wait until the block ends, which must take milliseconds."""
+    """Let a stop wait until the block ends, which must be short."""
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in the main thread alone
         return
@@ -80,10 +76,7 @@ def unstopped() -> Iterator[None]:
 def alone(target: Path) -> Iterator[bool]:
     """Be the only process that makes, moves or sweeps in a folder; never inside itself.
 
-    Yields
-    ------
-    bool
-        Whether that is certain: not on Windows, nor on a file system without locks.
+    Yields whether that is certain: not on Windows, nor on a file system without locks.
 
     Raises
     ------
@@ -118,11 +111,7 @@ def alone(target: Path) -> Iterator[bool]:
 def sweep(target: Path, *, certain: bool) -> None:
     """Remove the hidden folders of processes that are dead; those of living ones stay.
 
-    Parameters
-    ----------
-    target : Path
-    certain : bool
-        What :func:`alone`, inside which this is called, has yielded.
+    `certain` is what :func:`alone`, inside which this is called, has yielded.
     """
     for folder in target.glob(PREFIX + "*"):
         if folder.is_symlink() or not folder.is_dir():
