@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geofield import map_font, theme
+from geofield import theme
 from geofield.mapping import draw_map
+from geofield.mapping import fonts as map_fonts
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import load_settings
@@ -77,7 +78,7 @@ def test_a_field_alone_is_drawn_too(simulated: SimulatedField) -> None:
 
 
 def test_no_number_is_cut_or_lies_on_another() -> None:
-    from geofield.map_labels import OBSTACLE_LOOK, TRACK_LOOK, Label, draw_labels
+    from geofield.mapping.labels import OBSTACLE_LOOK, TRACK_LOOK, Label, draw_labels
 
     image = Image.new("RGB", (200, 100))
     labels = [Label(-4, 50, "128", OBSTACLE_LOOK), Label(199, 99, "7", OBSTACLE_LOOK)]
@@ -125,9 +126,9 @@ def test_letters_beyond_english_are_no_boxes(plan: Plan) -> None:
 
 
 def test_without_any_other_font_accents_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(map_font, "_OTHERS", ())
-    text, _ = map_font.written(
+    monkeypatch.setattr(map_fonts, "_OTHERS", ())
+    text, _ = map_fonts.written(
         "Gro\N{LATIN SMALL LETTER SHARP S}e Pr\N{LATIN SMALL LETTER E WITH ACUTE}s", 14
     )
     assert text == "Grosse Pres"
-    assert map_font.written("Long meadow, 3.62 ha", 14)[0] == "Long meadow, 3.62 ha"
+    assert map_fonts.written("Long meadow, 3.62 ha", 14)[0] == "Long meadow, 3.62 ha"

@@ -18,8 +18,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from geofield import schema, theme
 from geofield.grid import Grid
-from geofield.map_font import written
-from geofield.map_labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw_labels
+from geofield.mapping.fonts import written
+from geofield.mapping.labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw_labels
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
     credit_in_words,
@@ -35,9 +35,11 @@ if TYPE_CHECKING:
 
 #: Red, green and blue; a fourth number is the opacity.
 Colour = tuple[int, ...]
+#: Line and space, pixels.
+Dash = tuple[float, float]
 
 _CASING: Colour = (0, 0, 0, 150)
-#: Line and space where an outline is the picture's frame, pixels.
+#: Where an outline is the picture's frame.
 _FRAME_DASH = (9.0, 7.0)
 _INK: Colour = (255, 255, 255, 255)
 _PANEL: Colour = (20, 24, 28, 215)
@@ -54,20 +56,10 @@ _MAX_LABELS = 40
 def draw_map(
     dataset: Dataset, scene: Scene | None = None, *, long_side_px: int = LONG_SIDE_PX
 ) -> Image.Image:
-    """Draw the tables of a dataset on its picture.
+    """Draw the tables of a dataset on its picture, or on plain ground where there is none.
 
-    Parameters
-    ----------
-    dataset : Dataset
-    scene : Scene, optional
-        The picture below; plain ground where there is none.
-    long_side_px : int
-        Long side of the map part of the picture.
-
-    Returns
-    -------
-    PIL.Image.Image
-        RGB; the map with a panel below: legend, scale, north, figures, attribution.
+    The map part, its long side of so many pixels, has a panel below: legend, scale, north, figures,
+    attribution.
     """
     margin_px = 0 if scene is None else _margin_px(dataset, scene.grid)
     grid = _plain_grid(dataset) if scene is None else _widened(scene.grid, margin_px)
@@ -128,9 +120,7 @@ class _Canvas:
     def picture(self, scene: Scene, margin_px: int) -> None:
         rgb = scene.rgb.copy()
         rgb[~scene.valid] = 70
-        width, height = (
-            round(n * self.factor) for n in (scene.grid.width_px, scene.grid.height_px)
-        )
+        width, height = round(rgb.shape[1] * self.factor), round(rgb.shape[0] * self.factor)
         picture = Image.fromarray(rgb).resize((width, height), Image.Resampling.BICUBIC)
         corner = round(margin_px * self.factor)
         self.image.paste(picture, (corner, corner))
@@ -152,33 +142,21 @@ class _Canvas:
             self.outlines(part.geometry, look.color, 1.6 * _OVERSAMPLING, dash=look.dash)
         outline = self.dataset.table("field").geometry
         self.outlines(outline, theme.OUTLINE, 2.4 * _OVERSAMPLING)
-        self.lines(self.frame_lines(), "#000000", 3.2 * _OVERSAMPLING)
-        self.lines(self.frame_lines(), theme.DOUBT, 2.8 * _OVERSAMPLING, dash=_FRAME_DASH)
+        frame = frame_lines(self.dataset)
+        self.lines(frame, "#000000", 3.2 * _OVERSAMPLING)
+        self.lines(frame, theme.DOUBT, 2.8 * _OVERSAMPLING, dash=_FRAME_DASH)
         self.numbers(obstacles, segments)
-
-    def frame_lines(self) -> list[shapely.LineString]:
-        """Where the outline is the picture's frame: a little inside it, to be seen."""
-        return frame_lines(self.dataset)
 
     def pixels(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y = self.grid.from_crs(coordinates[:, 0], coordinates[:, 1], self.dataset.crs)
         return np.column_stack([x, y]) * self.factor
 
     def lines(
-        self,
-        shapes: Iterable[Any],
-        color: str,
-        width: float,
-        dash: tuple[float, float] | None = None,
+        self, shapes: Iterable[Any], color: str, width: float, dash: Dash | None = None
     ) -> None:
         colour = theme.rgb(color)
         for part in shapely.get_parts(np.array(list(shapes), dtype=object)):
-            points = self.pixels(shapely.get_coordinates(part))
-            strokes = (
-                [points.ravel().tolist()]
-                if dash is None
-                else _dashes(points, *(n * _OVERSAMPLING for n in dash))
-            )
+            strokes = self.strokes(part, dash)
             # Dark below, so that a light line shows on light ground, too.
             for stroke in strokes:
                 self.draw.line(stroke, fill=_CASING, width=round(width + 1.6 * _OVERSAMPLING))
@@ -186,25 +164,21 @@ class _Canvas:
                 self.draw.line(stroke, fill=colour, width=round(width))
 
     def outlines(
-        self,
-        shapes: gpd.GeoSeries,
-        color: str,
-        width: float,
-        *,
-        dash: tuple[float, float] | None = None,
+        self, shapes: gpd.GeoSeries, color: str, width: float, dash: Dash | None = None
     ) -> None:
-        colour = theme.rgb(color)
-        rings = shapely.get_rings(shapely.get_parts(shapes.to_numpy()))
-        for ring in rings:
-            points = self.pixels(shapely.get_coordinates(ring))
-            flat = points.ravel().tolist()
-            if dash is None:
-                self.draw.line(flat, fill=_CASING, width=round(width * 2), joint="curve")
-            if dash is not None:
-                for piece in _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING):
-                    self.draw.line(piece, fill=colour, width=round(width))
-            else:
-                self.draw.line(flat, fill=colour, width=round(width), joint="curve")
+        colour, joint = theme.rgb(color), "curve" if dash is None else None
+        for ring in shapely.get_rings(shapely.get_parts(shapes.to_numpy())):
+            for stroke in self.strokes(ring, dash):
+                if dash is None:
+                    self.draw.line(stroke, fill=_CASING, width=round(width * 2), joint=joint)
+                self.draw.line(stroke, fill=colour, width=round(width), joint=joint)
+
+    def strokes(self, line: Any, dash: Dash | None) -> list[list[float]]:
+        """A line, or the drawn pieces of a dashed one, each x, y, x, y."""
+        points = self.pixels(shapely.get_coordinates(line))
+        if dash is None:
+            return [points.ravel().tolist()]
+        return _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING)
 
     def numbers(self, obstacles: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> None:
         if len(obstacles) and len(obstacles) <= 150:
@@ -259,13 +233,7 @@ def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float
         font = ImageFont.load_default(_DOUBT_SIZE)
         draw.text(place, line, font=font, fill=theme.rgb(theme.DOUBT), anchor="ls")
     credit, font = written(credit_in_words(dataset), 12)
-    draw.text(
-        (16, image.height - 12),
-        credit,
-        font=font,
-        fill=(190, 195, 200),
-        anchor="ls",
-    )
+    draw.text((16, image.height - 12), credit, font=font, fill=(190, 195, 200), anchor="ls")
     return image
 
 
@@ -278,41 +246,32 @@ def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) ->
         draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
 
 
-def _legend_entries(dataset: Dataset) -> list[tuple[str, str, tuple[float, float] | None]]:
+def _legend_entries(dataset: Dataset) -> list[tuple[str, str, Dash | None]]:
     """Colour, words and dashes of what the map shows."""
-    statuses = list(dict.fromkeys(dataset.table("obstacles")["status"].tolist()))
-    dashed: tuple[float, float] = (5.0, 5.0)
-    entries: list[tuple[str, str, tuple[float, float] | None]] = [(theme.OUTLINE, "field", None)]
-    if frame_lines(dataset):
-        entries.append((theme.DOUBT, "goes on outside", _FRAME_DASH))
-    for status, look in theme.STATUS.items():
-        if status in statuses:
-            entries.append((look.color, f"obstacle, {status}", look.dash))
-    if dataset.has("segments"):
-        entries.append((theme.TRACK, "track", (9.0, 4.0)))
-    if dataset.has("gaps"):
-        entries.append((theme.GAP, "gap", dashed))
-    if dataset.has("headland_tracks"):
-        entries.append((theme.HEADLAND, "headland", None))
+    statuses = set(dataset.table("obstacles")["status"])
     turns = dataset.table("turns")
     unfit = int((turns["fits"] == "no").sum())
-    if len(turns) > unfit:
-        entries.append((theme.TURN, "turn", None))
-    if unfit:
-        entries.append((theme.UNFIT, f"turn that does not fit ({unfit})", None))
-    return entries
+    entries: list[tuple[object, str, str, Dash | None]] = [
+        (True, theme.OUTLINE, "field", None),
+        (frame_lines(dataset), theme.DOUBT, "goes on outside", _FRAME_DASH),
+        *(
+            (status in statuses, look.color, f"obstacle, {status}", look.dash)
+            for status, look in theme.STATUS.items()
+        ),
+        (dataset.has("segments"), theme.TRACK, "track", (9.0, 4.0)),
+        (dataset.has("gaps"), theme.GAP, "gap", (5.0, 5.0)),
+        (dataset.has("headland_tracks"), theme.HEADLAND, "headland", None),
+        (len(turns) > unfit, theme.TURN, "turn", None),
+        (unfit, theme.UNFIT, f"turn that does not fit ({unfit})", None),
+    ]
+    return [(color, text, dash) for shown, color, text, dash in entries if shown]
 
 
 def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) -> None:
     for index, words in enumerate(figures_in_words(dataset)):
         line, font = written(words, 16 if index == 0 else 14)
-        draw.text(
-            (width - 16, top + 14 + 22 * index),
-            line,
-            font=font,
-            fill=_INK[:3],
-            anchor="rm",
-        )
+        place = (width - 16, top + 14 + 22 * index)
+        draw.text(place, line, font=font, fill=_INK[:3], anchor="rm")
 
 
 def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
@@ -339,16 +298,7 @@ def _scale_bar(
     left = right - length / metres_per_px
     for width, colour in ((7, (0, 0, 0)), (3, _INK[:3])):
         draw.line([left, bottom, right, bottom], fill=colour, width=width)
-    label = length_in_words(length)
-    draw.text(
-        ((left + right) / 2, bottom - 7),
-        label,
-        font=ImageFont.load_default(14),
-        fill=_INK[:3],
-        anchor="ms",
-        stroke_width=2,
-        stroke_fill=(0, 0, 0),
-    )
+    _outlined(draw, ((left + right) / 2, bottom - 7), length_in_words(length), 14, "ms")
 
 
 def _north_arrow(draw: ImageDraw.ImageDraw, grid: Grid, x: float, y: float) -> None:
@@ -361,12 +311,12 @@ def _north_arrow(draw: ImageDraw.ImageDraw, grid: Grid, x: float, y: float) -> N
     left, right = ((x - 20 * ux + s * 9 * uy, y - 20 * uy - s * 9 * ux) for s in (1, -1))
     notch = (x - 11 * ux, y - 11 * uy)
     draw.polygon([tip, left, notch, right], fill=_INK[:3], outline=(0, 0, 0))
-    draw.text(
-        (x + 31 * ux, y + 31 * uy),
-        "N",
-        font=ImageFont.load_default(15),
-        fill=_INK[:3],
-        anchor="mm",
-        stroke_width=2,
-        stroke_fill=(0, 0, 0),
-    )
+    _outlined(draw, (x + 31 * ux, y + 31 * uy), "N", 15, "mm")
+
+
+def _outlined(
+    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, size_px: int, anchor: str
+) -> None:
+    """Write light letters with a dark rim, to be read on any ground."""
+    font, rim = ImageFont.load_default(size_px), (0, 0, 0)
+    draw.text(at, text, _INK[:3], font, anchor, stroke_width=2, stroke_fill=rim)

@@ -37,10 +37,7 @@ class Label:
 def draw_labels(image: Image.Image, labels: Iterable[Label]) -> list[Box]:
     """Write numbers into a picture, the first ones first; what would lie on one is left out.
 
-    Returns
-    -------
-    list of (left, top, right, bottom)
-        Where they are, pixels.
+    Returned is where they are: left, top, right, bottom in pixels.
     """
     draw = ImageDraw.Draw(image)
     taken: list[Box] = []
@@ -54,15 +51,8 @@ def draw_labels(image: Image.Image, labels: Iterable[Label]) -> list[Box]:
         if any(_overlap(box, other) for other in taken):
             continue
         taken.append(box)
-        draw.text(
-            (x, y),
-            each.text,
-            font=font,
-            fill=look.ink,
-            anchor="mm",
-            stroke_width=2,
-            stroke_fill=look.around,
-        )
+        ink, rim = look.ink, look.around
+        draw.text((x, y), each.text, ink, font, "mm", stroke_width=2, stroke_fill=rim)
     return taken
 
 

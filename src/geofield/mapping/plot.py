@@ -27,19 +27,9 @@ if TYPE_CHECKING:
 
 
 def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the tables of a plan.
+    """Draw the tables of a plan, on its picture where there is one, reprojected where need be.
 
-    Parameters
-    ----------
-    dataset : Dataset
-    scene : Scene, optional
-        The picture below; reprojected where it is in another CRS.
-    ax : Axes, optional
-
-    Returns
-    -------
-    Axes
-        x and y in metres of the dataset's CRS, one scale for both.
+    The axes are metres of the dataset's CRS, one scale for both.
 
     Raises
     ------
