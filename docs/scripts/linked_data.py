@@ -5,10 +5,18 @@ from __future__ import annotations
 import rdflib
 from rdflib.namespace import OWL, RDFS, SH
 
+from geofield.formats.rdf.graph import ontology
 from geofield.formats.rdf.layers import layer_maps
-from geofield.formats.rdf.namespaces import DEFAULT_BASE, GF, SCHEMA_PREFIXES, compact
+from geofield.formats.rdf.namespaces import (
+    DEFAULT_BASE,
+    GF,
+    ONTOLOGY,
+    SCHEMA_PREFIXES,
+    SHAPES,
+    compact,
+    resource,
+)
 from geofield.formats.rdf.query import queries
-from geofield.formats.rdf.resources import ONTOLOGY, SHAPES, ontology, resource
 
 _WORDS = rdflib.Graph().parse(data=resource(ONTOLOGY), format="turtle")
 _SHAPES = rdflib.Graph().parse(data=resource(SHAPES), format="turtle")

@@ -11,10 +11,19 @@ import rdflib
 from rdflib import OWL, RDF, RDFS
 
 from geofield import schema
+from geofield.formats.rdf.graph import label
 from geofield.formats.rdf.layers import CODE_LISTS, YES_NO, classes, layer_maps, value_iri
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import GF, SH, expand
-from geofield.formats.rdf.resources import CONTEXT, ONTOLOGY, SHAPES, context, label, resource
+from geofield.formats.rdf.namespaces import (
+    CONTEXT,
+    CONTEXT_TERMS,
+    GF,
+    ONTOLOGY,
+    SH,
+    SHAPES,
+    expand,
+    resource,
+)
 
 DATATYPES = {"int": "xsd:integer", "float": "xsd:double", "str": "xsd:string", "date": "xsd:date"}
 COLUMNS = [
@@ -81,7 +90,7 @@ def test_each_column_of_the_schema_is_held_by_a_shape(shapes, layer, column, nam
 
 @pytest.mark.parametrize(("layer", "column", "name"), COLUMNS)
 def test_each_column_of_the_schema_has_a_term_in_the_context(layer, column, name):
-    entry = context()[name.partition(":")[2]]
+    entry = CONTEXT_TERMS[name.partition(":")[2]]
     wanted = "@id" if name in CODE_LISTS else range_of(column, name)
     assert entry == {"@id": name} | ({} if wanted == "xsd:string" else {"@type": wanted})
 
@@ -94,7 +103,7 @@ def test_each_value_of_a_code_list_is_in_the_ontology(ontology):
 
 
 def test_the_context_holds_no_term_that_the_ontology_does_not_explain():
-    terms = [entry["@id"] for entry in context().values() if isinstance(entry, dict)]
+    terms = [entry["@id"] for entry in CONTEXT_TERMS.values() if isinstance(entry, dict)]
     assert [name for name in terms if not label(name)] == []
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "scripts"))
 
+from geofield.formats.rdf.graph import ontology
 from geofield.formats.rdf.layers import layer_maps
 from geofield.formats.rdf.namespaces import compact
 from geofield.formats.rdf.query import queries
-from geofield.formats.rdf.resources import ontology
 from linked_data import classes, individuals, ontology_page, queries_page
 
 

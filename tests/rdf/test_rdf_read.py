@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pyoxigraph as ox
 import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
@@ -13,7 +12,6 @@ from rdf_plans import small_plan
 
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf import write
-from geofield.formats.rdf.jsonld import flat_triples
 from geofield.formats.rdf.read import from_graph, load, read
 
 WRITERS = {
@@ -235,31 +233,3 @@ def test_an_infinite_number_is_refused(plan, tmp_path):
     endless = type(plan)({**plan.tables, "obstacles": obstacles}, plan.crs, plan.name)
     with pytest.raises(FormatError, match="radius_m is infinite"):
         write.write_turtle(endless, tmp_path, options={})
-
-
-@pytest.mark.parametrize("profile", write.PROFILES)
-def test_json_of_our_own_form_reads_as_a_parser_reads_it(plan, tmp_path, profile):
-    options = {"rdf_profile": profile, "points": True}
-    (path,) = write.write_jsonld(plan, tmp_path, options=options)
-    known = {(q.subject.value, q.predicate.value, q.object.value) for q in ox.parse(path=path)}
-    assert set(flat_triples(path)) == known
-    assert_same_tables(read(path), plan, points=True)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('"gf": "https://w3id.org/geofield#"', '"gf": "https://elsewhere.example/"'),
-        ('"@graph"', '"@id": "http://e/g", "@graph"'),
-        ('"obstacleNo": "1"', '"obstacleNo": 1'),
-        ('"@id": "https://example.org/', '"@id": "https://example .org/'),
-        ('"@id": "https://example.org/', '"@id": "urn:x/'),
-        ('"@graph": [', '"@graph": [{"gf:trackNo": "7"},'),
-    ],
-)
-def test_json_of_any_other_form_is_left_to_the_parser(plan, tmp_path, old, new):
-    (path,) = write.write_jsonld(plan, tmp_path, options={})
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-    assert flat_triples(path) is None

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import pyoxigraph as ox
 import pytest
 from rdf_plans import long_plan, small_plan
 
 from geofield.formats.rdf import write
 from geofield.formats.rdf.graph import Graph
-from geofield.formats.rdf.namespaces import GF, PREFIXES, STUDY_PREFIXES
+from geofield.formats.rdf.namespaces import GF, PREFIXES, STUDY_PREFIXES, node
+from geofield.formats.rdf.parse import SYNTAXES
 from geofield.formats.rdf.read import load, read
-from geofield.formats.rdf.repeated import repeated
-from geofield.formats.rdf.triples import triples
+from geofield.formats.rdf.repeated import repeated, write_repeated
+from geofield.formats.rdf.triples import Nodes, triples
 
 
 def told(graph: Graph) -> set[tuple[str, str, str]]:
@@ -22,67 +26,159 @@ def parsed(path) -> set[tuple[str, str, str]]:
     return {(q.subject.value, q.predicate.value, q.object.value) for q in ox.parse(path=path)}
 
 
+WRITERS = {
+    ".rdf": write.write_rdfxml,
+    ".ttl": write.write_turtle,
+    ".jsonld": write.write_jsonld,
+    ".nt": write.write_ntriples,
+}
+
+
+def by_pattern(path) -> Graph | None:
+    return repeated(path, SYNTAXES[path.suffix])
+
+
 @pytest.fixture(scope="module")
 def tracks(tmp_path_factory):
-    """The file of tracks and points, by profile."""
+    """The file of tracks and points, by profile and syntax."""
     paths = {}
     for profile in write.PROFILES:
         folder = tmp_path_factory.mktemp(profile)
         options = {"rdf_profile": profile, "points": True}
         # In several chunks, so that the study's points are no one run.
-        paths[profile] = write.write_rdfxml(long_plan(21_000), folder, options=options)[-1]
+        plan = long_plan(21_000)
+        for suffix, writer in WRITERS.items():
+            paths[profile, suffix] = writer(plan, folder, options=options)[-1]
     return paths
 
 
+@pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("profile", write.PROFILES)
-def test_the_pattern_tells_what_the_parser_tells(tracks, profile):
-    graph = repeated(tracks[profile])
+def test_the_pattern_tells_what_the_parser_tells(tracks, profile, suffix):
+    graph = by_pattern(tracks[profile, suffix])
     assert graph is not None
-    assert told(graph) == parsed(tracks[profile])
+    assert told(graph) == parsed(tracks[profile, suffix])
 
 
+@pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("profile", write.PROFILES)
-def test_points_come_back_in_their_order(tracks, profile):
-    numbers = read(tracks[profile]).table("track_points")["point_no"].tolist()
+def test_points_come_back_in_their_order(tracks, profile, suffix):
+    numbers = read(tracks[profile, suffix]).table("track_points")["point_no"].tolist()
     assert len(numbers) > 20_000
     assert numbers == sorted(numbers)
 
 
+@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("profile", write.PROFILES)
+def test_points_of_a_plan_with_a_headland_and_a_route_stand_last(tmp_path, profile, suffix):
+    plan = small_plan(spacing_m=6.0, step_m=1.0)
+    assert all(map(plan.has, ("headland", "headland_tracks", "route", "turns")))
+    options = {"rdf_profile": profile, "points": True}
+    path = WRITERS[suffix](plan, tmp_path, options=options)[-1]
+    graph = by_pattern(path)
+    assert graph is not None
+    assert told(graph) == parsed(path)
+
+
 POINT = '\t<gf:TrackPoint rdf:about="https://example.org/'
+CLASS = "<http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <https://w3id.org/geofield#TrackPoint>"
 #: What an editor or another program may make of one place in such a file.
 OTHERS = {
-    "a comment": ("\t</gf:TrackPoint>\n", "\t</gf:TrackPoint><!-- -->\n"),
-    "a base": ("<rdf:RDF ", '<rdf:RDF xml:base="https://example.org/" '),
-    "a document type": ("<rdf:RDF ", "<!DOCTYPE rdf:RDF>\n<rdf:RDF "),
-    "no UTF-8": ("</gf:planner>", "\udcff</gf:planner>"),
-    "not well-formed": ("</gf:planner>", "</gf:plan>"),
-    "nested": ("</gf:planner>\n", f'{POINT}x">\n\t</gf:TrackPoint>\n</gf:planner>\n'),
-    "two at one": ("/point/8/geometry", "/point/7/geometry"),
+    ".rdf": {
+        "a comment": ("\t</gf:TrackPoint>\n", "\t</gf:TrackPoint><!-- -->\n"),
+        "a base": ("<rdf:RDF ", '<rdf:RDF xml:base="https://example.org/" '),
+        "a document type": ("<rdf:RDF ", "<!DOCTYPE rdf:RDF>\n<rdf:RDF "),
+        "no UTF-8": ("</gf:planner>", "\udcff</gf:planner>"),
+        "not well-formed": ("</gf:planner>", "</gf:plan>"),
+        "nested": ("</gf:planner>\n", f'{POINT}x">\n\t</gf:TrackPoint>\n</gf:planner>\n'),
+        "two at one": ('/point/8/geometry">', '/point/7/geometry">'),
+        "a space in a name": ('gf:basedOn rdf:resource="', 'gf:basedOn rdf:resource=" '),
+        "a control character": ("</gf:planner>", "\x02</gf:planner>"),
+        "a control reference": ("</gf:planner>", "&#2;</gf:planner>"),
+    },
+    ".ttl": {
+        "a long text": ('dcterms:title "', 'dcterms:title """x" .\n<a:b> dcterms:title "y"""'),
+        "a text of lines": ('gf:planner "', "gf:planner '''x\n''', \""),
+        "a comment": ("\n<", " # <\n<"),
+        "an open statement": ("> a gf:Field ,", ">\n<http://e/p> a gf:Field ,"),
+        "another prefix": ('0.1.0" .\n', '0.1.0" .\n@prefix gf: <http://e/> .\n'),
+        "another prefix in a line": (
+            "/point/9> a gf:TrackPoint ;",
+            "/point/9> a gf:Y . @prefix gf: <http://e/> .\n<http://e/z> a gf:TrackPoint ;",
+        ),
+        "another point": ("> a gf:Field ,", "> a gf:TrackPoint , gf:Field ,"),
+    },
+    ".nt": {"another point": ("\n", f"\n<http://e/x> {CLASS} .\n")},
+    ".jsonld": {
+        "words elsewhere": ('"@context": {', '"@context": {"@import": "http://e/c",'),
+        "a graph of its own": ('"@graph"', '"@id": "http://e/g", "@graph"'),
+        "a space in a name": ('"@id": "https://ex', '"@id": "https:// ex'),
+        "a node in a node": ('"@graph": [\n{', '"@graph": [\n{"gf:x": [{},\n{'),
+    },
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
-def test_any_other_form_is_left_to_the_parser(tracks, tmp_path, name):
-    text, path = tracks["geosparql"].read_text(), tmp_path / "tracks.rdf"
-    old, new = OTHERS[name]
+@pytest.mark.parametrize(
+    ("suffix", "name"), [(suffix, name) for suffix, each in OTHERS.items() for name in each]
+)
+def test_any_other_form_is_left_to_the_parser(tracks, tmp_path, suffix, name):
+    old, new = OTHERS[suffix][name]
+    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
     assert old in text
-    path.write_bytes(text.replace(old, new).encode(errors="surrogateescape"))
-    assert repeated(path) is None
+    path.write_bytes(text.replace(old, new, 1).encode(errors="surrogateescape"))
+    assert by_pattern(path) is None
+
+
+@pytest.mark.parametrize("host", ["example.org:x", "a@b@c"])
+@pytest.mark.parametrize("suffix", [".rdf", ".ttl", ".nt"])
+def test_names_that_the_parser_refuses_are_refused(tracks, tmp_path, suffix, host):
+    path = tmp_path / f"tracks{suffix}"
+    text = tracks["geosparql", suffix].read_text()
+    path.write_text(text.replace("https://example.org/", f"https://{host}/"))
+    assert by_pattern(path) is None
+
+
+@pytest.mark.parametrize("suffix", [".ttl", ".nt"])
+def test_of_two_values_the_first_in_the_file_stays_the_first(tracks, tmp_path, suffix):
+    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
+    point = re.search(r"<[^<>]*/point/7>", text)
+    assert point is not None
+    after = re.search(r"\.\n(?=<[^<>]*/point/9>)", text)
+    assert after is not None
+    more = f'{point[0]} <{GF}pointNo> "99"^^<http://www.w3.org/2001/XMLSchema#integer> .\n'
+    path.write_text(text[: after.end()] + more + text[after.end() :])
+    wanted = Graph()
+    wanted.add((q.subject.value, q.predicate.value, q.object.value) for q in ox.parse(path=path))
+    assert load(path).columns == wanted.columns
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("suffix", "old", "new"),
     [
-        ("POINT (33.53", "POINT  (33.53"),
-        ("/track/7/", "/track/7%20/"),
-        ("/point/7/geometry", "/point/7&amp;/geometry"),
-        (">7</gf:pointNo>", ">7</gf:pointNo>\n\t\t<gf:note>a &lt;b&gt; &amp;amp;</gf:note>"),
-        (">9</gf:pointNo>", ">&#57;</gf:pointNo>"),
-        (">9</gf:pointNo>", ">9&amp;lt;</gf:pointNo>"),
+        (".rdf", "POINT (33.53", "POINT  (33.53"),
+        (".rdf", "/track/7/", "/track/7%20/"),
+        (".rdf", "/point/7/geometry", "/point/7&amp;/geometry"),
+        (
+            ".rdf",
+            ">7</gf:pointNo>",
+            ">7</gf:pointNo>\n\t\t<gf:x>&lt;b&gt; &amp;amp;</gf:x>",
+        ),
+        (".rdf", ">9</gf:pointNo>", ">&#57;</gf:pointNo>"),
+        (".rdf", ">9</gf:pointNo>", ">9&amp;lt;</gf:pointNo>"),
+        (".ttl", "gf:pointNo 9 ;", "gf:pointNo 9, 10 ;"),
+        (".ttl", "gf:pointNo 9 ;", "gf:pointNo +9 ;"),
+        (".ttl", "POINT (33.53", "POINT\\u0020(33.53"),
+        (".ttl", "/point/7/geometry> a", "/point/7/geometry> # seven\n a"),
+        (".nt", '"9"^^', '"\\u0039"^^'),
+        (".nt", "/track/7/", "/track/7%20/"),
+        (".nt", "/point/7/geometry> .", "/point/7/geometry> . # seven"),
+        (".jsonld", '"pointNo": "9"', '"pointNo": 9'),
+        (".jsonld", '/point/7/geometry"}', '/point/7/geometry", "gf:note": "a \\"b\\""}'),
+        (".jsonld", '"onSegment": "https:', '"onSegment": "gf:'),
     ],
 )
-def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, old, new):
-    text, path = tracks["geosparql"].read_text(), tmp_path / "tracks.rdf"
+def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, suffix, old, new):
+    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
     assert old in text
     path.write_text(text.replace(old, new, 1))
     graph = load(path)
@@ -91,15 +187,69 @@ def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, old, new
     assert graph.of_type("gf:TrackPoint") == points
 
 
-def test_points_are_written_as_pyoxigraph_writes_them(tmp_path):
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_names_that_another_place_may_change_are_left_to_the_parser(tracks, tmp_path, suffix):
+    # "urn:x/7" is whole, "x:7" among such may be a short form.
+    path = tmp_path / f"tracks{suffix}"
+    text = tracks["geosparql", suffix].read_text()
+    path.write_text(text.replace("https://example.org/", "urn:x:"))
+    assert by_pattern(path) is None
+    assert told(load(path)) == parsed(path)
+
+
+WRITTEN = [suffix for suffix in WRITERS if suffix != ".jsonld"]
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
+def test_points_are_written_as_pyoxigraph_writes_them(tmp_path, suffix):
+    syntax = SYNTAXES[suffix]
     name = "a \"b\" 'c' <d> &amp; %s \u00e9"
     dataset = small_plan(spacing_m=2.0, step_m=1.0, name=name)
     for profile in write.PROFILES:
         options = {"rdf_profile": profile, "points": True, "plan_name": name}
-        *_, path = write.write_rdfxml(dataset, tmp_path, options=options)
-        groups = write.describe(dataset, options).product("tracks")
-        whole = tmp_path / "whole.rdf"
+        *_, path = WRITERS[suffix](dataset, tmp_path, options=options)
+        described = write.describe(dataset, options)
+        is_xml = syntax == ox.RdfFormat.RDF_XML
+        groups = described.product("tracks") if is_xml else described.everything()
+        whole = tmp_path / "whole"
         prefixes = {**PREFIXES, **STUDY_PREFIXES} if profile == "study" else PREFIXES
-        ox.serialize(triples(groups), whole, ox.RdfFormat.RDF_XML, prefixes=prefixes)
+        ox.serialize(triples(groups), whole, syntax, prefixes=prefixes)
         assert whole.stat().st_size > 500_000
         assert path.read_bytes() == whole.read_bytes()
+
+
+#: Values of which some stand in a file in another form than the others.
+UNLIKE: dict[str, Any] = {
+    "signs": ox.Literal("-7", datatype=node("xsd:integer")),
+    "no number": ox.Literal("seven", datatype=node("xsd:integer")),
+    "exponents": ox.Literal("1.0E5", datatype=node("xsd:double")),
+    "decimals": ox.Literal("0.5", datatype=node("xsd:decimal")),
+    "truth": ox.Literal("true", datatype=node("xsd:boolean")),
+    "quotes": ox.Literal('so "called" \\ so'),
+    "lines": ox.Literal("one\ntwo\ttabs"),
+    "tongues": ox.Literal("chat", language="fr"),
+    "short names": node("gf:Field"),
+    "per cent": ox.Literal("%s of 100 %"),
+}
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
+@pytest.mark.parametrize("what", UNLIKE)
+def test_values_of_another_form_are_written_as_pyoxigraph_writes_them(tmp_path, suffix, what):
+    syntax = SYNTAXES[suffix]
+    other, count = UNLIKE[what], 400
+
+    def like(number: int) -> ox.NamedNode | ox.Literal:
+        if isinstance(other, ox.NamedNode):
+            return ox.NamedNode(f"https://example.org/{number}")
+        text = str(number) + (".5" if other.datatype == node("xsd:decimal") else "")
+        return ox.Literal(text, datatype=other.datatype if other.language is None else None)
+
+    values = [*map(like, range(count - 1)), other]
+    names = [ox.NamedNode(f"https://example.org/point/{number}") for number in range(count)]
+    groups = [(Nodes(names, [(node("rdfs:seeAlso"), values)]),)]
+    path, whole = tmp_path / "own", tmp_path / "whole"
+    with path.open("wb") as file:
+        write_repeated(groups, file, syntax, PREFIXES)
+    ox.serialize(triples(groups), whole, syntax, prefixes=PREFIXES)
+    assert path.read_bytes() == whole.read_bytes()

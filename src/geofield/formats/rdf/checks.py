@@ -12,12 +12,12 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
+from geofield.formats.rdf.geosparql import geometry_of
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
 from geofield.formats.rdf.namespaces import GML, STUDY_POINT
 from geofield.formats.rdf.parse import Problem
 from geofield.formats.rdf.scope import tracks_of
-from geofield.formats.rdf.wkt import geometry_of
 
 #: Farther than this from its field, in degrees (about 10 km), nothing belongs to it.
 _FAR_DEG = 0.1
@@ -35,6 +35,7 @@ _LINKS = {
 _AXES = "In CRS84 the longitude comes first."
 
 Bounds = tuple[float, float, float, float]
+_EARTH: Bounds = (-180.0, -90.0, 180.0, 90.0)
 
 
 def check_graph(graph: Graph) -> Iterator[Problem]:
@@ -50,26 +51,25 @@ def check_graph(graph: Graph) -> Iterator[Problem]:
 
 def _double_numbers(graph: Graph) -> Iterator[Problem]:
     """Numbers that must be unique: in the survey, in the plan, on the track."""
-    seen: dict[tuple[Any, ...], str] = {}
+    seen: dict[Any, str] = {}
+    keys: list[tuple[str, str, Any]] = []
     for layer in layer_maps():
         title = layer.layer.column(layer.layer.key[-1]).title.lower()
+        names = {column.name: name for column, name in layer.properties()}
+        numbers = [names[key] for key in layer.layer.key if key in names]
         for iri in graph.of_type(*classes(layer)) if layer.layer.name != "field" else ():
-            yield from _double(seen, iri, title, _key(graph, layer, iri))
+            keys.append((iri, title, _key(graph, layer, numbers, iri)))
     for iri in graph.of_type(GML + "point"):
         number = graph.value(iri, STUDY_POINT + "no")
-        yield from _double(seen, iri, "point", number and (GML, number))
+        keys.append((iri, "point", number and (GML, number)))
+    for iri, title, key in keys:
+        if key and seen.setdefault(key, iri) != iri:
+            message = f"Has the same {title} number {key[-1]} as <{seen[key]}>."
+            yield Problem(message, f"<{iri}>", None, "Give each its own number.", "unique-number")
 
 
-def _double(
-    seen: dict[tuple[Any, ...], str], iri: str, title: str, key: tuple[Any, ...] | Any
-) -> Iterator[Problem]:
-    if key and seen.setdefault(key, iri) != iri:
-        message = f"Has the same {title} number {key[-1]} as <{seen[key]}>."
-        yield Problem(message, f"<{iri}>", None, "Give each its own number.", "unique-number")
-
-
-def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
-    """What must be unique: layer and owner, then the layer's own key numbers."""
+def _key(graph: Graph, layer: LayerMap, terms: list[str], iri: str) -> tuple[Any, ...] | None:
+    """What must be unique: layer and owner, then the layer's own key numbers, of these terms."""
     owners = ["gf:onTrack", "gf:inPlan", "gf:inSurvey", "gf:inField"]
     owner = next(filter(None, (graph.value(iri, name) for name in owners)), None)
     if layer.layer.name == "track_points":
@@ -77,8 +77,7 @@ def _key(graph: Graph, layer: LayerMap, iri: str) -> tuple[Any, ...] | None:
         owner = graph.value(tracks_of(graph, [iri])[0], "gf:inPlan")
     elif layer.layer.name == "route":
         owner = graph.value(iri, "gf:inPlan")
-    names = {column.name: name for column, name in layer.properties()}
-    numbers = [graph.value(iri, names[key]) for key in layer.layer.key if key in names]
+    numbers = [graph.value(iri, term) for term in terms]
     return None if None in numbers else (layer.layer.name, owner, *numbers)
 
 
@@ -100,12 +99,13 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
         shape, crs = geometry_of(text, iri)
     except FormatError as error:
         message = error.message.split(">: ", 1)[-1]
-        yield Problem(message, f"<{iri}>", None, error.hint or "", "wkt").capital()
+        yield Problem(message, f"<{iri}>", None, error.hint or "", "wkt")
         return
     box = _lonlat_bounds(shape, crs)
     if box is not None:
         bounds[iri] = box
-    if crs.is_geographic and (box is None or not _inside((-180, -90, 180, 90), *box)):
+    on_earth = box and _near(_EARTH, box[0], box[1], 0) and _near(_EARTH, box[2], box[3], 0)
+    if crs.is_geographic and not on_earth:
         pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
         message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
         hint = "Are they metres, or latitude before longitude?"
@@ -120,9 +120,8 @@ def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
     if not crs.is_geographic:
         project = transformer(crs, LONLAT)
         (west, east), (south, north) = project.transform([west, east], [south, north])
-    return (
-        (west, south, east, north) if all(map(math.isfinite, (west, south, east, north))) else None
-    )
+    box = (west, south, east, north)
+    return box if all(map(math.isfinite, box)) else None
 
 
 def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
@@ -169,11 +168,6 @@ def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
                 yield Problem(message, f"<{iri}>", None, _AXES, "swapped-axes")
             else:
                 yield Problem("Lies far outside its field.", f"<{iri}>", rule="far-outside")
-
-
-def _inside(outer: Bounds | tuple[int, ...], *inner: float) -> bool:
-    west, south, east, north = inner
-    return bool(west >= outer[0] and south >= outer[1] and east <= outer[2] and north <= outer[3])
 
 
 def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:

@@ -9,13 +9,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import (
-    LONLAT,
-    grid_north_deg,
-    ground_areas_m2,
-    ground_lengths_m,
-    transformer,
-)
+from geofield.crs import LONLAT, grid_north_deg, ground_areas_m2, ground_lengths_m, transformer
 from geofield.grid import Grid
 
 if TYPE_CHECKING:
@@ -29,7 +23,10 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
     segments from tracks that have none. An obstacle without a word on its status counts as
     added by a person, so that no re-run drops it.
     """
-    _field(tables["field"], crs)
+    field = tables["field"]
+    shapes = field.geometry.to_numpy()
+    _fill(field, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
+    _fill(field, "perimeter_m", ground_lengths_m(shapely.get_exterior_ring(shapes), crs))
     _obstacles(tables["obstacles"], crs)
     numbered(tables["tracks"], "track_no")
     numbered(tables["track_points"], "point_no")
@@ -40,7 +37,10 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
         _fill(tables[name], "length_m", ground_lengths_m(tables[name].geometry.to_numpy(), crs))
     _positions(tables["track_points"], crs)
     if grid is not None:
-        _pixels(tables["track_points"], grid, crs)
+        points = tables["track_points"]
+        x, y = shapely.get_coordinates(points.geometry.to_numpy()).T
+        for column, values in zip(("x_px", "y_px"), grid.from_crs(x, y, crs), strict=True):
+            _fill(points, column, values)
 
 
 def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
@@ -49,20 +49,7 @@ def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
         frame.loc[missing, column] = np.asarray(values)[missing.to_numpy()]
 
 
-def _field(frame: gpd.GeoDataFrame, crs: CRS) -> None:
-    shapes = frame.geometry.to_numpy()
-    _fill(frame, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
-    if len(frame):
-        _fill(
-            frame,
-            "perimeter_m",
-            ground_lengths_m(shapely.get_exterior_ring(shapes), crs),
-        )
-
-
 def _obstacles(frame: gpd.GeoDataFrame, crs: CRS) -> None:
-    if not len(frame):
-        return
     _fill(frame, "kind", np.full(len(frame), "other", dtype=object))
     _fill(frame, "status", np.full(len(frame), "added", dtype=object))
     _fill(frame, "buffer_m", np.zeros(len(frame)))
@@ -87,25 +74,12 @@ def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
     _fill(frame, "lat", np.round(lat, 9))
 
 
-def _pixels(frame: gpd.GeoDataFrame, grid: Grid, crs: CRS) -> None:
-    shapes = frame.geometry.to_numpy()
-    x_px, y_px = grid.from_crs(shapely.get_x(shapes), shapely.get_y(shapes), crs)
-    _fill(frame, "x_px", x_px)
-    _fill(frame, "y_px", y_px)
-
-
 def _segments(tracks: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
     """Each part of a track as a segment."""
     parts, owner = shapely.get_parts(tracks.geometry.to_numpy(), return_index=True)
-    numbers = tracks["track_no"].to_numpy(dtype=np.int64)[owner]
-    first = np.r_[True, owner[1:] != owner[:-1]] if len(owner) else np.zeros(0, bool)
-    starts = np.maximum.accumulate(np.where(first, np.arange(len(owner)), 0))
-    return schema.table(
-        schema.SEGMENTS,
-        {"track_no": numbers, "segment_no": np.arange(len(owner)) - starts + 1},
-        parts,
-        crs,
-    )
+    numbers = tracks["track_no"].iloc[owner]
+    numbering = {"track_no": numbers, "segment_no": numbers.groupby(owner).cumcount() + 1}
+    return schema.table(schema.SEGMENTS, numbering, parts, crs)
 
 
 def _tracks(tables: dict[str, gpd.GeoDataFrame]) -> None:
@@ -113,12 +87,11 @@ def _tracks(tables: dict[str, gpd.GeoDataFrame]) -> None:
     if not len(tracks):
         return
     number = tracks["track_no"]
-    for column, layer in (("segment_count", "segments"), ("gap_count", "gaps")):
-        counts = tables[layer].groupby("track_no").size()
-        _fill(tracks, column, counts.reindex(number, fill_value=0).to_numpy())
-    if len(tables["track_points"]):
-        counts = tables["track_points"].groupby("track_no").size()
-        _fill(tracks, "point_count", counts.reindex(number, fill_value=0).to_numpy())
+    told = {"segment_count": "segments", "gap_count": "gaps", "point_count": "track_points"}
+    for column, layer in told.items():
+        if column != "point_count" or len(tables[layer]):
+            counts = tables[layer].groupby("track_no").size()
+            _fill(tracks, column, counts.reindex(number, fill_value=0).to_numpy())
     if tracks["heading_deg"].isna().any():
         crs = CRS(tracks.crs)
         _fill(tracks, "heading_deg", [_heading(line, crs) for line in tracks.geometry])

@@ -16,12 +16,19 @@ from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats.rdf.complete import numbered
-from geofield.formats.rdf.features import feature_group, point_group, row_iris
-from geofield.formats.rdf.layers import LayerMap, layer_map, layer_maps
+from geofield.formats.rdf.features import (
+    column_terms,
+    feature_group,
+    link_properties,
+    point_group,
+    row_iris,
+)
+from geofield.formats.rdf.layers import CANDIDATE, LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
 from geofield.formats.rdf.namespaces import crs_iri, node
-from geofield.formats.rdf.triples import Column, Group, Nodes, date_term, named, single, term
+from geofield.formats.rdf.triples import Column, Group, Nodes, date_term, named, single
 from geofield.model.dataset import Dataset
+from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -38,34 +45,17 @@ LICENCES = {
 }
 #: Metres by which `geo:sfWithin` may miss, for corners that are computed, not measured.
 WITHIN_TOLERANCE_M = 0.001
-#: What the rows of a layer are of: a property and one of the dataset's names.
-_BELONGS = {
-    "field": (
-        ("gf:inField", "field"), ("prov:wasDerivedFrom", "imagery"), ("prov:wasGeneratedBy", "run"),
-    ),
-    "obstacles": (
-        ("gf:inField", "field"), ("gf:inSurvey", "survey"), ("prov:wasDerivedFrom", "imagery"),
-    ),
-    "tracks": (("gf:inField", "field"), ("prov:wasDerivedFrom", "survey")),
-}  # fmt: skip
 #: The files of RDF/XML; also the order of the others.
 PRODUCTS = ("field", "obstacles", "tracks")
 
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A dataset about to be described.
-
-    Attributes
-    ----------
-    dataset : Dataset
-    names : Names
-    points : bool
-        Whether the track points are told: most of the bytes, and segments imply them.
-    """
+    """A dataset about to be described."""
 
     dataset: Dataset
     names: Names
+    #: Whether the track points are told: most of the bytes, and segments imply them.
     points: bool = False
 
     @property
@@ -86,7 +76,8 @@ class Description:
             yield from self._field()
         elif product == "tracks":
             yield from self._plan()
-        for layer in layer_maps():
+        # Points last: thousands of nodes of one shape at the end are read by the pattern of one.
+        for layer in sorted(layer_maps(), key=lambda each: each.layer == schema.TRACK_POINTS):
             if layer.product == product:
                 yield from self.layer(layer)
 
@@ -98,29 +89,45 @@ class Description:
                 yield point_group(chunk, self.names)
         elif self.dataset.has(name):
             frame = self.table(layer)
-            extra = self.belonging(name, frame)
-            yield feature_group(layer, frame, self.names, extra=extra, accuracy_m=self.accuracy_m)
+            columns = [*self.columns(layer, frame), *self.belonging(layer, frame)]
+            types = self.types(layer, frame)
+            yield feature_group(layer, frame, self.names, types, columns, self.accuracy_m)
             if name == schema.OBSTACLES.name:
                 yield from self.detections(frame)
+
+    def types(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[tuple[ox.NamedNode, ...]]:
+        """The classes of each row; obstacles that are not driven around are candidates."""
+        own = tuple(map(node, (layer.cls, *layer.also, "geo:Feature")))
+        if layer.layer.name != schema.OBSTACLES.name:
+            return [own] * len(frame)
+        avoided = set(active(frame)["obstacle_no"].tolist())
+        other = (node(CANDIDATE), *own[1:])
+        return [own if number in avoided else other for number in frame["obstacle_no"].tolist()]
+
+    def columns(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
+        """The columns of a layer, and its links to other rows, as properties."""
+        told = [
+            (node(name), column_terms(layer.layer.name, column, name, frame[column.name]))
+            for column, name in layer.properties()
+            if column.name in frame.columns
+        ]
+        return [*told, *link_properties(layer, frame, self.names)]
 
     def table(self, layer: LayerMap) -> gpd.GeoDataFrame:
         """A layer's table, a number in every row; a field's without what its own node tells."""
         table = self.dataset.table(layer.layer.name)
         if layer.layer.name != schema.FIELD.name:
             return keyed(layer, table)
-        apart = ["heading_deg"] if self._has_plan() else []
+        apart = ["heading_deg"] if self.dataset.has(schema.TRACKS.name) else []
         return table.drop(columns=[*apart, "field_id", "name"])
 
-    def belonging(self, name: str, frame: gpd.GeoDataFrame) -> list[Column]:
+    def belonging(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
         """What the rows of a layer say beyond their columns: what they belong to."""
-        layer = layer_map(name)
-        result: list[Column] = []
-        links = [*_BELONGS.get(name, ())]
-        if layer.in_plan and layer.says_plan:
-            links.append(("gf:inPlan", "plan"))
-        for predicate, owner in links:
-            target = _thing(getattr(self.names, owner))
-            result.append((node(predicate), [target] * len(frame)))
+        name, count = layer.layer.name, len(frame)
+        result: list[Column] = [
+            (node(predicate), [_thing(getattr(self.names, owner))] * count)
+            for predicate, owner in layer.belongs
+        ]
         if name in (schema.OBSTACLES.name, schema.TRACKS.name):
             result.append(self._within(frame))
         if name == schema.ROUTE.name:
@@ -159,16 +166,14 @@ class Description:
             geo_hasGeometry=tuple(map(ox.NamedNode, (place, *metric))),
         )
 
-    def _has_plan(self) -> bool:
-        return self.dataset.has(schema.TRACKS.name)
-
     def _plan(self) -> Iterator[Group]:
         """The plan of tracks, where the dataset has any layer of one."""
         dataset, names = self.dataset, self.names
         if not any(dataset.has(each.layer.name) for each in layer_maps() if each.in_plan):
             return
         rows = dataset.table(schema.FIELD.name)
-        heading = rows["heading_deg"].iloc[0] if len(rows) and self._has_plan() else np.nan
+        has_heading = len(rows) and dataset.has(schema.TRACKS.name)
+        heading = rows["heading_deg"].iloc[0] if has_heading else np.nan
         surveyed = len(rows) or dataset.has(schema.OBSTACLES.name)
         yield single(
             names.plan,
@@ -187,14 +192,14 @@ class Description:
         found = frame[frame["status"] != "added"]
         iris = row_iris(layer_map(schema.OBSTACLES.name), found, self.names)
         count, imagery = len(found), _thing(self.names.imagery)
-        confidence = found["confidence"].tolist()
+        confidence = schema.OBSTACLES.column("confidence")
         columns: list[Column] = [
             (node("rdf:type"), [(node("gf:Detection"), node("sosa:Observation"))] * count),
             (node("sosa:hasFeatureOfInterest"), named(iris)),
             (node("sosa:observedProperty"), [node("gf:obstaclePresence")] * count),
             (
                 node("sosa:hasSimpleResult"),
-                [None if pd.isna(value) else term(float(value)) for value in confidence],
+                column_terms("obstacles", confidence, "gf:confidence", found["confidence"]),
             ),
             (node("prov:wasDerivedFrom"), [imagery] * count),
         ]
@@ -262,13 +267,7 @@ def _thing(iri: str | None) -> ox.NamedNode | None:
 
 
 def keyed(layer: LayerMap, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """A layer's table with a number in every row, unique as its IRIs must be.
-
-    Raises
-    ------
-    FormatError
-        When two rows have the same key.
-    """
+    """A layer's table with a number in every row; refuses two rows of one key."""
     keys = list(layer.layer.key)
     last = keys[-1]
     if layer.layer.column(last).type == "int" and frame[last].isna().any():

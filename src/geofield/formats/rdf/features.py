@@ -15,14 +15,8 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, reproject
 from geofield.errors import FormatError
-from geofield.formats.rdf.layers import (
-    CANDIDATE,
-    CODE_LISTS,
-    YES_NO,
-    LayerMap,
-    layer_map,
-    value_iri,
-)
+from geofield.formats.rdf.geosparql import in_order
+from geofield.formats.rdf.layers import CODE_LISTS, YES_NO, LayerMap, layer_map, value_iri
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import CRS84, crs_iri, node
 from geofield.formats.rdf.triples import (
@@ -35,8 +29,6 @@ from geofield.formats.rdf.triples import (
     term,
     text_term,
 )
-from geofield.formats.rdf.wkt import in_order
-from geofield.model.obstacles import active
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -46,7 +38,6 @@ LONLAT_DECIMALS = 9
 #: Decimals of a track point, whose place is told once: a centimetre.
 POINT_DECIMALS = 7
 _OBSTACLES_IN_CAUSE = re.compile(r"obstacles?\s+([0-9][0-9,\s]*)")
-_ALSO = {"gf:Survey": ("prov:Entity",), "gf:Obstacle": ("sosa:FeatureOfInterest",)}
 
 
 def row_iris(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[str | None]:
@@ -66,44 +57,23 @@ def feature_group(
     layer: LayerMap,
     frame: gpd.GeoDataFrame,
     names: Names,
-    *,
-    extra: Sequence[Column] = (),
-    columns: Sequence[Column] | None = None,
-    types: Sequence[Any] | None = None,
+    types: Sequence[Any],
+    columns: Sequence[Column],
     accuracy_m: float | None = None,
 ) -> Group:
     """A layer's rows: each feature, its CRS84 geometry, its geometry in the metric CRS.
 
-    Parameters
-    ----------
-    layer : LayerMap
-    frame : GeoDataFrame
-        In the metric CRS, with the layer's columns and no missing keys.
-    names : Names
-    extra : sequence of Column
-        Further properties of the features.
-    columns : sequence of Column, optional
-        Instead of those of the layer's own columns.
-    types : sequence, optional
-        The classes of each row, where they are not the layer's own.
-    accuracy_m : float, optional
-        Of the geometries, metres.
+    `frame` is in the metric CRS and has no missing keys; `accuracy_m` (metres) is that of the
+    geometries.
     """
     iris = row_iris(layer, frame, names)
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     nodes, links = _geometries(iris, geometry, CRS(frame.crs), accuracy_m)
+    area = _area(layer, frame)
     return (
         Nodes(
             named(iris),
-            [
-                (node("rdf:type"), row_types(layer, frame) if types is None else types),
-                *_label(layer, frame),
-                *(column_properties(layer, frame) if columns is None else columns),
-                *_links(layer, frame, names),
-                *extra,
-                *_area(layer, frame),
-                *links,
-            ],
+            [(node("rdf:type"), types), *_label(layer, frame), *columns, *area, *links],
         ),
         *nodes,
     )
@@ -144,28 +114,8 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
     )
 
 
-def row_types(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[tuple[ox.NamedNode, ...]]:
-    """The classes of each row; obstacles that are not driven around are candidates."""
-    own = tuple(map(node, (layer.cls, *_ALSO.get(layer.cls, ()), "geo:Feature")))
-    if layer.layer.name != schema.OBSTACLES.name:
-        return [own] * len(frame)
-    avoided = set(active(frame)["obstacle_no"].tolist())
-    other = (node(CANDIDATE), *own[1:])
-    return [own if number in avoided else other for number in frame["obstacle_no"].tolist()]
-
-
-def column_properties(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
-    """A layer's columns as properties."""
-    return [
-        (node(name), _column_terms(layer.layer.name, column, name, frame[column.name]))
-        for column, name in layer.properties()
-        if column.name in frame.columns
-    ]
-
-
-def _column_terms(
-    layer: str, column: schema.Column, name: str, series: pd.Series[Any]
-) -> list[Any]:
+def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series[Any]) -> list[Any]:
+    """The terms of a column; refuses numbers that are infinite."""
     values = [None if pd.isna(value) else value for value in series.tolist()]
     if column.type == "float":
         for row, value in enumerate(values):
@@ -193,7 +143,8 @@ def _label(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
     return [(node("rdfs:label"), [text_term(layer.label.format(**row)) for row in rows])]
 
 
-def _links(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[Column]:
+def link_properties(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[Column]:
+    """A layer's links to other rows as properties."""
     result: list[Column] = []
     for link in layer.links:
         pointing = frame
@@ -228,32 +179,27 @@ def _geometries(
     iris: list[str | None], geometry: Any, crs: CRS, accuracy_m: float | None
 ) -> tuple[list[Nodes], list[Column]]:
     """The geometries' nodes, and the links from their features to them."""
-    default = [f"{iri}/geometry" for iri in iris]
     identifier = crs_iri(crs)
-    lonlat = reproject(geometry, crs, LONLAT)
-    decimals = LONLAT_DECIMALS if identifier else -1
-    nodes = [_geometry_nodes(default, lonlat, CRS84, decimals, accuracy_m)]
+    lonlat = shapely.to_wkt(
+        reproject(geometry, crs, LONLAT), rounding_precision=LONLAT_DECIMALS if identifier else -1
+    )
+    told = [("", CRS84, lonlat)]
     if identifier:
-        code = identifier.rpartition("/")[2]
-        metric = [f"{iri}/EPSG-{code}" for iri in default]
-        nodes.append(_geometry_nodes(metric, in_order(geometry, crs), identifier, -1, accuracy_m))
+        exact = shapely.to_wkt(in_order(geometry, crs), rounding_precision=-1)
+        told.append((f"/EPSG-{identifier.rpartition('/')[2]}", identifier, exact))
+    kinds = [(node(f"sf:{shape.geom_type}"), node("geo:Geometry")) for shape in geometry]
+    nodes = []
+    for name, iri, wkt in told:
+        columns: list[Column] = [
+            (node("rdf:type"), kinds),
+            (node("geo:asWKT"), Typed([f"<{iri}> {text}" for text in wkt], "geo:wktLiteral")),
+        ]
+        if accuracy_m is not None:
+            accuracy = [term(float(accuracy_m))] * len(iris)
+            columns.append((node("geo:hasMetricSpatialAccuracy"), accuracy))
+        nodes.append(Nodes(named(f"{each}/geometry{name}" for each in iris), columns))
     every = list(zip(*(each.subjects for each in nodes), strict=True))
     return nodes, [
         (node("geo:hasDefaultGeometry"), nodes[0].subjects),
         (node("geo:hasGeometry"), every),
     ]
-
-
-def _geometry_nodes(
-    iris: list[str], geometry: Any, crs: str, decimals: int, accuracy_m: float | None
-) -> Nodes:
-    wkt = shapely.to_wkt(geometry, rounding_precision=decimals)
-    kinds = [node(f"sf:{shape.geom_type}") for shape in geometry]
-    columns: list[Column] = [
-        (node("rdf:type"), [(kind, node("geo:Geometry")) for kind in kinds]),
-        (node("geo:asWKT"), Typed([f"<{crs}> {text}" for text in wkt], "geo:wktLiteral")),
-    ]
-    if accuracy_m is not None:
-        accuracy = term(float(accuracy_m))
-        columns.append((node("geo:hasMetricSpatialAccuracy"), [accuracy] * len(iris)))
-    return Nodes([ox.NamedNode(iri) for iri in iris], columns)

@@ -1,29 +1,106 @@
-"""GeoSPARQL functions in Python, for stores that have none: pyoxigraph and rdflib.
+"""GeoSPARQL: WKT literals with their CRS, and functions for stores that have none.
 
-Relations compare planar shapes in CRS84; distances, lengths and areas are measured on the
-WGS 84 ellipsoid, so that they are metres on the ground wherever the field lies.
+Literals are read with their axes put into geofield's order. The stores are pyoxigraph and rdflib;
+relations compare planar shapes in CRS84; distances, lengths and areas are measured on the WGS 84
+ellipsoid, so that they are metres on the ground wherever the field lies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
+import numpy as np
 import pyoxigraph as ox
 import shapely
-from pyproj import Geod
+from numpy.typing import NDArray
+from pyproj import CRS, Geod
+from shapely.errors import ShapelyError
 
-from geofield.crs import LONLAT, reproject, utm_crs
+from geofield.crs import LONLAT, northing_first, reproject, utm_crs
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, GEOF, expand, node
-from geofield.formats.rdf.wkt import geometries_of
+from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, EPSG, GEOF, expand, node
 
 _GEOD = Geod(ellps="WGS84")
 #: Units of measure that `geof:distance` and `geof:buffer` take.
 METRE_IRIS = ("http://www.opengis.net/def/uom/OGC/1.0/metre", expand("unit:M"))
 
 Value = str | float | bool | None
+
+
+def split_literal(text: str) -> tuple[str, str]:
+    """The CRS's IRI (CRS84 where none is named, as GeoSPARQL has it) and the WKT."""
+    iri, found, wkt = text.partition(">")
+    return (iri.lstrip()[1:], wkt) if found and iri.lstrip()[:1] == "<" else (CRS84, text)
+
+
+@lru_cache(maxsize=64)
+def known_crs(iri: str) -> CRS:
+    """The CRS of an OGC identifier; refuses any other."""
+    if iri == CRS84:
+        return CRS.from_user_input("OGC:CRS84")
+    code = iri.removeprefix(EPSG)
+    if code != iri and code.isdecimal():
+        return CRS.from_epsg(int(code))
+    raise FormatError(
+        f"The coordinate reference system <{iri}> is not known.",
+        hint=f"Use <{CRS84}> or <{EPSG}...>.",
+    )
+
+
+def geometry_of(text: str, subject: str) -> tuple[Any, CRS]:
+    """One WKT literal as a geometry (x before y) and its CRS; errors name the subject."""
+    iri, wkt = split_literal(text)
+    try:
+        return _shapes(iri, wkt)
+    except ShapelyError as error:
+        raise FormatError(f"<{subject}>: {wkt[:60]!r} is not WKT ({error}).") from error
+    except FormatError as error:
+        raise FormatError(f"<{subject}>: {error.message}", hint=error.hint) from error
+
+
+def _shapes(iri: str, wkt: Any) -> tuple[Any, CRS]:
+    """One WKT or many in the CRS of an IRI as geometries, and that CRS."""
+    shapes = shapely.from_wkt(wkt)
+    crs = known_crs(iri)
+    if not np.isfinite(shapely.get_coordinates(shapes)).all():
+        raise FormatError("a coordinate is not a finite number.")
+    return in_order(shapes, crs), crs
+
+
+def in_order(geometry: Any, crs: CRS) -> Any:
+    """Geometries between geofield's order of axes and the authority's, either way."""
+    if northing_first(crs):
+        return shapely.transform(geometry, lambda xy: xy[:, ::-1])
+    return geometry
+
+
+def geometries_of(
+    texts: Sequence[str | None], subjects: Sequence[str], target: CRS
+) -> NDArray[np.object_]:
+    """WKT literals as geometries in one CRS; None stays None."""
+    result = np.full(len(texts), None, dtype=object)
+    heads = [None if text is None else text[: text.find(">") + 1] for text in texts]
+    for head in dict.fromkeys(each for each in heads if each is not None):
+        rows = [row for row, each in enumerate(heads) if each == head]
+        known = [texts[row] or "" for row in rows]
+        try:
+            iri, _ = split_literal(known[0])
+            shapes, crs = _shapes(iri, [text[len(head) :] for text in known])
+        except (ShapelyError, FormatError):
+            # One by one, to name the one that is at fault.
+            for text, row in zip(known, rows, strict=True):
+                geometry_of(text, subjects[row])
+            raise
+        result[rows] = reproject(shapes, crs, target)
+    lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
+    for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
+        raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")
+    return result
+
+
+# -- functions ----------------------------------------------------------------------------------
 
 
 @lru_cache(maxsize=4096)

@@ -5,27 +5,23 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import chain
 
-from geofield.formats.rdf.namespaces import TYPE, expand
+import pyoxigraph as ox
+
+from geofield.formats.rdf.namespaces import ONTOLOGY, TYPE, expand, resource
 
 
 @dataclass(slots=True)
 class Graph:
-    """Triples as columns. Classes and predicates are asked for by prefixed name or full IRI.
+    """Triples as columns. Classes and predicates are asked for by prefixed name or full IRI."""
 
-    Attributes
-    ----------
-    columns : dict
-        Predicate to subject to its first value, in the order of the file.
-    more : dict
-        Predicate to subject to its further values, where it has any.
-    by_type : dict
-        Class to subjects, made when first asked for.
-    """
-
+    #: Predicate to subject to its first value, in the order of the file.
     columns: dict[str, dict[str, str]] = field(default_factory=dict)
+    #: Predicate to subject to its further values, where it has any.
     more: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+    #: Class to subjects, made when first asked for.
     by_type: dict[str, dict[str, None]] = field(default_factory=dict, repr=False)
 
     def add(self, triples: Iterable[tuple[str, str, str]]) -> None:
@@ -63,8 +59,7 @@ class Graph:
 
     def everywhere(self, predicate: str) -> Iterator[str]:
         """The values of a predicate, whatever the subject."""
-        more = self.more.get(expand(predicate), {})
-        return chain(self.column(predicate).values(), *more.values())
+        return (value for _, value in self.pairs(predicate))
 
     def has(self, subject: str) -> bool:
         """Whether anything is said of a subject."""
@@ -96,3 +91,17 @@ class Graph:
         for predicate in predicates:
             subject = self.columns.get(expand(predicate), {}).get(subject or "")
         return subject
+
+
+@cache
+def ontology() -> Graph:
+    """The ontology of the package, in the order of its file."""
+    graph = Graph()
+    quads = ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE)
+    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
+    return graph
+
+
+def label(name: str) -> str:
+    """What a property is called; empty for one that the ontology does not explain."""
+    return (ontology().value(expand(name), "rdfs:label") or "") if ":" in name else ""

@@ -14,8 +14,6 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
-import numpy as np
-
 from geofield.errors import FormatError
 from geofield.formats.rdf.names import NOT_IN_IRI
 from geofield.formats.rdf.namespaces import RDF
@@ -25,8 +23,6 @@ MAX_DEPTH = 100
 #: Entities such as ``<!ENTITY owl "http://www.w3.org/2002/07/owl#">``, as Protege writes them.
 MAX_ENTITIES = 100
 MAX_ENTITY_CHARACTERS = 256
-#: Larger files are looked through piece by piece.
-MAX_PLAIN_BYTES = 1 << 28
 _IRI_ATTRIBUTES = frozenset({RDF + name for name in ("about", "resource", "datatype")})
 _JSON_ID = re.compile(r'"@(?:id|type)"\s*:\s*"((?:[^"\\]|\\.)*)"')
 _JSON_CONTEXT = re.compile(r'"@(?:context|import)"\s*:\s*\[?\s*"((?:[^"\\]|\\.)*)"')
@@ -44,13 +40,7 @@ _OUTWARD = re.compile(
 
 
 def check_query(text: str) -> None:
-    """Refuse SPARQL that would reach for other hosts or other data.
-
-    Raises
-    ------
-    FormatError
-        Names the keyword and its line.
-    """
+    """Refuse SPARQL that would reach for other hosts or other data; names keyword and line."""
     found = _OUTWARD.search(text)
     if found:
         raise FormatError(
@@ -61,61 +51,26 @@ def check_query(text: str) -> None:
         )
 
 
-def check_json(path: Path) -> None:
-    """Refuse a JSON-LD file that needs the network or whose IRIs a parser would drop.
-
-    Raises
-    ------
-    FormatError
-        Names file, line and reason.
-    """
-    text = path.read_text(encoding="utf-8", errors="replace")
+def check_json(text: str, name: str) -> None:
+    """Refuse JSON-LD that needs the network or whose IRIs a parser would drop; names the line."""
     remote = _JSON_CONTEXT.search(text)
     if remote:
         raise FormatError(
-            f"{path.name}, line {_line(text, remote.start())}: its context {remote[1]!r:.120} lies "
+            f"{name}, line {_line(text, remote.start())}: its context {remote[1]!r:.120} lies "
             "outside the file, and geofield does not fetch it.",
             hint="Put the context itself into the file.",
         )
     for match in _JSON_ID.finditer(text):
         if NOT_IN_IRI.search(_unescaped(match[1])):
             raise FormatError(
-                f"{path.name}, line {_line(text, match.start())}: the IRI {match[1][:120]!r} "
+                f"{name}, line {_line(text, match.start())}: the IRI {match[1][:120]!r} "
                 f"{_FORBIDDEN}.",
                 hint="Percent-encode it: a space is %20.",
             )
 
 
-def plain_xml(path: Path) -> bool:
-    """Whether its brackets alone show that an XML file is well nested, and no deeper than allowed.
-
-    So where each ``<`` has one ``>`` before the next, and none begins a comment, a text of
-    characters or a document type (without which there are no entities): each pair is a tag then.
-    All else is for :func:`check_xml`, which takes five times as long.
-    """
-    if path.stat().st_size > MAX_PLAIN_BYTES:
-        return False
-    text = np.fromfile(path, np.uint8)
-    start, end = np.flatnonzero(text == ord("<")), np.flatnonzero(text == ord(">"))
-    if not len(start) or len(start) != len(end) or (start > end).any():
-        return False
-    if (end[:-1] > start[1:]).any() or text[end[-1] + 1 :].tobytes().strip():
-        return False
-    first, last = text[start + 1], text[end - 1]
-    step = np.where(first == ord("/"), -1, 1) * (last != ord("/")) * (first != ord("?"))
-    depth, root = np.cumsum(step), int(np.argmax(step == 1))
-    nested = depth[-1] == 0 and depth.max() <= MAX_DEPTH and (depth[root:-1] > 0).all()
-    return bool(nested and start[0] == 0 and not (first == ord("!")).any())
-
-
 def check_xml(path: Path) -> None:
-    """Refuse an RDF/XML file that is hostile or not well-formed.
-
-    Raises
-    ------
-    FormatError
-        Names file, line and reason.
-    """
+    """Refuse an RDF/XML file that is hostile or not well-formed; names file, line and reason."""
     with path.open("rb") as file:
         parser = _XmlGuard(path).parser
         try:

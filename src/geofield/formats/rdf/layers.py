@@ -33,19 +33,7 @@ CANDIDATE = "gf:Candidate"
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A column that names a row of another layer, told by a link instead of a number.
-
-    Attributes
-    ----------
-    column : str
-        The column whose value the link carries.
-    predicate : str
-        Prefixed name.
-    target : str
-        The other layer; the link is made from its key columns.
-    target_key : str
-        The key column of the other layer that the number is.
-    """
+    """A column that holds a key of another layer's row, told by a link instead of a number."""
 
     column: str
     predicate: str
@@ -55,37 +43,26 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class LayerMap:
-    """How a layer becomes RDF.
-
-    Attributes
-    ----------
-    layer : Layer
-    cls : str
-        Class, prefixed name.
-    path : str
-        The rows' IRIs below the plan's (or the survey's), with key columns in braces.
-    product : str
-        The RDF/XML file that holds it: ``field``, ``obstacles`` or ``tracks``.
-    in_plan : bool
-        Whether it belongs to a plan of tracks; to the survey otherwise.
-    label : str
-        `rdfs:label` of the rows, with columns in braces; empty for none.
-    links : tuple of Link
-    terms : dict of str to str
-        Properties of columns that mean something else than elsewhere.
-    says_plan : bool
-        Whether rows link to their plan; parts of a track do so through the track.
-    """
+    """How a layer becomes RDF. Names of classes and properties are prefixed."""
 
     layer: schema.Layer
     cls: str
+    #: The rows' IRIs below the plan's (or the survey's), with key columns in braces.
     path: str
+    #: The RDF/XML file that holds it.
     product: str = "tracks"
+    #: Whether it belongs to a plan of tracks; to the survey otherwise.
     in_plan: bool = True
+    #: `rdfs:label` of the rows, with columns in braces.
     label: str = ""
     links: tuple[Link, ...] = ()
+    #: Properties of columns that mean something else than elsewhere.
     terms: dict[str, str] | None = None
-    says_plan: bool = True
+    #: What rows are of: properties and the dataset's names (`Names`) they point to. Parts of a
+    #: track are of a plan through the track.
+    belongs: tuple[tuple[str, str], ...] = (("gf:inPlan", "plan"),)
+    #: Classes of other vocabularies that rows have as well.
+    also: tuple[str, ...] = ()
 
     def properties(self) -> list[tuple[schema.Column, str]]:
         """The columns that are properties, with prefixed names, in the layer's order."""
@@ -97,24 +74,34 @@ class LayerMap:
         ]
 
 
+_IN_FIELD, _OF_PICTURE = ("gf:inField", "field"), ("prov:wasDerivedFrom", "imagery")
 _ON_TRACK = Link("track_no", "gf:onTrack", "tracks", "track_no")
 _ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments", "segment_no")
-_OF_TRACK: dict[str, Any] = {"links": (_ON_TRACK,), "says_plan": False}
+_OF_TRACK: dict[str, Any] = {"links": (_ON_TRACK,), "belongs": ()}
 
 _MAPS: dict[str, dict[str, Any]] = {
-    "field": {"cls": "gf:Survey", "path": "", "product": "field", "in_plan": False},
+    "field": {
+        "cls": "gf:Survey", "path": "", "product": "field", "in_plan": False,
+        "belongs": (_IN_FIELD, _OF_PICTURE, ("prov:wasGeneratedBy", "run")),
+        "also": ("prov:Entity",),
+    },
     "obstacles": {
         "cls": "gf:Obstacle", "path": "obstacle/{obstacle_no}", "product": "obstacles",
         "in_plan": False, "label": "Obstacle {obstacle_no}",
+        "belongs": (_IN_FIELD, ("gf:inSurvey", "survey"), _OF_PICTURE),
+        "also": ("sosa:FeatureOfInterest",),
     },
-    "tracks": {"cls": "gf:Track", "path": "track/{track_no}", "label": "Track {track_no}"},
+    "tracks": {
+        "cls": "gf:Track", "path": "track/{track_no}", "label": "Track {track_no}",
+        "belongs": (_IN_FIELD, ("prov:wasDerivedFrom", "survey"), ("gf:inPlan", "plan")),
+    },
     "segments": {"cls": "gf:Segment", "path": "track/{track_no}/segment/{segment_no}", **_OF_TRACK},
     "gaps": {
         "cls": "gf:Gap", "path": "track/{track_no}/gap/{gap_no}", **_OF_TRACK,
         "terms": {"obstacle_no": "gf:causingObstacleNo"},
     },
     "track_points": {
-        "cls": "gf:TrackPoint", "path": "point/{point_no}", "says_plan": False,
+        "cls": "gf:TrackPoint", "path": "point/{point_no}", "belongs": (),
         "links": (_ON_TRACK, _ON_SEGMENT),
     },
     "headland": {"cls": "gf:Headland", "path": "headland/{headland_no}"},

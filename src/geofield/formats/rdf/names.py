@@ -60,13 +60,7 @@ class Names:
 
     @classmethod
     def of(cls, dataset: Dataset, *, base: str | None = None, plan: str = "") -> Names:
-        """The names of a dataset under a base, the plan under its name or its digest.
-
-        Raises
-        ------
-        FormatError
-            When the base cannot name features.
-        """
+        """The names of a dataset under a base, the plan under its name or its digest."""
         base = check_base(base)
         provenance, grid = dataset.provenance, dataset.grid
         source = provenance.source
@@ -95,14 +89,8 @@ class Names:
 
 
 def check_base(base: str | None) -> str:
-    """A base as given by the user, ending in ``/``.
-
-    Raises
-    ------
-    FormatError
-        When it is not an absolute http(s) IRI without query, fragment and spaces.
-    """
-    if base is None or not base:
+    """A base as given by the user, ending in ``/``; an absolute IRI that names can follow."""
+    if not base:
         return DEFAULT_BASE
     if not _BASE.fullmatch(base):
         raise FormatError(
@@ -127,7 +115,8 @@ def digest(*parts: Any) -> str:
         if isinstance(part, pd.DataFrame):
             whole.update(_table_bytes(part))
         else:
-            whole.update(json.dumps(_plain(part), sort_keys=True, default=str).encode())
+            plain = dict(part) if hasattr(part, "items") else part
+            whole.update(json.dumps(plain, sort_keys=True, default=str).encode())
         whole.update(b"\0")
     return whole.hexdigest()[:12]
 
@@ -140,10 +129,6 @@ def _table_bytes(table: gpd.GeoDataFrame) -> bytes:
     }
     text = json.dumps(columns, default=str).encode()
     return text + b"".join(shapely.to_wkb(table.geometry.to_numpy(), byte_order=1))
-
-
-def _plain(value: Any) -> Any:
-    return dict(value) if hasattr(value, "items") else value
 
 
 def _grid(grid: Any) -> list[Any]:

@@ -17,11 +17,18 @@ GF: Final = "https://w3id.org/geofield#"
 #: belongs to nobody: whoever publishes data sets a base they control.
 DEFAULT_BASE: Final = "https://example.org/geofield/"
 
-_DATA: Final = files(__package__) / "data"
-CONTEXT_TERMS: Final[dict[str, Any]] = json.loads((_DATA / "context.jsonld").read_text("utf-8"))[
-    "@context"
-]
-#: Prefixes of every product, by name: those of the context.
+#: The source of all words: written by hand, and held against the schema's columns by tests.
+ONTOLOGY, SHAPES, CONTEXT = "ontology.ttl", "shapes.ttl", "context.jsonld"
+
+
+def resource(name: str) -> str:
+    """The text of one of the files in the package's folder ``data``."""
+    return (files(__package__) / "data" / name).read_text(encoding="utf-8")
+
+
+#: The JSON-LD context: prefixes, and a short term with its type for each property.
+CONTEXT_TERMS: Final[dict[str, Any]] = json.loads(resource(CONTEXT))["@context"]
+#: Prefixes of every product, by name.
 PREFIXES: Final = {name: iri for name, iri in CONTEXT_TERMS.items() if isinstance(iri, str)}
 # The source study's vocabulary (METHOD.md, section 5).
 STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
@@ -41,9 +48,7 @@ STUDY_PREFIXES: Final[dict[str, str]] = {
 }
 _TURTLE_PREFIX: Final = re.compile(r"^@prefix (\w+): <(.*)> \.$", re.MULTILINE)
 #: Also those that the ontology, the shapes and the queries need.
-SCHEMA_PREFIXES: Final[dict[str, str]] = dict(
-    _TURTLE_PREFIX.findall((_DATA / "ontology.ttl").read_text("utf-8"))
-)
+SCHEMA_PREFIXES: Final[dict[str, str]] = dict(_TURTLE_PREFIX.findall(resource(ONTOLOGY)))
 
 RDF: Final = PREFIXES["rdf"]
 XSD: Final = PREFIXES["xsd"]
@@ -57,7 +62,7 @@ BOOLEAN: Final = XSD + "boolean"
 
 CRS84: Final = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 _LOCAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
-_EPSG: Final = "http://www.opengis.net/def/crs/EPSG/0/"
+EPSG: Final = "http://www.opengis.net/def/crs/EPSG/0/"
 
 
 @cache
@@ -85,12 +90,4 @@ def compact(iri: str) -> str:
 def crs_iri(crs: CRS) -> str | None:
     """The OGC identifier of a CRS, None where it has no EPSG code."""
     authority = crs.to_authority(auth_name="EPSG", min_confidence=100)
-    return _EPSG + str(authority[1]) if authority else None
-
-
-def crs_of_iri(iri: str) -> CRS | None:
-    """The CRS of an OGC identifier; None where it is not one."""
-    if iri == CRS84:
-        return CRS.from_user_input("OGC:CRS84")
-    code = iri.removeprefix(_EPSG)
-    return CRS.from_epsg(int(code)) if code != iri and code.isdecimal() else None
+    return EPSG + str(authority[1]) if authority else None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pyoxigraph as ox
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.guard import check_json, check_xml, plain_xml
+from geofield.formats.rdf.guard import check_json, check_xml
 
 #: File endings and their syntax; XML and JSON only where the ending says RDF.
 SYNTAXES: dict[str, ox.RdfFormat] = {
@@ -22,12 +22,7 @@ SYNTAXES: dict[str, ox.RdfFormat] = {
 
 
 def parse(path: Path) -> Iterator[ox.Quad]:
-    """The triples of a file, as a stream.
-
-    Parameters
-    ----------
-    path : Path
-        Its ending tells the syntax.
+    """The triples of a file, as a stream; its ending tells the syntax.
 
     Raises
     ------
@@ -42,16 +37,14 @@ def parse(path: Path) -> Iterator[ox.Quad]:
         )
     if not path.is_file():
         raise FormatError(f"There is no file {path}.")
-    if syntax == ox.RdfFormat.RDF_XML and not plain_xml(path):
+    if syntax == ox.RdfFormat.RDF_XML:
         check_xml(path)
     elif syntax == ox.RdfFormat.JSON_LD:
-        check_json(path)
+        check_json(path.read_text(encoding="utf-8", errors="replace"), path.name)
     try:
         # A relative name in a file without a base must not become the name of a local file.
         yield from ox.parse(path=path, format=syntax, base_iri="https://example.org/no-base/")
     except SyntaxError as error:
-        if syntax == ox.RdfFormat.RDF_XML:
-            check_xml(path)  # which knows the line
         line = f", line {error.lineno}" if error.lineno else ""
         raise FormatError(
             f"{path.name}{line}: {error.msg}.", hint="The file is not valid RDF in its syntax."
@@ -62,20 +55,10 @@ def parse(path: Path) -> Iterator[ox.Quad]:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What a validator found.
+    """What a validator found wrong with a subject: an IRI in angle brackets, or the file.
 
-    Attributes
-    ----------
-    message : str
-        What is wrong, in plain words.
-    subject : str
-        What it is wrong with: an IRI in angle brackets, or the file.
-    line : int or None
-        At which the subject is described first, where that is known.
-    hint : str
-        What to do about it; empty where it is obvious.
-    rule : str
-        The rule that is broken, for programs: a shape's constraint and property, or a check.
+    `line` is where the subject is described first, `hint` what to do about it, `rule` for
+    programs: a shape's constraint and property, or a check.
     """
 
     message: str
@@ -91,12 +74,8 @@ class Problem:
 
     @property
     def words(self) -> str:
-        """The message and what to do."""
-        return f"{self.message} {self.hint}".strip()
+        """The message as a sentence, and what to do."""
+        return f"{self.message[:1].upper()}{self.message[1:]} {self.hint}".strip()
 
     def __str__(self) -> str:
         return f"{self.place}: {self.words}" if self.place else self.words
-
-    def capital(self) -> Problem:
-        """The same with a message that begins as a sentence."""
-        return replace(self, message=self.message[0].upper() + self.message[1:])

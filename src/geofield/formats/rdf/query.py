@@ -26,18 +26,9 @@ _PARAMETER = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A query of the package.
+    """A query of the package: SPARQL without prefixes, with words for people.
 
-    Attributes
-    ----------
-    name : str
-        As the user writes it.
-    title, description : str
-        For people.
-    text : str
-        SPARQL, without prefixes.
-    parameters : mapping of str to str
-        Variables that stand for values, with defaults as a person writes them.
+    `parameters` are the variables that stand for values, with defaults as a person writes them.
     """
 
     name: str
@@ -68,13 +59,7 @@ class Query:
         return "\n".join([*words, *prefixes, self.text])
 
     def with_values(self, values: Mapping[str, str]) -> str:
-        """The text with other values of its parameters.
-
-        Raises
-        ------
-        FormatError
-            When a parameter is unknown or its value of the wrong kind.
-        """
+        """The text with other values of its parameters."""
         unknown = set(values) - set(self.parameters)
         if unknown:
             raise FormatError(
@@ -93,14 +78,7 @@ class Query:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A table of answers.
-
-    Attributes
-    ----------
-    columns : tuple of str
-    rows : tuple of tuples
-        Python values: text (of IRIs too), int, float, bool or None.
-    """
+    """A table of answers, in Python's values: text (of IRIs too), int, float, bool or None."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
@@ -116,13 +94,7 @@ def queries() -> dict[str, Query]:
 
 
 def open_store(paths: Iterable[Path]) -> ox.Store:
-    """A store in memory with the triples of files, merged.
-
-    Raises
-    ------
-    FormatError
-        When one of them is hostile or not valid.
-    """
+    """A store in memory with the triples of files, merged; refuses hostile and invalid ones."""
     store = ox.Store()
     for path in paths:
         store.bulk_extend(parse(Path(path)))
@@ -130,15 +102,7 @@ def open_store(paths: Iterable[Path]) -> ox.Store:
 
 
 def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = None) -> Answer:
-    """The answers of a query.
-
-    Parameters
-    ----------
-    store : pyoxigraph.Store
-    query : Query or str
-        One of the package, or SPARQL; geofield's prefixes are known.
-    values : mapping of str to str, optional
-        Values of the query's parameters, as a person writes them.
+    """The answers of a query of the package, or of SPARQL in which geofield's prefixes are known.
 
     Raises
     ------
@@ -149,11 +113,8 @@ def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = 
     text = query.with_values(values or {}) if isinstance(query, Query) else query
     check_query(text)
     try:
-        result = store.query(
-            text,
-            prefixes=SCHEMA_PREFIXES,
-            custom_functions=oxigraph_functions(),
-        )
+        functions = oxigraph_functions()
+        result = store.query(text, prefixes=SCHEMA_PREFIXES, custom_functions=functions)
         if not isinstance(result, ox.QuerySolutions):
             raise FormatError("Only SELECT queries are answered here.", hint="Ask with SELECT.")
         columns = tuple(variable.value for variable in result.variables)

@@ -18,8 +18,8 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats.arrow import TYPE_IDS, promoted
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
+from geofield.formats.rdf.geosparql import geometries_of, known_crs, split_literal
 from geofield.formats.rdf.graph import Graph
-from geofield.formats.rdf.jsonld import flat_triples
 from geofield.formats.rdf.layers import (
     YES_NO,
     LayerMap,
@@ -30,11 +30,10 @@ from geofield.formats.rdf.layers import (
 )
 from geofield.formats.rdf.namespaces import GML, STUDY_OBSTACLE, STUDY_TREE, SVG_CIRCLE, expand
 from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
-from geofield.formats.rdf.parse import parse
+from geofield.formats.rdf.parse import SYNTAXES, parse
 from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
 from geofield.formats.rdf.study import STUDY_OBSTACLE_TERMS, STUDY_POINT_TERMS
-from geofield.formats.rdf.wkt import geometries_of, known_crs, split_literal
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import circle_polygons
 
@@ -82,12 +81,12 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
 
 
 def load(path: Path) -> Graph:
-    """The triples of a file; of JSON-LD and RDF/XML as geofield writes them, by that form."""
-    if path.suffix == ".rdf" and (graph := repeated(path)) is not None:
-        return graph
-    graph = Graph()
-    flat = flat_triples(path) if path.suffix.lower() == ".jsonld" else None
-    graph.add(((s.value, p.value, o.value) for s, p, o, _ in parse(path)) if flat is None else flat)
+    """The triples of a file; many nodes of one shape by their pattern."""
+    syntax = SYNTAXES.get(path.suffix.lower())
+    graph = repeated(path, syntax) if syntax else None
+    if graph is None:
+        graph = Graph()
+        graph.add((s.value, p.value, o.value) for s, p, o, _ in parse(path))
     return graph
 
 

@@ -16,19 +16,12 @@ _OWN_PLAN = re.compile(r"/plan(?:/[0-9a-f]{12})?$")
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """What is read of a graph; None where there is nothing to choose.
-
-    Attributes
-    ----------
-    field, survey, plan : str or None
-        IRIs.
-    tracks : frozenset of str
-        The tracks of the plan.
-    """
+    """What is read of a graph, as IRIs; None where there is nothing to choose."""
 
     field: str | None
     survey: str | None
     plan: str | None
+    #: Those of the plan.
     tracks: frozenset[str]
 
     def rows(self, graph: Graph, layer: LayerMap, found: list[str]) -> list[str]:
@@ -66,12 +59,8 @@ def tracks_of(graph: Graph, found: list[str]) -> list[str | None]:
 def choose(graph: Graph, plan: str | None = None) -> Scope:
     """The field, survey and plan that are meant.
 
-    Parameters
-    ----------
-    graph : Graph
-    plan : str, optional
-        The plan's IRI or the end of it; the field's own, with a warning, where there are
-        several and none is named.
+    `plan` is the plan's IRI or the end of it. Where there are several and none is named, the
+    field's own is taken, with a warning.
 
     Raises
     ------
@@ -88,15 +77,12 @@ def choose(graph: Graph, plan: str | None = None) -> Scope:
     for iri in graph.of_type("gf:Track"):
         tracks.setdefault(graph.value(iri, "gf:inPlan"), set()).add(iri)
     plans = {p for p in tracks if p} | set(graph.of_type("gf:TrackPlan"))
-    chosen = _one("track plan", sorted(plans, key=_own_first), plan)
+    own_first = sorted(sorted(plans), key=lambda iri: not _OWN_PLAN.search(iri))
+    chosen = _one("track plan", own_first, plan)
     surveys = sorted(graph.of_type("gf:Survey"))
     survey = graph.value(chosen, "gf:basedOn") or _one("survey", surveys)
     mine = tracks.get(chosen, set()) | (set() if plan else tracks.get(None, set()))
     return Scope(fields[0] if fields else None, survey, chosen, frozenset(mine))
-
-
-def _own_first(plan: str) -> tuple[bool, str]:
-    return (_OWN_PLAN.search(plan) is None, plan)
 
 
 def _one(kind: str, found: list[str], wanted: str | None = None) -> str | None:

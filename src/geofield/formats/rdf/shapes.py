@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import pyoxigraph as ox
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.namespaces import SH, TYPE, XSD, compact, expand
+from geofield.formats.rdf.graph import label
+from geofield.formats.rdf.namespaces import SH, SHAPES, TYPE, XSD, compact, expand, resource
 from geofield.formats.rdf.parse import Problem
-from geofield.formats.rdf.resources import SHAPES, label, resource
 
 Node = dict[str, list[Any]]
 #: The values of a path that break a constraint; None for one that is missing.
 Test = Callable[[list[Any]], list[Any]]
+#: Predicates one behind another; nothing means the node itself.
+PropertyPath = tuple[str, ...]
+#: Message, constraint and test.
+Rule = tuple[str, str, Test]
 #: Texts that are of a datatype.
 _LEXICAL = {
     XSD + "double": r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN",
@@ -35,17 +39,23 @@ _NUMBERS = tuple(XSD + name for name in ("double", "integer", "int", "decimal", 
 
 def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
     """Everything in a graph that breaks a shape of its class or a class above it."""
+    nodes = _nodes(quads)
+    for subject, node in nodes.items():
+        types = _with_parents(node.get(TYPE, ()), nodes)
+        for path, rules in _rules_of(tuple(types)):
+            values = list(dict.fromkeys([subject] if not path else _values(node, path, nodes)))
+            for message, constraint, test in rules:
+                for value in test(values):
+                    yield _problem(subject, path, constraint, value, message)
+
+
+def _nodes(quads: Iterable[ox.Quad]) -> dict[Any, Node]:
+    """What is said of each subject, by predicate."""
     nodes: dict[Any, Node] = {}
     # A graph is a set: what a file says a thousand times counts once.
     for quad in dict.fromkeys(quads):
         nodes.setdefault(quad.subject, {}).setdefault(quad.predicate.value, []).append(quad.object)
-    for subject, node in nodes.items():
-        types = _with_parents(node.get(TYPE, ()), nodes)
-        rules = [rule for each in types for rule in _rules().get(each, ())]
-        for path, message, constraint, test in rules:
-            values = list(dict.fromkeys([subject] if not path else _values(node, path, nodes)))
-            for value in test(values):
-                yield _problem(subject, path, constraint, value, message)
+    return nodes
 
 
 def _with_parents(types: Iterable[Any], nodes: dict[Any, Node]) -> list[str]:
@@ -58,43 +68,48 @@ def _with_parents(types: Iterable[Any], nodes: dict[Any, Node]) -> list[str]:
     return [each.value for each in found if isinstance(each, ox.NamedNode)]
 
 
-def _values(node: Node, path: tuple[str, ...], nodes: dict[Any, Node]) -> list[Any]:
+def _values(node: Node, path: PropertyPath, nodes: dict[Any, Node]) -> list[Any]:
     values = node.get(path[0], [])
     for predicate in path[1:]:
         values = [v for each in values for v in nodes.get(each, {}).get(predicate, [])]
     return values
 
 
-Rule = tuple[tuple[str, ...], str, str, Test]
+@lru_cache(maxsize=256)
+def _rules_of(types: tuple[str, ...]) -> list[tuple[PropertyPath, list[Rule]]]:
+    """What is asked of a node of some classes, path by path: values are looked up once."""
+    by_path: dict[PropertyPath, list[Rule]] = {}
+    for each in types:
+        for path, rule in _rules().get(each, ()):
+            by_path.setdefault(path, []).append(rule)
+    return list(by_path.items())
 
 
 @cache
-def _rules() -> dict[str, list[Rule]]:
-    """Path, message, constraint and test of every rule, by the class it is for."""
-    graph: dict[Any, Node] = {}
-    for quad in ox.parse(resource(SHAPES), ox.RdfFormat.TURTLE):
-        graph.setdefault(quad.subject, {}).setdefault(quad.predicate.value, []).append(quad.object)
-    rules: dict[str, list[Rule]] = {}
+def _rules() -> dict[str, list[tuple[PropertyPath, Rule]]]:
+    """Path and rule of everything that is asked, by the class it is for."""
+    graph = _nodes(ox.parse(resource(SHAPES), ox.RdfFormat.TURTLE))
+    rules: dict[str, list[tuple[PropertyPath, Rule]]] = {}
     for node in graph.values():
         compiled = [
             r for prop in node.get(SH + "property", ()) for r in _compiled(graph, graph[prop])
         ]
         for kind in node.get(SH + "nodeKind", ()) if SH + "targetClass" in node else ():
             words = "Name it, or it cannot be merged with other data."
-            compiled.append(((), words, "nodeKind", _test(graph, "nodeKind", kind, node)))
+            compiled.append(((), (words, "nodeKind", _test(graph, "nodeKind", kind, node))))
         for cls in node.get(SH + "targetClass", ()):
             rules.setdefault(cls.value, []).extend(compiled)
     return rules
 
 
-def _compiled(graph: dict[Any, Node], shape: Node) -> Iterator[Rule]:
+def _compiled(graph: dict[Any, Node], shape: Node) -> Iterator[tuple[PropertyPath, Rule]]:
     (first,) = shape[SH + "path"]
     path = tuple(term.value for term in (_items(graph, first) or [first]))
     message = shape[SH + "message"][0].value
     for predicate, (value, *_) in shape.items():
         name = predicate.removeprefix(SH)
         if name not in ("path", "message", "flags"):
-            yield path, message, name, _test(graph, name, value, shape)
+            yield path, (message, name, _test(graph, name, value, shape))
 
 
 def _items(graph: dict[Any, Node], head: Any) -> list[Any]:
@@ -153,7 +168,7 @@ def _is_number(term: Any) -> bool:
     )
 
 
-def _problem(subject: Any, path: tuple[str, ...], name: str, value: Any, rule: str) -> Problem:
+def _problem(subject: Any, path: PropertyPath, name: str, value: Any, rule: str) -> Problem:
     """What is wrong, in plain words; the rule that it breaks as the hint."""
     shown = f"<{subject.value}>" if isinstance(subject, ox.NamedNode) else f"_:{subject.value}"
     if not path:

@@ -26,14 +26,8 @@ import numpy as np
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
-from geofield.formats.rdf.features import (
-    POINT_DECIMALS,
-    column_properties,
-    feature_group,
-    row_iris,
-    row_types,
-)
-from geofield.formats.rdf.layers import layer_map
+from geofield.formats.rdf.features import POINT_DECIMALS, row_iris
+from geofield.formats.rdf.layers import LayerMap, layer_map
 from geofield.formats.rdf.namespaces import (
     DCMI_IMAGE,
     GML,
@@ -82,40 +76,41 @@ class StudyDescription(Description):
             for chunk in self.dataset.point_chunks():
                 yield from self._points(chunk)
 
-    def layer(self, layer: Any) -> Iterator[Group]:
+    def layer(self, layer: LayerMap) -> Iterator[Group]:
         """Obstacles in both vocabularies; points stand in a file of their own."""
         name = layer.layer.name
         if name == schema.OBSTACLES.name and self.dataset.has(name):
-            yield from self._obstacles()
-        elif name not in (schema.OBSTACLES.name, schema.TRACK_POINTS.name):
+            frame = self.table(layer)
+            iris, types = row_iris(layer, frame, self.names), self.types(layer, frame)
+            avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
+            yield _members(STUDY_OBSTACLE, named(avoided))
+        if name != schema.TRACK_POINTS.name:
             yield from super().layer(layer)
 
-    def _obstacles(self) -> Iterator[Group]:
-        layer = layer_map(schema.OBSTACLES.name)
-        frame = self.table(layer)
-        kinds = frame["kind"].tolist()
-        types = [
-            (node(STUDY_TREE + "tree"), *own)
-            if own[0] == node(layer.cls) and kind == "tree"
-            else own
-            for own, kind in zip(row_types(layer, frame), kinds, strict=True)
+    def types(self, layer: LayerMap, frame: Any) -> list[tuple[Any, ...]]:
+        """Trees that are driven around are the study's, too."""
+        types = super().types(layer, frame)
+        if layer.layer.name != schema.OBSTACLES.name:
+            return types
+        tree, obstacle = node(STUDY_TREE + "tree"), node(layer.cls)
+        return [
+            (tree, *own) if own[0] == obstacle and kind == "tree" else own
+            for own, kind in zip(types, frame["kind"], strict=True)
         ]
-        iris = row_iris(layer, frame, self.names)
-        avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
-        yield _members(STUDY_OBSTACLE, named(avoided))
+
+    def columns(self, layer: LayerMap, frame: Any) -> list[Column]:
+        """The study's words for an obstacle first; what they tell is not told twice."""
+        columns = super().columns(layer, frame)
+        if layer.layer.name != schema.OBSTACLES.name:
+            return columns
         study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
         taken = {predicate for predicate, _ in study}
-        own = [each for each in column_properties(layer, frame) if each[0] not in taken]
         image: Column = (node("dc:type"), [node(DCMI_IMAGE)] * len(frame))
-        yield feature_group(
-            layer,
-            frame,
-            self.names,
-            types=types,
-            columns=[image, *study, *own],
-            extra=self.belonging(schema.OBSTACLES.name, frame),
-            accuracy_m=self.accuracy_m,
-        )
+        return [image, *study, *(each for each in columns if each[0] not in taken)]
+
+    def detections(self, frame: Any) -> Iterator[Group]:
+        """The study has none."""
+        return iter(())
 
     def _points(self, frame: Any) -> Iterator[Group]:
         iris = row_iris(layer_map(schema.TRACK_POINTS.name), frame, self.names)
@@ -142,9 +137,8 @@ def _members(root: str, members: Iterable[Any]) -> Group:
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
     result: list[Column] = []
     for column, (predicate, datatype) in terms.items():
-        values, missing = frame[column].tolist(), frame[column].isna().to_numpy()
-        texts: list[str | None] = list(map(repr, values))
-        for row in np.flatnonzero(missing).tolist():
+        texts: list[str | None] = list(map(repr, frame[column].tolist()))
+        for row in np.flatnonzero(frame[column].isna()).tolist():
             texts[row] = None
         result.append((node(predicate), Typed(texts, datatype)))
     return result

@@ -28,15 +28,7 @@ def write_study_xml(
 ) -> list[Path]:
     """Two files, ``obstacles.xml`` and ``path.xml``, of what is driven around and driven.
 
-    Parameters
-    ----------
-    dataset : Dataset
-    folder : Path
-        There already.
-    stem : str
-        Other than ``field``, it stands before the names: ``north_path.xml``.
-    options : mapping
-        None are known.
+    A stem other than ``field`` stands before the names: ``north_path.xml``. It has no options.
     """
     before = "" if stem == "field" else f"{stem}_"
     products = {

@@ -47,15 +47,13 @@ class Typed(list[Any]):
         super().__init__(texts)
         self.datatype = node(datatype)
 
-    def literals(self) -> list[ox.Literal | None]:
-        """The terms; None stays none."""
-        kind = self.datatype
-        return [None if text is None else ox.Literal(text, datatype=kind) for text in self]
-
 
 def terms(values: Sequence[Value]) -> Sequence[Value]:
-    """The terms of a column."""
-    return values.literals() if isinstance(values, Typed) else values
+    """The terms of a column; None stays none."""
+    if not isinstance(values, Typed):
+        return values
+    kind = values.datatype
+    return [None if text is None else ox.Literal(text, datatype=kind) for text in values]
 
 
 def triples(groups: Iterable[Group]) -> Iterator[ox.Triple]:

@@ -23,16 +23,8 @@ _PREFIX = re.compile(r"@?prefix\s+([\w-]*):\s*<([^>]*)>", re.IGNORECASE)
 def validate(path: Path) -> list[Problem]:
     """Everything that is wrong with a file, in the order of its lines.
 
-    Parameters
-    ----------
-    path : Path
-        RDF/XML, Turtle, JSON-LD or N-Triples.
-
-    Returns
-    -------
-    list of Problem
-        Empty when the file is sound. A file that is hostile or not valid in its syntax has
-        one problem: nothing more can be said of it.
+    A file that is hostile or not valid in its syntax has one problem: nothing more can be said
+    of it.
     """
     path = Path(path)
     try:
@@ -41,7 +33,7 @@ def validate(path: Path) -> list[Problem]:
         line = re.search(r"line (\d+)", error.message)
         message = error.message.split(": ", 1)[-1]
         place = int(line[1]) if line else None
-        return [Problem(message, path.name, place, error.hint or "", "syntax").capital()]
+        return [Problem(message, path.name, place, error.hint or "", "syntax")]
     graph = Graph()
     graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
     known = [iri for layer in layer_maps() for iri in classes(layer)]

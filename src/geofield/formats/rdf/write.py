@@ -1,4 +1,10 @@
-"""Writers: a dataset to RDF/XML, Turtle, JSON-LD and N-Triples as a stream, and to rdflib."""
+"""Writers: a dataset to RDF/XML, Turtle, JSON-LD and N-Triples as a stream, and to rdflib.
+
+All take one field or more, each under its own names, and the options ``rdf_profile``
+(``geosparql`` or ``study``), ``base_iri``, ``plan_name`` (name of the track plan) and ``points``:
+whether track points are written, which the study's profile does unless told not to and the other
+when asked.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +20,7 @@ from geofield.formats.rdf.describe import PRODUCTS, Description
 from geofield.formats.rdf.jsonld import write_jsonld as write_json
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import PREFIXES, STRING, STUDY_PREFIXES
-from geofield.formats.rdf.repeated import write_xml
+from geofield.formats.rdf.repeated import write_repeated
 from geofield.formats.rdf.study import StudyDescription
 from geofield.formats.rdf.triples import Group, triples
 from geofield.model.dataset import Dataset
@@ -22,8 +28,13 @@ from geofield.model.dataset import Dataset
 if TYPE_CHECKING:
     import rdflib
 
-PROFILES = ("geosparql", "study")
 Fields = Dataset | Sequence[Dataset]
+#: By profile what describes a dataset, whether its points are told unless asked, and the prefixes.
+_PROFILES: dict[str, tuple[type[Description], bool, dict[str, str]]] = {
+    "geosparql": (Description, False, PREFIXES),
+    "study": (StudyDescription, True, {**PREFIXES, **STUDY_PREFIXES}),
+}
+PROFILES = tuple(_PROFILES)
 
 
 def write_rdfxml(
@@ -31,25 +42,9 @@ def write_rdfxml(
 ) -> list[Path]:
     """RDF/XML in three files: ``field.rdf``, ``obstacles.rdf``, ``tracks.rdf``.
 
-    Parameters
-    ----------
-    fields : Dataset or sequence of Dataset
-        One or more fields, each under its own names.
-    folder : Path
-        There already.
-    stem : str
-        Other than ``field``, it stands before the names: ``north_obstacles.rdf``.
-    options : mapping
-        ``rdf_profile`` (``geosparql`` or ``study``), ``base_iri``, ``plan_name`` (name of the
-        track plan) and ``points``: whether track points are written, which the study's profile
-        does unless told not to and the other when asked.
-
-    Returns
-    -------
-    list of Path
-        The files written.
+    A stem other than ``field`` stands before the names: ``north_obstacles.rdf``.
     """
-    told = [describe(each, options) for each in _each(fields)]
+    told = _described(fields, options)
     before = "" if stem == "field" else f"{stem}_"
     paths = [folder / f"{before}{product}.rdf" for product in PRODUCTS]
     for path, product in zip(paths, PRODUCTS, strict=True):
@@ -69,9 +64,8 @@ def _one_file(suffix: str, syntax: ox.RdfFormat) -> Callable[..., list[Path]]:
     def write(
         fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
     ) -> list[Path]:
-        """One file; options as in :func:`write_rdfxml`."""
         path = folder / f"{stem}{suffix}"
-        told = [describe(each, options) for each in _each(fields)]
+        told = _described(fields, options)
         _write(path, syntax, chain.from_iterable(each.everything() for each in told), options)
         return [path]
 
@@ -85,7 +79,7 @@ write_ntriples = _one_file(".nt", ox.RdfFormat.N_TRIPLES)
 
 
 def to_graph(dataset: Dataset, options: Mapping[str, Any]) -> rdflib.Graph:
-    """The dataset as an rdflib graph, prefixes bound; options as in :func:`write_rdfxml`."""
+    """The dataset as an rdflib graph, prefixes bound."""
     import rdflib
 
     def term(each: Any) -> Any:
@@ -104,13 +98,7 @@ def to_graph(dataset: Dataset, options: Mapping[str, Any]) -> rdflib.Graph:
 
 
 def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
-    """The description that a profile gives of a dataset.
-
-    Raises
-    ------
-    FormatError
-        When there is no such profile, or the base cannot name features.
-    """
+    """The description that a profile gives of a dataset; refuses unknown ones and bases."""
     kind, points, _ = _profile(options)
     names = Names.of(
         dataset, base=options.get("base_iri"), plan=str(options.get("plan_name") or "")
@@ -120,29 +108,26 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     return kind(dataset, names, wanted)
 
 
-def _each(fields: Fields) -> Sequence[Dataset]:
-    return [fields] if isinstance(fields, Dataset) else fields
+def _described(fields: Fields, options: Mapping[str, Any]) -> list[Description]:
+    each_field = [fields] if isinstance(fields, Dataset) else fields
+    return [describe(each, options) for each in each_field]
 
 
 def _profile(options: Mapping[str, Any]) -> tuple[type[Description], bool, dict[str, str]]:
-    """What describes a dataset, whether its points are told unless asked, and the prefixes."""
     profile = str(options.get("rdf_profile") or PROFILES[0])
     if profile not in PROFILES:
         raise FormatError(
             f"There is no RDF profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
         )
-    if profile == "study":
-        return StudyDescription, True, {**PREFIXES, **STUDY_PREFIXES}
-    return Description, False, PREFIXES
+    return _PROFILES[profile]
 
 
 def _write(
     path: Path, syntax: ox.RdfFormat, groups: Iterable[Group], options: Mapping[str, Any]
 ) -> None:
     *_, prefixes = _profile(options)
-    own = {ox.RdfFormat.JSON_LD: write_json, ox.RdfFormat.RDF_XML: write_xml}.get(syntax)
-    if own is not None:
-        with path.open("wb") as file:
-            own(groups, file, prefixes)
-    else:
-        ox.serialize(triples(groups), path, syntax, prefixes=prefixes)
+    with path.open("wb") as file:
+        if syntax == ox.RdfFormat.JSON_LD:
+            write_json(groups, file, prefixes)
+        else:
+            write_repeated(groups, file, syntax, prefixes)
