@@ -160,16 +160,16 @@ def fetch_speed(folder: Path, form: str, repeats: int) -> list[str]:
     west, south, east, north = left + 1, bottom + 1, right - 1, top - 1
 
     with tile_server(form) as template:
-        source = XYZSource("bench", template, Terms(may_cache=True))
+        source = XYZSource("bench", template, terms=Terms(may_cache=True))
 
         def rows_only() -> None:
-            client = Client(threads=THREADS)
+            client = Client(FetchOptions(threads=THREADS))
             for _ in TileFetcher(source, client=client, threads=THREADS).rows(block):
                 pass
             client.close()
 
         def to_array() -> None:
-            client = Client(threads=THREADS)
+            client = Client(FetchOptions(threads=THREADS))
             whole = np.empty((SIDE * 256, SIDE * 256, 3), np.uint8)
             for row, strip, _ in TileFetcher(source, client=client, threads=THREADS).rows(block):
                 whole[row * 256 : (row + 1) * 256] = strip
@@ -365,7 +365,7 @@ def faults(folder: Path) -> list[str]:
     options = FetchOptions(backoff_s=0.02, timeout_s=1.0)
 
     def run(server: TileServer, chosen_options: FetchOptions) -> Acquired:
-        source = XYZSource("server", server.template, Terms(may_cache=True))
+        source = XYZSource("server", server.template, terms=Terms(may_cache=True))
         target = folder / "fault.tif"
         return acquire(source, where, target, options=chosen_options, overwrite=True)
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from geofield.imagery import read_scene
 
 from .pictures import ground, write
 from .test_fetch import expected
+from .test_sources import wms_server, wmts_server
 from .tile_server import Handler, first_time, hole, serving, status_500
 
 POINT = ["--lat", "35.075373", "--lon", "33.531142"]
@@ -84,8 +86,9 @@ def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture
         assert run(*arguments) == 1
         assert "--missing mask" in capsys.readouterr().err
         assert not Path("a.tif").exists()
-        assert run(*arguments, "--missing", "mask") == 0
+        assert run(*arguments, "--missing", "mask", "--log", "a.log") == 0
         assert "are no-data in the picture" in capsys.readouterr().err
+        assert "are no-data in the picture" in Path("a.log").read_text()
     with rasterio.open("a.tif") as file:
         assert not file.dataset_mask().all()
         west, south, east, north = rasterio.warp.transform_bounds(file.crs, 4326, *file.bounds)
@@ -187,6 +190,61 @@ def test_sources_of_ones_own(
     shown_list = capsys.readouterr().out
     assert "deriving geodata: FORBIDDEN" in shown_list
     assert "s3cret" not in shown_list
+
+
+@pytest.mark.parametrize("kind", ["wms", "wmts", "mbtiles"])
+def test_what_is_said_of_a_source_of_ones_own_holds_for_every_kind(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str
+) -> None:
+    from geofield.cli.imagery_tools import catalogue_of
+    from geofield.imagery import FetchOptions, find_source
+    from geofield.imagery.client import Client
+    from geofield.imagery.sources import TileSource
+    from geofield.settings import load_settings
+
+    def only_for_farms(act: Callable[..., None]) -> Callable[..., None]:
+        def route(handler: Handler, query: dict[str, str]) -> None:
+            if handler.headers.get("Referer") == "https://farm":
+                act(handler, query)
+            else:
+                handler.reply(403, b"no", "text/plain")
+
+        return route
+
+    with serving() as server:
+        wms_server(server, "EPSG:3857")
+        wmts_server(server, mercator=True, rest=True)
+        server.routes = {path: only_for_farms(act) for path, act in server.routes.items()}
+        address, more = f"{server.address}/wms?service=WMS", 'layer = "ortho"\n'
+        if kind == "wmts":
+            address, more = f"{server.address}/WMTSCapabilities.xml", ""
+        if kind == "mbtiles":
+            wanted = ("--zoom", 15, "--size", 300, "-o", "a.tif")
+            kept = ("--cache-dir", tmp_path / "own")
+            assert run("tiles", server.template, *POINT, *wanted, *kept) == 0
+            (file,) = (tmp_path / "own").glob("*.mbtiles")
+            address, more = str(file), ""
+        Path("geofield.toml").write_text(
+            f'[fetch.sources.county]\nkind = "{kind}"\nurl = "{address}"\nmay_derive = true\n{more}'
+            'attribution = "Example County"\ndate = "2024-06"\nrate_per_s = 40\n'
+            '[fetch.sources.county.headers]\nReferer = "https://farm"\n'
+        )
+        options = ("--zoom", 15, "--size", 300, "-o", "b.tif", "--json")
+        assert run("tiles", "county", *POINT, *options) == 0, capsys.readouterr().err
+        said = Path("geofield.toml").read_text()
+        # Also where nobody says whose it is.
+        refused = said.replace("may_derive = true", "may_derive = false")
+        Path("geofield.toml").write_text(refused.replace("Example County", ""))
+        assert run("tiles", "county", *POINT, *options) == 1
+        assert "forbid" in capsys.readouterr().err
+        Path("geofield.toml").write_text(said)
+        if kind != "mbtiles":
+            client = Client(FetchOptions(attempts=1))
+            source = find_source("county", catalogue=catalogue_of(load_settings()), client=client)
+            client.close()
+            assert isinstance(source, TileSource)
+            assert source.rate_per_s == 40
+    assert read_scene("b.tif").source.date == "2024-06"
 
 
 def test_a_wrong_settings_file_does_not_show_its_keys(capsys: pytest.CaptureFixture[str]) -> None:

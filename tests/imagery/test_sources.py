@@ -9,6 +9,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -229,7 +230,10 @@ def test_keys_show_nowhere(
 
         server.routes["/keyed"] = keyed
         source = XYZSource(
-            "paid", server.address + "/keyed/{z}/{x}/{y}?key={key}", Terms(may_cache=True), key=KEY
+            "paid",
+            server.address + "/keyed/{z}/{x}/{y}?key={key}",
+            terms=Terms(may_cache=True),
+            key=KEY,
         )
         options = replace(FAST, cache_dir=tmp_path / "cache")
         try:
@@ -319,7 +323,7 @@ def wms_server(server: TileServer, crs_name: str) -> None:
 def test_wms(tmp_path: Path, crs_name: str, lat: float, lon: float, zoom: int | None) -> None:
     with serving() as server:
         wms_server(server, crs_name)
-        client = Client(attempts=2)
+        client = Client(FetchOptions(attempts=2))
         address = server.address + "/wms?service=WMS"
         with pytest.raises(ImageryError, match=r"2 layers.*layer=.NAME.*ortho, plan"):
             find_source(address, client=client, point=(lon, lat))
@@ -441,7 +445,7 @@ def wmts_server(server: TileServer, *, mercator: bool, rest: bool) -> None:
 def test_wmts(tmp_path: Path, mercator: bool, rest: bool) -> None:
     with serving() as server:
         wmts_server(server, mercator=mercator, rest=rest)
-        client = Client(attempts=2)
+        client = Client(FetchOptions(attempts=2))
         source = find_source(server.address + "/WMTSCapabilities.xml", client=client)
         client.close()
         assert not isinstance(source, PictureSource)
@@ -486,8 +490,12 @@ def test_capabilities_from_a_file_and_bad_ones(tmp_path: Path) -> None:
 
 
 def test_a_document_that_is_not_there_names_the_host() -> None:
-    with serving() as server, pytest.raises(NetworkError, match=r"127\.0\.0\.1.*status 404"):
-        find_source(server.address + "/a/WMTSCapabilities.xml", client=Client(attempts=1))
+    with (
+        serving() as server,
+        closing(Client(FetchOptions(attempts=1))) as client,
+        pytest.raises(NetworkError, match=r"127\.0\.0\.1.*status 404"),
+    ):
+        find_source(server.address + "/a/WMTSCapabilities.xml", client=client)
 
 
 # -- pictures over HTTP, folders, indexes, STAC -------------------------------------------------

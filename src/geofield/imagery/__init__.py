@@ -11,28 +11,14 @@ from typing import TYPE_CHECKING
 from geofield.late import late_names
 
 if TYPE_CHECKING:
-    from geofield.imagery.acquisition import Acquired, FetchOptions, Where, acquire, with_provenance
+    from geofield.imagery.acquisition import Acquired, Where, acquire
     from geofield.imagery.at_place import is_own_picture, picture_at
+    from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
     from geofield.imagery.reader import SceneReader
     from geofield.imagery.scene import read_scene
     from geofield.imagery.sources import find_source
     from geofield.imagery.write import write_scene
-
-_HOME = {
-    "Acquired": "acquisition",
-    "FetchOptions": "acquisition",
-    "SceneReader": "reader",
-    "Where": "acquisition",
-    "acquire": "acquisition",
-    "find_source": "sources",
-    "is_own_picture": "at_place",
-    "open_reader": "pictures",
-    "picture_at": "at_place",
-    "read_scene": "scene",
-    "with_provenance": "acquisition",
-    "write_scene": "write",
-}
 
 __all__ = [
     "Acquired",
@@ -45,8 +31,19 @@ __all__ = [
     "open_reader",
     "picture_at",
     "read_scene",
-    "with_provenance",
     "write_scene",
 ]
 
-__getattr__ = late_names(__name__, _HOME)
+__getattr__ = late_names(
+    __name__,
+    {
+        "acquisition": "Acquired Where acquire",
+        "at_place": "is_own_picture picture_at",
+        "opening": "FetchOptions",
+        "pictures": "open_reader",
+        "reader": "SceneReader",
+        "scene": "read_scene",
+        "sources": "find_source",
+        "write": "write_scene",
+    },
+)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
@@ -14,13 +13,15 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import ImageryError
 from geofield.grid import Grid
-from geofield.imagery.cache import TileCache, cache_file
+from geofield.imagery.cache import TileCache
 from geofield.imagery.client import Client
-from geofield.imagery.fetch import FetchReport, Missing, Progress, TileFetcher, absence_error
+from geofield.imagery.fetch import FetchReport, Progress, TileFetcher, absence_error
 from geofield.imagery.mosaic import Staging, stage_to_cog
-from geofield.imagery.reach import Reach
+from geofield.imagery.opening import FetchOptions
 from geofield.imagery.scene import read_scene
-from geofield.imagery.sources.base import FrameSource, LocalTiles, PictureSource, Source, TileSource
+from geofield.imagery.sources.base import PictureSource, Source, TileSource
+from geofield.imagery.sources.google import GoogleStaticSource
+from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.tags import source_tags
 from geofield.imagery.terms import check_terms
 from geofield.imagery.tiling import Block
@@ -32,33 +33,23 @@ Zoom = int | Literal["max", "fit"] | None
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """What part of the earth is wanted: a square around a point, or an area.
+    """What part of the earth is wanted: a square around a point, or an area."""
 
-    Attributes
-    ----------
-    lat, lon : float, optional
-        The centre, degrees, WGS 84.
-    size_px, size_m : optional
-        Side of the square, pixels (640 by default) or ground metres.
-    area : shapely geometry, optional
-        In lon/lat degrees; instead of the square, or with a point to look around in it.
-    zoom : int, "max", "fit" or None
-        The source's zoom; its finest; the largest at which the area (or `size_m`) still fits
-        a frame of `frame_px`; None takes `resolution_m`.
-    resolution_m : float
-        Ground resolution wanted when no zoom is given.
-    whole_tiles : bool
-        Keep the touched tiles whole.
-    """
-
+    #: lat, lon: the centre, degrees, WGS 84.
     lat: float | None = None
     lon: float | None = None
+    #: size_px, size_m: side of the square, pixels (640 by default) or ground metres.
     size_px: int | None = None
     size_m: float | None = None
+    #: In lon/lat degrees; instead of the square, or with a point to look around in it.
     area: BaseGeometry | None = None
+    #: The source's zoom; its finest; the largest at which the area (or `size_m`) still fits a frame
+    #: of `frame_px`; None takes `resolution_m`.
     zoom: Zoom = None
+    #: Ground resolution wanted when no zoom is given.
     resolution_m: float = 0.6
     frame_px: int = 640
+    #: Keep the touched tiles whole.
     whole_tiles: bool = False
 
     def __post_init__(self) -> None:
@@ -81,61 +72,12 @@ class Where:
 
 @dataclass(frozen=True, slots=True)
 class Acquired:
-    """What `acquire` made.
-
-    Attributes
-    ----------
-    path : Path
-    grid : Grid
-    source : ImagerySource
-    report : FetchReport
-    """
+    """What `acquire` made."""
 
     path: Path
     grid: Grid
     source: ImagerySource
     report: FetchReport
-
-
-@dataclass(frozen=True, slots=True)
-class FetchOptions:
-    """How tiles are fetched and kept.
-
-    Attributes
-    ----------
-    cache_dir : Path or None
-        Where tile caches live; None keeps nothing.
-    offline : bool
-        Work from the cache alone.
-    missing : "error" or "mask"
-        What happens to tiles that cannot be had: stop, or leave no-data.
-    threads : int
-        Requests at once.
-    attempts, timeout_s, backoff_s
-        See `geofield.imagery.client.Client`.
-    cache_max_bytes, cache_max_age_s
-        Limits of each cache file.
-    acknowledged : bool
-        The user answers for terms that forbid deriving geodata.
-    proxy : str or None
-    no_proxy : tuple of str
-    allow : tuple of str
-        Folders and hosts that files and servers may lead to besides their own.
-    """
-
-    cache_dir: Path | None = None
-    offline: bool = False
-    missing: Missing = "error"
-    threads: int = 16
-    attempts: int = 6
-    timeout_s: float = 20.0
-    backoff_s: float = 0.25
-    cache_max_bytes: int | None = 2 * 2**30
-    cache_max_age_s: float | None = 90 * 86400.0
-    acknowledged: bool = False
-    proxy: str | None = None
-    no_proxy: tuple[str, ...] = ()
-    allow: tuple[str, ...] = ()
 
 
 def acquire(
@@ -149,17 +91,6 @@ def acquire(
 ) -> Acquired:
     """Get the picture of a place from a source and write it as a COG.
 
-    Parameters
-    ----------
-    source : Source
-        From `geofield.imagery.sources.find_source`.
-    place : Place
-    path : path
-        The GeoTIFF to write.
-    options : FetchOptions, optional
-    overwrite : bool
-    progress : callable (done, total, what), optional
-
     Raises
     ------
     TermsError
@@ -172,7 +103,7 @@ def acquire(
     options = options or FetchOptions()
     check_terms(source.name, source.terms, acknowledged=options.acknowledged)
     if isinstance(source, PictureSource):
-        return _picture(source, place, path, options.allow, overwrite=overwrite)
+        return _picture(source, place, path, options.allow, overwrite)
     source, block = plan(source, place)
     with ExitStack() as stack:
         temporary = stack.enter_context(replacing(path, overwrite=overwrite))
@@ -191,12 +122,14 @@ def acquire(
     return Acquired(Path(path), block.grid, provenance, report)
 
 
-def plan(source: TileSource | LocalTiles, place: Where) -> tuple[TileSource | LocalTiles, Block]:
+def plan(
+    source: TileSource | MBTilesSource, place: Where
+) -> tuple[TileSource | MBTilesSource, Block]:
     """The tiles that a place needs, and the source to ask for them."""
     pyramid = source.pyramid
     lat, lon = place.point
     zoom = choose_zoom(source, place)
-    if isinstance(source, FrameSource):
+    if isinstance(source, GoogleStaticSource):
         size = place.size_px or place.frame_px
         if place.size_m is not None:
             size = round(place.size_m / pyramid.ground_resolution_m(zoom, lat=lat, lon=lon))
@@ -213,7 +146,7 @@ def plan(source: TileSource | LocalTiles, place: Where) -> tuple[TileSource | Lo
     )
 
 
-def choose_zoom(source: TileSource | LocalTiles, place: Where) -> int:
+def choose_zoom(source: TileSource | MBTilesSource, place: Where) -> int:
     """The zoom that a place asks for."""
     pyramid = source.pyramid
     lat, lon = place.point
@@ -226,15 +159,11 @@ def choose_zoom(source: TileSource | LocalTiles, place: Where) -> int:
             raise ImageryError(
                 "Fitting the zoom needs a size in metres or an area.", hint="Add --size-m 400."
             )
-        return next(
-            (
-                level.zoom
-                for level in reversed(pyramid.levels)
-                if place.size_m / pyramid.ground_resolution_m(level.zoom, lat=lat, lon=lon)
-                <= place.frame_px
-            ),
-            pyramid.zooms[0],
-        )
+        for level in reversed(pyramid.levels):
+            resolution_m = pyramid.ground_resolution_m(level.zoom, lat=lat, lon=lon)
+            if place.size_m / resolution_m <= place.frame_px:
+                return level.zoom
+        return pyramid.zooms[0]
     if place.zoom is None:
         return pyramid.zoom_for(place.resolution_m, lat=lat, lon=lon)
     pyramid.level(place.zoom)
@@ -242,62 +171,41 @@ def choose_zoom(source: TileSource | LocalTiles, place: Where) -> int:
 
 
 def _fetcher(
-    source: TileSource | LocalTiles, options: FetchOptions, stack: ExitStack
+    source: TileSource | MBTilesSource, options: FetchOptions, stack: ExitStack
 ) -> TileFetcher:
     if not isinstance(source, TileSource):
         return TileFetcher(source, client=None, threads=options.threads)
     cache = None
     if options.cache_dir is not None and source.terms.cacheable:
-        cache = stack.enter_context(
-            TileCache(
-                cache_file(options.cache_dir, source.name, source.identity),
-                name=source.name,
-                terms=source.terms,
-                level=source.pyramid.level,
-                max_bytes=options.cache_max_bytes,
-                max_age_s=options.cache_max_age_s,
-                metadata=_cache_metadata(source),
-            )
+        cache = TileCache(
+            options.cache_dir,
+            source,
+            max_bytes=options.cache_max_bytes,
+            max_age_s=options.cache_max_age_s,
         )
+        stack.callback(cache.close)
         stack.callback(cache.note_bounds)
         stack.callback(cache.trim)
     if options.offline and cache is None:
-        why = (
-            f"the terms of {source.name} do not allow one"
-            if not source.terms.cacheable
-            else "no cache folder is set"
-        )
+        why = "no cache folder is set"
+        if not source.terms.cacheable:
+            why = f"the terms of {source.name} do not allow one"
         raise ImageryError(
             f"Offline work needs a cache, and {why}.", hint="Work without --offline."
         )
     client = None
     if not options.offline:
-        client = Client(
-            threads=options.threads,
-            attempts=options.attempts,
-            timeout_s=options.timeout_s,
-            backoff_s=options.backoff_s,
-            rate_per_s=source.rate_per_s,
-            secrets=source.secrets,
-            proxy=options.proxy,
-            no_proxy=options.no_proxy,
-            reach=Reach(options.allow),
-        )
+        client = Client(options, rate_per_s=source.rate_per_s, secrets=source.secrets)
         stack.callback(client.close)
     return TileFetcher(source, client=client, cache=cache, threads=options.threads)
 
 
-def _cache_metadata(source: TileSource) -> Mapping[str, str]:
-    """The CRS of tiles that are not Web Mercator's: only geofield reads those."""
-    return {} if source.pyramid.levels[0].wraps else {"crs": source.pyramid.crs.to_wkt()}
-
-
 def _provenance(
-    source: TileSource | LocalTiles, block: Block, report: FetchReport
+    source: TileSource | MBTilesSource, block: Block, report: FetchReport
 ) -> ImagerySource:
     newest = report.newest
     if report.downloaded or newest is None:
-        newest = max(filter(None, (newest, _today())))
+        newest = datetime.now(UTC).date()
     details = [("fetched", newest.isoformat())] if isinstance(source, TileSource) else []
     if report.absent:
         details.append(("tiles_masked", str(report.absent)))
@@ -315,17 +223,8 @@ def _provenance(
     )
 
 
-def _today() -> date:
-    return datetime.now(UTC).date()
-
-
 def _picture(
-    source: PictureSource,
-    place: Where,
-    path: str | Path,
-    allow: tuple[str, ...],
-    *,
-    overwrite: bool,
+    source: PictureSource, place: Where, path: str | Path, allow: tuple[str, ...], overwrite: bool
 ) -> Acquired:
     """A window of the user's own picture."""
     if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
@@ -340,10 +239,9 @@ def _picture(
         lon=lon,
         size_m=size_m,
         size_px=place.size_px,
-        bands=source.bands,
         allow=allow,
     )
-    scene = with_provenance(scene, source)
+    scene = _with_provenance(scene, source)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 
@@ -358,7 +256,7 @@ def _extent_m(area: BaseGeometry) -> float:
     )
 
 
-def with_provenance(scene: Scene, source: PictureSource) -> Scene:
+def _with_provenance(scene: Scene, source: PictureSource) -> Scene:
     """The scene with what the source's owner says of it beside what its file says."""
     terms, known = source.terms, scene.source
     merged = replace(

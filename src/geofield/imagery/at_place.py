@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from geofield.imagery.acquisition import FetchOptions, Where, acquire, with_provenance
-from geofield.imagery.scene import read_scene
+from geofield.imagery.acquisition import Where, acquire
+from geofield.imagery.opening import FetchOptions
 from geofield.imagery.sources import PictureSource, Source
-from geofield.imagery.write import write_scene
 
 #: Pixels on a side where no size was asked for.
 _SIDE_PX = 1024
@@ -34,34 +33,18 @@ def picture_at(
 ) -> Iterator[str]:
     """A path that `read_scene` reads, of a source's picture around a place.
 
-    Parameters
-    ----------
-    source : Source
-        Its terms were checked.
-    lat, lon : float
-        Degrees, WGS 84.
-    size_m : float, optional
-        Side of the square on the ground.
-    bands : sequence of str, optional
-        What the bands show, by the user's word.
-    options : FetchOptions
-    progress : callable, optional
-
-    Yields
-    ------
-    str
-        The source's own file or address, or a file that is gone behind the block.
+    It is the source's own file or address, or a file that is gone behind the block. `size_m` is the
+    side of the square on the ground, `bands` is what the bands show by the user's word. The terms
+    of the source were checked before.
     """
+    size_px = None if size_m else _SIDE_PX
     if isinstance(source, PictureSource):
         if bands or source.terms.attribution + source.terms.licence == "":
             yield source.path
             return
         # What the settings say of its terms must travel with it: as a file that says so.
-        scene = read_scene(source.path, lat=lat, lon=lon, size_m=size_m, allow=options.allow)
-        with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
-            yield str(write_scene(with_provenance(scene, source), Path(folder) / "scene.tif"))
-        return
-    where = Where(lat=lat, lon=lon, size_m=size_m, size_px=None if size_m else _SIDE_PX)
+        size_px = None
+    where = Where(lat=lat, lon=lon, size_m=size_m, size_px=size_px)
     with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
         done = acquire(
             source, where, Path(folder) / "scene.tif", options=options, progress=progress

@@ -42,30 +42,15 @@ _WORDS = {
     "panchromatic": "grey",
 }
 _SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
-_INTERPRETATION = {
-    "red": "red",
-    "green": "green",
-    "blue": "blue",
-    "nir": "nir",
-    "alpha": "alpha",
-    "gray": "grey",
-    "pan": "grey",
-}
 
 
 @dataclass(frozen=True, slots=True)
 class BandRoles:
-    """What each band of a file shows.
+    """What each band of a file shows."""
 
-    Attributes
-    ----------
-    roles : tuple of str
-        One of `geofield.model.scene.ROLES`, or ``alpha``, per band of the file.
-    notes : tuple of str
-        What had to be decided or assumed.
-    """
-
+    #: One of `geofield.model.scene.ROLES`, or ``alpha``, per band of the file.
     roles: tuple[str, ...]
+    #: What had to be decided or assumed.
     notes: tuple[str, ...] = ()
 
     @property
@@ -86,18 +71,9 @@ def find_roles(
     looks_like_mask: Sequence[bool],
     given: Sequence[str] | None = None,
 ) -> BandRoles:
-    """Decide what each band shows.
+    """Decide what each band shows, from the file's own words and GDAL's interpretation of each.
 
-    Parameters
-    ----------
-    descriptions : sequence of str or None
-        The file's own words for each band.
-    interpretation : sequence of str
-        GDAL's colour interpretation: red, green, blue, alpha, gray, nir, undefined ...
-    looks_like_mask : sequence of bool
-        Whether each band's values are nearly all 0 or opaque (:func:`looks_like_mask`).
-    given : sequence of str, optional
-        Roles from the user, in the order of the bands; further bands are ``other``.
+    `given` are roles from the user, in the order of the bands; further bands are ``other``.
 
     Raises
     ------
@@ -110,12 +86,10 @@ def find_roles(
     notes: list[str] = []
     described = [_from_description(text) for text in descriptions]
     if any(described) and _is_consistent(described):
-        roles = [role or "other" for role in described]
-        if not {"red", "green", "blue", "grey", "nir"} & set(roles):
-            described = [""] * count
-        else:
-            return BandRoles(tuple(roles))
-    roles = [_INTERPRETATION.get(name, "") for name in interpretation]
+        if {"red", "green", "blue", "grey", "nir"} & set(described):
+            return BandRoles(tuple(role or "other" for role in described))
+        described = [""] * count
+    roles = [_WORDS.get(name, "") for name in interpretation]
     for i, role in enumerate(roles):
         if role == "alpha" and not looks_like_mask[i]:
             roles[i] = ""
@@ -124,15 +98,10 @@ def find_roles(
             )
         if not roles[i] and described[i] not in roles:
             roles[i] = described[i]
-    known = [role for role in roles if role]
-    colours = [role for role in known if role in ("red", "green", "blue")]
-    if len(set(colours)) == len(colours) == 3:
-        roles, more = _complete_colour(roles, looks_like_mask)
-        notes += more
-    else:
-        roles, more = _from_count(roles, looks_like_mask)
-        notes += more
-    return BandRoles(tuple(roles), tuple(notes))
+    colours = [role for role in roles if role in ("red", "green", "blue")]
+    named = len(set(colours)) == len(colours) == 3
+    roles, more = (_complete_colour if named else _from_count)(roles, looks_like_mask)
+    return BandRoles(tuple(roles), (*notes, *more))
 
 
 def looks_like_mask(values: NDArray[Any]) -> bool:
@@ -209,16 +178,11 @@ def _complete_colour(
 ) -> tuple[list[str], tuple[str, ...]]:
     """Bands beside red, green and blue: the first that is a picture is near infrared."""
     notes: tuple[str, ...] = ()
-    for i, role in enumerate(roles):
-        if role:
-            continue
-        if mask_like[i]:
-            roles[i] = "other"
-        elif "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
+    for i in [i for i, role in enumerate(roles) if not role]:
+        roles[i] = "other"
+        if not mask_like[i] and "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
             roles[i] = "nir"
             notes = (f"Band {i + 1} is taken as near infrared.",)
-        else:
-            roles[i] = "other"
     return roles, notes
 
 

@@ -12,15 +12,16 @@ import re
 import sqlite3
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from geofield.errors import ImageryError, ImageryWarning
-from geofield.imagery.terms import Terms
-from geofield.imagery.tiling import TileLevel
+
+if TYPE_CHECKING:
+    from geofield.imagery.sources.base import TileSource
 
 T = TypeVar("T")
 
@@ -39,14 +40,6 @@ _BUSY_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class CachedTile:
-    """A tile's bytes and when they were fetched, seconds since 1970."""
-
-    body: bytes
-    time_s: int
-
-
-@dataclass(frozen=True, slots=True)
 class CacheInfo:
     """What a cache file holds."""
 
@@ -61,70 +54,42 @@ class CacheInfo:
 
 
 def cache_file(folder: Path, name: str, identity: str) -> Path:
-    """The cache file of a source.
-
-    Parameters
-    ----------
-    folder : Path
-    name : str
-        For people.
-    identity : str
-        Address template, layer and style, without any key: what makes two sources differ.
-    """
+    """The cache file of a source; `identity` is what makes two of one name differ."""
     slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "source"
     return folder / f"{slug}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.mbtiles"
 
 
 class TileCache:
-    """Tiles of one source on disk.
+    """Tiles of one source on disk, in a folder that is made when missing.
 
-    Parameters
-    ----------
-    path : Path
-        The MBTiles file; made when missing.
-    name : str
-        Of the source.
-    terms : Terms
-    max_bytes : int, optional
-        The oldest tiles go when there are more bytes of tiles.
-    max_age_s : float, optional
-        Older tiles are fetched again.
-    level : callable
-        From a zoom to its `TileLevel`: MBTiles counts rows from the south, and zooms as the
-        ``z/x/y`` scheme does.
+    The oldest tiles go when there are more than `max_bytes` of tiles; those older than `max_age_s`
+    are fetched again.
     """
 
     def __init__(
         self,
-        path: Path,
+        folder: Path,
+        source: TileSource,
         *,
-        name: str,
-        terms: Terms,
-        level: Callable[[int], TileLevel],
         max_bytes: int | None = None,
         max_age_s: float | None = None,
-        metadata: Mapping[str, str] | None = None,
     ) -> None:
-        self.path = path
-        self._level = level
+        self.path = cache_file(folder, source.name, source.identity)
+        self._pyramid = source.pyramid
         self._max_bytes = max_bytes
         self._max_age_s = max_age_s
         self._metadata = {
-            "name": name,
+            "name": source.name,
             "type": "baselayer",
             "version": "1.3",
-            "description": f"Tiles of {name}, kept by geofield",
-            "attribution": terms.attribution,
-            "licence": terms.licence,
-            **(metadata or {}),
+            "description": f"Tiles of {source.name}, kept by geofield",
+            "attribution": source.terms.attribution,
+            "licence": source.terms.licence,
         }
+        if not source.pyramid.levels[0].wraps:
+            # Tiles that are not Web Mercator's: only geofield reads those.
+            self._metadata["crs"] = source.pyramid.crs.to_wkt()
         self._connection = self._opened()
-
-    def __enter__(self) -> TileCache:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the file."""
@@ -132,35 +97,28 @@ class TileCache:
 
     def get_row(
         self, zoom: int, row: int, columns: Iterable[int], *, stale: bool = False
-    ) -> dict[int, CachedTile]:
-        """The tiles of one row that are kept and fresh, by column.
+    ) -> dict[int, tuple[bytes, int]]:
+        """The tiles of one row that are kept and fresh, or of any age (`stale`), by column.
 
-        Parameters
-        ----------
-        stale : bool
-            Take tiles of any age (offline).
+        Each as its bytes and when it was fetched, seconds since 1970.
         """
-        wanted = sorted(set(columns))
+        wanted = set(columns)
         if not wanted:
             return {}
         since = 0.0
         if self._max_age_s is not None and not stale:
             since = time.time() - self._max_age_s
-
-        def query(connection: sqlite3.Connection) -> list[tuple[int, bytes, int]]:
-            return connection.execute(
+        values = (*self._place(zoom, row), min(wanted), max(wanted), since)
+        found = self._guarded(
+            lambda db: db.execute(
                 "SELECT t.tile_column, t.tile_data, COALESCE(f.time_s, 0) FROM tiles t "
                 "LEFT JOIN fetched f USING (zoom_level, tile_column, tile_row) "
                 "WHERE t.zoom_level = ? AND t.tile_row = ? AND t.tile_column BETWEEN ? AND ? "
                 "AND COALESCE(f.time_s, 0) >= ?",
-                (*self._place(zoom, row), wanted[0], wanted[-1], since),
+                values,
             ).fetchall()
-
-        return {
-            column: CachedTile(bytes(body), time_s)
-            for column, body, time_s in self._guarded(query)
-            if column in set(wanted)
-        }
+        )
+        return {column: (body, time_s) for column, body, time_s in found if column in wanted}
 
     def put(self, tiles: Iterable[tuple[int, int, int, bytes]]) -> None:
         """Keep tiles (zoom, column, row, bytes) in one transaction."""
@@ -172,37 +130,27 @@ class TileCache:
         if not kept:
             return
 
-        def insert(connection: sqlite3.Connection) -> None:
-            connection.execute("BEGIN IMMEDIATE")
-            try:
-                connection.executemany("INSERT OR REPLACE INTO tiles VALUES (?, ?, ?, ?)", kept)
-                connection.executemany(
-                    "INSERT OR REPLACE INTO fetched VALUES (?, ?, ?, ?, ?)",
-                    [(z, c, r, now, len(body)) for z, c, r, body in kept],
-                )
-                connection.execute(
-                    "INSERT OR IGNORE INTO metadata VALUES ('format', ?)", (_format(kept[0][3]),)
-                )
-                # Readers trust these: they must tell what is here, not what the source has.
-                connection.execute(
-                    "INSERT OR REPLACE INTO metadata SELECT 'minzoom', MIN(zoom_level) FROM tiles"
-                )
-                connection.execute(
-                    "INSERT OR REPLACE INTO metadata SELECT 'maxzoom', MAX(zoom_level) FROM tiles"
-                )
-                connection.execute("COMMIT")
-            except BaseException:
-                if connection.in_transaction:
-                    connection.execute("ROLLBACK")
-                raise
+        def insert(db: sqlite3.Connection) -> None:
+            db.executemany("INSERT OR REPLACE INTO tiles VALUES (?, ?, ?, ?)", kept)
+            db.executemany(
+                "INSERT OR REPLACE INTO fetched VALUES (?, ?, ?, ?, ?)",
+                [(z, c, r, now, len(body)) for z, c, r, body in kept],
+            )
+            form = _format(kept[0][3])
+            db.execute("INSERT OR IGNORE INTO metadata VALUES ('format', ?)", (form,))
+            # Readers trust these: they must tell what is here, not what the source has.
+            db.execute(
+                "INSERT OR REPLACE INTO metadata SELECT 'minzoom', MIN(zoom_level) FROM tiles "
+                "UNION SELECT 'maxzoom', MAX(zoom_level) FROM tiles"
+            )
 
         self._guarded(insert)
 
     def note_bounds(self) -> None:
         """Write the ground covered into the metadata: QGIS zooms to it."""
 
-        def note(connection: sqlite3.Connection) -> None:
-            zoom, west, east, south, north = connection.execute(
+        def note(db: sqlite3.Connection) -> None:
+            zoom, west, east, south, north = db.execute(
                 "SELECT MAX(zoom_level), MIN(tile_column), MAX(tile_column) + 1, MIN(tile_row), "
                 "MAX(tile_row) + 1 FROM tiles "
                 "WHERE zoom_level = (SELECT MAX(zoom_level) FROM tiles)"
@@ -216,44 +164,42 @@ class TileCache:
                 for row in (south, north)
             ]
             bounds = f"{lons[0]:.7f},{lats[0]:.7f},{lons[1]:.7f},{lats[1]:.7f}"
-            connection.execute("INSERT OR REPLACE INTO metadata VALUES ('bounds', ?)", (bounds,))
+            db.execute("INSERT OR REPLACE INTO metadata VALUES ('bounds', ?)", (bounds,))
 
         if "crs" not in self._metadata:
             self._guarded(note)
 
-    def trim(self) -> int:
-        """Remove the oldest tiles until the size limit holds; how many went."""
-        if self._max_bytes is None:
-            return 0
+    def trim(self) -> None:
+        """Remove the oldest tiles until the size limit holds."""
         limit = self._max_bytes
+        if limit is None:
+            return
 
-        def shrink(connection: sqlite3.Connection) -> int:
-            (total,) = connection.execute("SELECT COALESCE(SUM(bytes), 0) FROM fetched").fetchone()
-            gone = []
+        def shrink(db: sqlite3.Connection) -> bool:
+            (total,) = db.execute("SELECT COALESCE(SUM(bytes), 0) FROM fetched").fetchone()
             if total <= limit:
-                return 0
-            for zoom, column, row, size in connection.execute(
+                return False
+            gone = []
+            for *place, size in db.execute(
                 "SELECT zoom_level, tile_column, tile_row, bytes FROM fetched ORDER BY time_s"
             ):
-                gone.append((zoom, column, row))
+                gone.append(place)
                 total -= size
                 if total <= limit:
                     break
             where = "WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?"
-            connection.execute("BEGIN IMMEDIATE")
-            connection.executemany(f"DELETE FROM tiles {where}", gone)  # noqa: S608
-            connection.executemany(f"DELETE FROM fetched {where}", gone)  # noqa: S608
-            connection.execute("COMMIT")
-            connection.execute("PRAGMA incremental_vacuum").fetchall()
-            return len(gone)
+            db.executemany(f"DELETE FROM tiles {where}", gone)  # noqa: S608
+            db.executemany(f"DELETE FROM fetched {where}", gone)  # noqa: S608
+            return True
 
-        return self._guarded(shrink)
+        if self._guarded(shrink):
+            self._guarded(lambda db: db.execute("PRAGMA incremental_vacuum").fetchall())
 
     # -- inside ----------------------------------------------------------------------------
 
     def _place(self, zoom: int, row: int) -> tuple[int, int]:
         """Zoom and row as MBTiles counts them."""
-        level = self._level(zoom)
+        level = self._pyramid.level(zoom)
         return level.scheme_zoom, level.rows - 1 - row
 
     def _opened(self) -> sqlite3.Connection:
@@ -273,28 +219,32 @@ class TileCache:
             return self._connected()
 
     def _connected(self) -> sqlite3.Connection:
-        connection = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None)
+        connection = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level="IMMEDIATE")
         try:
             connection.execute("PRAGMA synchronous = NORMAL")
             connection.executescript(_SCHEMA)
-            connection.executemany(
-                "INSERT OR IGNORE INTO metadata VALUES (?, ?)", self._metadata.items()
-            )
+            with connection:
+                connection.executemany(
+                    "INSERT OR IGNORE INTO metadata VALUES (?, ?)", self._metadata.items()
+                )
         except sqlite3.Error:
             connection.close()
             raise
         return connection
 
     def _guarded(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """Do the work in one transaction, with a new file where this one is damaged."""
         try:
-            return work(self._connection)
+            with self._connection as connection:
+                return work(connection)
         except sqlite3.DatabaseError as error:
             if not _is_damage(error):
                 raise _unusable(self.path, error) from None
             self._connection.close()
             self._set_aside()
             self._connection = self._connected()
-            return work(self._connection)
+            with self._connection as connection:
+                return work(connection)
 
     def _set_aside(self) -> None:
         number = 1
@@ -341,20 +291,11 @@ def _info(path: Path) -> CacheInfo:
                 "MIN(zoom_level), MAX(zoom_level) FROM fetched"
             ).fetchone()
     except sqlite3.Error:
-        return CacheInfo(
-            path, "(damaged or not a tile cache)", "", 0, path.stat().st_size, None, None, None
-        )
+        said, size = "(damaged or not a tile cache)", path.stat().st_size
+        return CacheInfo(path, said, "", 0, size, None, None, None)
+    name, attribution = words.get("name", ""), words.get("attribution", "")
     zooms = None if low is None else (int(low), int(high))
-    return CacheInfo(
-        path,
-        words.get("name", ""),
-        words.get("attribution", ""),
-        count,
-        size,
-        zooms,
-        oldest,
-        newest,
-    )
+    return CacheInfo(path, name, attribution, count, size, zooms, oldest, newest)
 
 
 def _format(body: bytes) -> str:

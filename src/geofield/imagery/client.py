@@ -14,7 +14,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 from urllib.parse import urljoin, urlsplit
 
 import urllib3
@@ -22,6 +22,7 @@ from urllib3.exceptions import HTTPError, LocationParseError, NewConnectionError
 
 from geofield.errors import ImageryError, NetworkError
 from geofield.imagery.gdal import USER_AGENT
+from geofield.imagery.opening import FetchOptions
 from geofield.imagery.reach import Reach
 
 T = TypeVar("T")
@@ -30,6 +31,11 @@ T = TypeVar("T")
 _AGAIN = frozenset({408, 425, 429, 500, 502, 503, 504, 520, 521, 522, 523, 524})
 #: There is nothing at this address.
 _NOTHING = frozenset({204, 404, 410})
+_MEANINGS = {
+    400: " (bad request)",
+    401: " (not authorised: check the key)",
+    403: " (forbidden: check the key and the terms)",
+}
 _MAX_REDIRECTS = 5
 _MAX_BODY = 128 * 2**20
 #: A server that asks for a longer pause has said no.
@@ -50,99 +56,46 @@ class GaveUpError(Exception):
     """The server answered, but never with what was asked for."""
 
 
-class Redactor:
-    """Removes keys from text."""
-
-    def __init__(self, secrets: Iterable[str] = ()) -> None:
-        self._secrets = tuple(sorted({s for s in secrets if s}, key=len, reverse=True))
-
-    def __call__(self, text: str) -> str:
-        """The text with every key replaced by ``***``."""
-        for secret in self._secrets:
-            text = text.replace(secret, "***")
-        return text
-
-
-class _KeylessLog(logging.Filter):
-    """Keeps keys out of urllib3's debugging log, which prints every address."""
-
-    def __init__(self, redact: Redactor) -> None:
-        super().__init__()
-        self._redact = redact
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """Rewrite the record; it is always kept."""
-        record.msg, record.args = self._redact(record.getMessage()), None
-        return True
-
-
 class Client:
     """A pool of connections to tile servers, shared by threads.
 
-    Parameters
-    ----------
-    threads : int
-        Connections per host.
-    attempts : int
-        Requests at most for one answer.
-    timeout_s : float
-        For connecting, for each pause within a body, and three times that for the whole.
-    rate_per_s : float, optional
-        Requests per second at most.
-    secrets : iterable of str
-        Keys that must not show in messages.
-    backoff_s : float
-        The first pause; doubled each time.
-    proxy : str, optional
-        Address of an HTTP proxy; never used for this machine itself.
-    no_proxy : tuple of str
-        Endings of host names that are asked without the proxy.
-    reach : Reach, optional
-        Hosts that servers may send on to; without it, none but themselves.
+    It asks `rate_per_s` times per second at most; `secrets` are keys that must not show in
+    messages.
     """
 
     def __init__(
         self,
+        options: FetchOptions,
         *,
-        threads: int = 16,
-        attempts: int = 6,
-        timeout_s: float = 20.0,
         rate_per_s: float | None = None,
         secrets: Iterable[str] = (),
-        backoff_s: float = 0.25,
-        proxy: str | None = None,
-        no_proxy: tuple[str, ...] = (),
-        reach: Reach | None = None,
     ) -> None:
-        self.attempts = attempts
-        self.redact = Redactor(secrets)
+        self.attempts = options.attempts
+        self._secrets = sorted({secret for secret in secrets if secret}, key=len, reverse=True)
         #: How often each kind of trouble was met and survived.
         self.troubles: Counter[str] = Counter()
-        self._timeout_s = timeout_s
-        self._backoff_s = backoff_s
+        self._timeout_s = options.timeout_s
+        self._backoff_s = options.backoff_s
         self._interval_s = 1.0 / rate_per_s if rate_per_s else 0.0
         self._next_slot = 0.0
         self._not_before: dict[str, float] = {}
         self._lock = threading.Lock()
         self._stopped = threading.Event()
-        options = {
+        pool: dict[str, Any] = {
             "num_pools": 8,
-            "maxsize": threads,
+            "maxsize": options.threads,
             "block": False,
-            "timeout": urllib3.Timeout(connect=timeout_s, read=timeout_s),
+            "timeout": urllib3.Timeout(connect=options.timeout_s, read=options.timeout_s),
             "headers": {"User-Agent": USER_AGENT, "Accept": "image/*,*/*;q=0.5"},
         }
-        self._direct = urllib3.PoolManager(**options)  # type: ignore[arg-type]
-        self._proxied = (
-            urllib3.ProxyManager(proxy, **options)  # type: ignore[arg-type]
-            if proxy
-            else self._direct
-        )
-        self._no_proxy = (*_THIS_MACHINE, *(each.lstrip(".") for each in no_proxy if each))
-        self._log_filter = _KeylessLog(self.redact)
+        self._direct = urllib3.PoolManager(**pool)
+        proxy = options.proxy
+        self._proxied = urllib3.ProxyManager(proxy, **pool) if proxy else self._direct
+        endings = (each.lstrip(".") for each in options.no_proxy if each)
+        self._no_proxy = (*_THIS_MACHINE, *endings)
         for name in _LOGGERS:
-            logging.getLogger(name).addFilter(self._log_filter)
-        self._reach = reach or Reach()
+            logging.getLogger(name).addFilter(self._keyless)
+        self._reach = Reach(options.allow)
 
     def stop(self) -> None:
         """Make every pause and every further request end at once."""
@@ -153,7 +106,18 @@ class Client:
         self._direct.clear()
         self._proxied.clear()
         for name in _LOGGERS:
-            logging.getLogger(name).removeFilter(self._log_filter)
+            logging.getLogger(name).removeFilter(self._keyless)
+
+    def redact(self, text: str) -> str:
+        """The text with every key replaced by ``***``."""
+        for secret in self._secrets:
+            text = text.replace(secret, "***")
+        return text
+
+    def _keyless(self, record: logging.LogRecord) -> bool:
+        """Keep keys out of urllib3's debugging log, which prints every address."""
+        record.msg, record.args = self.redact(record.getMessage()), None
+        return True
 
     def get(
         self,
@@ -161,15 +125,10 @@ class Client:
         accept: Callable[[bytes, str], T],
         headers: Mapping[str, str] | None = None,
     ) -> T:
-        """Ask until the answer is accepted.
+        """Ask until `accept` takes the body and its content type, and give what it makes of them.
 
-        Parameters
-        ----------
-        url : str
-        accept : callable (body, content type) -> T
-            Raises `BrokenBodyError` for an answer that is not what it should be.
-        headers : mapping, optional
-            Beside User-Agent and Accept.
+        It raises `BrokenBodyError` for an answer that is not what it should be. `headers` are sent
+        beside User-Agent and Accept.
 
         Raises
         ------
@@ -190,27 +149,21 @@ class Client:
             except (HTTPError, OSError) as error:
                 if isinstance(error, LocationParseError):
                     raise GaveUpError(self.redact(f"not an address: {error}")) from None
-                last = error
-                self._count(_kind_of(error))
-                self._pause(pause)
-                continue
-            if status in _NOTHING:
-                raise NotThereError(f"status {status}")
-            if status in _AGAIN:
-                last = GaveUpError(f"status {status}")
-                self._count(f"status {status}")
-                if asked is not None:
-                    self._keep_quiet(host, asked, status)
-                self._pause(pause if asked is None else asked)
-                continue
-            if status != 200:
-                raise GaveUpError(f"status {status}{_meaning(status)}")
-            try:
-                return accept(body, kind)
-            except BrokenBodyError as error:
-                last = GaveUpError(str(error))
-                self._count(str(error))
-                self._pause(pause)
+                last, trouble, asked = error, _kind_of(error), None
+            else:
+                _require_hope(status)
+                try:
+                    if status == 200:
+                        return accept(body, kind)
+                    trouble = f"status {status}"
+                except BrokenBodyError as error:
+                    trouble, asked = str(error), None
+                last = GaveUpError(trouble)
+            with self._lock:
+                self.troubles[trouble] += 1
+            if asked is not None:
+                self._keep_quiet(host, asked, trouble)
+            self._pause(pause if asked is None else asked)
         if isinstance(last, GaveUpError):
             raise GaveUpError(f"{last} {self.attempts} times")
         raise NetworkError(
@@ -219,32 +172,25 @@ class Client:
             "to go on, or use --offline to work from the cache alone.",
         )
 
-    def _keep_quiet(self, host: str, asked_s: float, status: int) -> None:
+    def _keep_quiet(self, host: str, asked_s: float, trouble: str) -> None:
         """Ask a host for nothing, in any thread, for as long as it wants."""
         if asked_s > _MAX_PAUSE_S:
-            raise GaveUpError(f"status {status}, asks to wait {asked_s:.0f} s")
+            raise GaveUpError(f"{trouble}, asks to wait {asked_s:.0f} s")
         with self._lock:
             until = time.monotonic() + asked_s
             self._not_before[host] = max(self._not_before.get(host, 0.0), until)
 
-    def text(self, url: str) -> bytes:
-        """A document (capabilities, STAC), with the same patience.
-
-        Raises
-        ------
-        NetworkError
-        """
+    def text(self, url: str, headers: Mapping[str, str] | None = None) -> bytes:
+        """A document (capabilities), with the same patience; `NetworkError` without one."""
         try:
-            return self.get(url, lambda body, kind: body)
-        except NotThereError as error:
-            reason = str(error)
-        except GaveUpError as error:
-            reason = str(error)
-        host = urlsplit(url).netloc.rpartition("@")[2]
-        raise NetworkError(
-            f"{host} does not give the document {urlsplit(url).path}: {reason}.",
-            hint="Check the address.",
-        )
+            return self.get(url, lambda body, kind: body, headers)
+        except (NotThereError, GaveUpError) as error:
+            parts = urlsplit(url)
+            raise NetworkError(
+                f"{parts.netloc.rpartition('@')[2]} does not give the document {parts.path}: "
+                f"{error}.",
+                hint="Check the address.",
+            ) from None
 
     def _once(
         self, url: str, headers: Mapping[str, str] | None
@@ -314,10 +260,6 @@ class Client:
         if (seconds > 0 and self._stopped.wait(seconds)) or self._stopped.is_set():
             raise NetworkError("The work was stopped.")
 
-    def _count(self, kind: str) -> None:
-        with self._lock:
-            self.troubles[kind] += 1
-
 
 def _retry_after(value: str | None) -> float | None:
     """Seconds to wait: a number, or a date."""
@@ -352,9 +294,9 @@ def _plain(error: Exception) -> str:
     return kind
 
 
-def _meaning(status: int) -> str:
-    return {
-        401: " (not authorised: check the key)",
-        403: " (forbidden: check the key and the terms)",
-        400: " (bad request)",
-    }.get(status, "")
+def _require_hope(status: int) -> None:
+    """Give up on what asking again will not change."""
+    if status in _NOTHING:
+        raise NotThereError(f"status {status}")
+    if status != 200 and status not in _AGAIN:
+        raise GaveUpError(f"status {status}{_MEANINGS.get(status, '')}")

@@ -32,37 +32,27 @@ _MOST_KNOWN = 10_000
 _TOLD = 3
 #: Lattices this near to each other (px) are the same.
 _SAME_PX = 1e-3
+#: Left, top, right, bottom, pixels.
+_Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One picture on the common grid.
+    """One picture on the common grid."""
 
-    Attributes
-    ----------
-    reader : SceneReader
-        Read as it is when `offset` is given, else already reprojected to the common grid.
-    offset : (column, row) or None
-        Of its first pixel on the common grid.
-    bounds : (left, top, right, bottom)
-        Common pixels that it may touch.
-    """
-
+    #: Read as it is when `offset` is given, else already reprojected to the common grid.
     reader: SceneReader
+    #: Column and row of its first pixel on the common grid.
     offset: tuple[int, int] | None
-    bounds: tuple[int, int, int, int]
+    #: Common pixels that it may touch.
+    bounds: _Box
 
 
 @dataclass(frozen=True, eq=False)
 class CollectionReader(SceneReader):
-    """A reader over several pictures; see `SceneReader`.
+    """A reader over several pictures; see `SceneReader`."""
 
-    Attributes
-    ----------
-    parts : tuple of Part
-        In the order of precedence: the first picture with data at a pixel shows there.
-    """
-
+    #: In the order of precedence: the first picture with data at a pixel shows there.
     parts: tuple[Part, ...] = ()
 
     def _pixels(
@@ -84,13 +74,11 @@ class CollectionReader(SceneReader):
                 dc, dr = part.offset or (0, 0)
                 inner = Window(c0 - dc, r0 - dr, c1 - c0, r1 - r0)
                 got, there = part.reader._pixels(inner, (r1 - r0, c1 - c0))
-                place = (slice(r0 - top, r1 - top), slice(c0 - left, c1 - left))
+                place = np.s_[r0 - top : r1 - top, c0 - left : c1 - left]
             else:
-                reader = part.reader
-                if part.offset is not None:
-                    reader = on_grid(reader, self.grid)
-                got, there = reader._pixels(window, shape)
-                place = (slice(0, shape[0]), slice(0, shape[1]))
+                whole = part.reader if part.offset is None else on_grid(part.reader, self.grid)
+                got, there = whole._pixels(window, shape)
+                place = np.s_[0 : shape[0], 0 : shape[1]]
             new = there & ~valid[place]
             for band in range(count):
                 values[band][place][new] = got[band][new]
@@ -99,16 +87,10 @@ class CollectionReader(SceneReader):
 
 
 def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "") -> SceneReader:
-    """A reader over several pictures.
+    """A reader over several pictures, with a warning where some cannot be read.
 
-    Parameters
-    ----------
-    paths : sequence of str
-        Files or addresses; earlier ones win where several are as fine at the point.
-    options : OpenOptions
-        What is known of them; pictures farther than 10 km from its point are left out.
-    name : str
-        Of the whole, for people.
+    Earlier ones win where several are as fine at the point; those farther than 10 km from it are
+    left out. `name` is that of the whole, for people.
 
     Raises
     ------
@@ -116,11 +98,6 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         None of them can be read.
     PointOutsideError
         None of those that can be read holds the point.
-
-    Warns
-    -----
-    ImageryWarning
-        When some cannot be read.
     """
     readers: list[SceneReader] = []
     damaged: list[str] = []
@@ -143,17 +120,11 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         notes.append(f"{len(readers) - len(usable)} pictures with other bands were left out.")
     usable.sort(key=lambda each: each is not reference)  # stable: the reference first
     grid, boxes = _common_grid(reference, usable, options.point)
-    parts = []
-    for reader, box in zip(usable, boxes, strict=True):
-        if box is None:
-            continue
-        offset = _offset(reader.grid, grid) if reader.warped_from is None else None
-        if offset is not None:
-            w, h = reader.grid.width_px, reader.grid.height_px
-            bounds = (offset[0], offset[1], offset[0] + w, offset[1] + h)
-            parts.append(Part(reader, offset, bounds))
-        else:
-            parts.append(Part(on_grid(reader, grid), None, box))
+    parts = [
+        _part(reader, grid, box)
+        for reader, box in zip(usable, boxes, strict=True)
+        if box is not None
+    ]
     if len(parts) > 1:
         moved = sum(part.offset is None for part in parts)
         notes.append(
@@ -172,6 +143,14 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         palette=reference.palette,
         parts=tuple(parts),
     )
+
+
+def _part(reader: SceneReader, grid: Grid, box: _Box) -> Part:
+    offset = _offset(reader.grid, grid) if reader.warped_from is None else None
+    if offset is None:
+        return Part(on_grid(reader, grid), None, box)
+    (column, row), own = offset, reader.grid
+    return Part(reader, offset, (column, row, column + own.width_px, row + own.height_px))
 
 
 def _told(damaged: Sequence[str]) -> str:
@@ -195,14 +174,8 @@ def _looked_at(path: str, options: OpenOptions) -> SceneReader:
     options = replace(options, lat=None, lon=None, source=None)
     if (version := _version(path)) is None:
         return SceneReader.open(path, options)
-    key = (
-        path,
-        version,
-        tuple(options.bands or ()),
-        str(options.crs),
-        options.scaling,
-        options.reach,
-    )
+    bands = tuple(options.bands or ())
+    key = (path, version, bands, str(options.crs), options.scaling, options.reach)
     if key not in _KNOWN:
         if len(_KNOWN) >= _MOST_KNOWN:
             _KNOWN.clear()
@@ -254,9 +227,6 @@ def _fits(reader: SceneReader, reference: SceneReader) -> bool:
     )
 
 
-_Box = tuple[int, int, int, int]
-
-
 def _common_grid(
     reference: SceneReader, readers: list[SceneReader], point: tuple[float, float] | None
 ) -> tuple[Grid, list[_Box | None]]:
@@ -267,40 +237,27 @@ def _common_grid(
     if point is not None:
         x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
-    boxes: list[tuple[float, float, float, float] | None] = []
+    near = [x0 - reach, y0 - reach], [x0 + reach, y0 + reach]
+    edge, zero, one = np.linspace(0.0, 1.0, 9), np.zeros(9), np.ones(9)
+    boxes: list[tuple[Any, Any] | None] = []
     for reader in readers:
-        w, h = reader.grid.width_px, reader.grid.height_px
-        edge = np.linspace(0.0, 1.0, 9)
-        xs = np.concatenate([edge * w, np.full(9, w), edge * w, np.zeros(9)])
-        ys = np.concatenate([np.zeros(9), edge * h, np.full(9, h), edge * h])
-        px, py = base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs)
-        if not (np.isfinite(px).all() and np.isfinite(py).all()):
-            boxes.append(None)
-            continue
-        box = (
-            max(px.min(), x0 - reach),
-            max(py.min(), y0 - reach),
-            min(px.max(), x0 + reach),
-            min(py.max(), y0 + reach),
-        )
-        boxes.append(box if box[2] > box[0] and box[3] > box[1] else None)
+        xs = np.concatenate([edge, one, edge, zero]) * reader.grid.width_px
+        ys = np.concatenate([zero, edge, one, edge]) * reader.grid.height_px
+        px = np.array(base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs))
+        low, high = np.maximum(px.min(axis=1), near[0]), np.minimum(px.max(axis=1), near[1])
+        boxes.append((low, high) if np.isfinite(px).all() and (high > low).all() else None)
     there = [box for box in boxes if box is not None]
-    left = math.floor(min(box[0] for box in there) + _SAME_PX)
-    top = math.floor(min(box[1] for box in there) + _SAME_PX)
-    right = math.ceil(max(box[2] for box in there) - _SAME_PX)
-    bottom = math.ceil(max(box[3] for box in there) - _SAME_PX)
-    grid = base.crop(left, top, right - left, bottom - top)
-    places: list[_Box | None] = [
-        None
-        if box is None
-        else (
-            max(math.floor(box[0]) - left - 1, 0),
-            max(math.floor(box[1]) - top - 1, 0),
-            min(math.ceil(box[2]) - left + 1, right - left),
-            min(math.ceil(box[3]) - top + 1, bottom - top),
-        )
-        for box in boxes
-    ]
+    first = np.floor(np.min([low for low, _ in there], axis=0) + _SAME_PX).astype(int)
+    last = np.ceil(np.max([high for _, high in there], axis=0) - _SAME_PX).astype(int)
+    grid = base.crop(*map(int, first), *map(int, last - first))
+    places: list[_Box | None] = []
+    for box in boxes:
+        if box is None:
+            places.append(None)
+            continue
+        start = np.maximum(np.floor(box[0]).astype(int) - first - 1, 0)
+        stop = np.minimum(np.ceil(box[1]).astype(int) - first + 1, last - first)
+        places.append((int(start[0]), int(start[1]), int(stop[0]), int(stop[1])))
     return grid, places
 
 

@@ -21,15 +21,7 @@ class WrongSizeError(ImageryError):
 
 
 def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
-    """The pixels of a PNG, JPEG or WebP tile.
-
-    Parameters
-    ----------
-    body : bytes
-    kind : str
-        The content type, for the message.
-    size_px : (width, height)
-        What the tile must measure.
+    """The pixels of a PNG, JPEG or WebP tile of a size (width, height); `kind` is for the message.
 
     Raises
     ------

@@ -38,16 +38,10 @@ Show = Literal["colour", "infrared"]
 
 @dataclass(frozen=True)
 class TiledPicture:
-    """A picture and the levels in which it is shown.
-
-    Attributes
-    ----------
-    reader : SceneReader
-    crs : CRS
-        Of the tiles: the plan's metric CRS.
-    """
+    """A picture and the levels in which it is shown."""
 
     reader: SceneReader
+    #: Of the tiles: the plan's metric CRS.
     crs: CRS
 
     @classmethod
@@ -81,10 +75,7 @@ class TiledPicture:
     @cached_property
     def limits(self) -> tuple[float, float] | None:
         """File values that become 0 and 255 in every tile."""
-        grid = self.reader.grid
-        coarse = max(1.0, max(grid.shape) / 1024)
-        shape = (max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse)))
-        return self.reader.scaling or self.reader.read(shape_px=shape).scaling
+        return self.reader.scaling or self.reader.read(shape_px=self._reduced_px(1024)).scaling
 
     @property
     def has_infrared(self) -> bool:
@@ -92,23 +83,11 @@ class TiledPicture:
         return "nir" in self.reader.roles.roles
 
     def tile(self, level: int, column: int, row: int, show: Show) -> tuple[bytes, str]:
-        """One tile as an image file.
-
-        Returns
-        -------
-        bytes, str
-            The file and its media type.
-
-        Raises
-        ------
-        ImageryError
-            When there is no such tile.
-        """
+        """One tile as an image file, and its media type; an error where there is none."""
         if not 0 <= level < len(self.resolutions_m):
             raise ImageryError(f"The picture has no level {level}.")
         size_m = self.resolutions_m[level] * TILE_PX
-        left, _, right, top = self.bounds
-        bottom = self.bounds[1]
+        left, bottom, right, top = self.bounds
         if not (0 <= column < (right - left) / size_m and 0 <= row < (top - bottom) / size_m):
             raise ImageryError(f"The picture has no tile {column}, {row} at level {level}.")
         corner = (left + column * size_m, top - row * size_m)
@@ -121,19 +100,19 @@ class TiledPicture:
 
     def reduced(self, long_side_px: int) -> Scene:
         """All of the picture with at most that many pixels on its longer side."""
-        grid = self.reader.grid
-        coarse = max(1.0, max(grid.shape) / long_side_px)
-        shape = (max(1, int(grid.height_px / coarse)), max(1, int(grid.width_px / coarse)))
-        return self.reader.read(shape_px=shape, scaling=self.limits)
+        return self.reader.read(shape_px=self._reduced_px(long_side_px), scaling=self.limits)
+
+    def _reduced_px(self, long_side_px: int) -> tuple[int, int]:
+        shape = self.reader.grid.shape
+        coarse = max(1.0, max(shape) / long_side_px)
+        return max(1, int(shape[0] / coarse)), max(1, int(shape[1] / coarse))
 
     def _cut(self, level: int, column: int, row: int) -> _Part:
         step = 2 ** (len(self.resolutions_m) - 1 - level)
         grid = self.reader.grid
         c0, r0 = column * TILE_PX * step, row * TILE_PX * step
-        width, height = (
-            min(TILE_PX * step, grid.width_px - c0),
-            min(TILE_PX * step, grid.height_px - r0),
-        )
+        width = min(TILE_PX * step, grid.width_px - c0)
+        height = min(TILE_PX * step, grid.height_px - r0)
         shape = (max(1, round(height / step)), max(1, round(width / step)))
         part = self.reader.read((c0, r0, width, height), shape_px=shape, scaling=self.limits)
         return np.stack([_padded(band) for band in part.bands]), part.roles, _padded(part.valid)
@@ -167,13 +146,7 @@ class TiledPicture:
 
 
 def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, Bounds]:
-    """A scene as one image file in a metric CRS; see :func:`shown_pixels`.
-
-    Returns
-    -------
-    bytes, str, (left, bottom, right, top)
-        The file, its media type, and where its edges lie.
-    """
+    """A scene as an image file in a metric CRS, its media type, and where its edges lie."""
     pixels, bounds = shown_pixels(scene, crs, long_side_px)
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "WEBP", quality=85, method=2)
@@ -181,19 +154,9 @@ def shown_scene(scene: Scene, crs: CRS, long_side_px: int) -> tuple[bytes, str, 
 
 
 def shown_pixels(scene: Scene, crs: CRS, long_side_px: int) -> tuple[NDArray[np.uint8], Bounds]:
-    """A scene's colours in a metric CRS, north up.
+    """A scene's red, green, blue and opacity (rows, columns, 4) in a metric CRS, north up.
 
-    Parameters
-    ----------
-    scene : Scene
-    crs : CRS
-    long_side_px : int
-        At most; a smaller scene keeps its own pixels.
-
-    Returns
-    -------
-    uint8 array (rows, columns, 4), (left, bottom, right, top)
-        Red, green, blue and opacity, and where the edges lie.
+    With it comes where the edges lie. A scene of fewer pixels than `long_side_px` keeps its own.
     """
     bounds = left, bottom, right, top = _bounds(scene.grid, crs)
     longest = max(scene.grid.shape)

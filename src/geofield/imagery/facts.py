@@ -46,15 +46,11 @@ def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
 
 def _sample(dataset: Any, band: int) -> NDArray[Any]:
     """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
-    parts = []
     width, height = min(_SAMPLE_PX, dataset.width), min(_SAMPLE_PX, dataset.height)
-    for fraction_y in (0.0, 0.5, 1.0):
-        for fraction_x in (0.0, 0.5, 1.0):
-            column = round((dataset.width - width) * fraction_x)
-            row = round((dataset.height - height) * fraction_y)
-            window = Window(column, row, width, height)
-            parts.append(dataset.read(band, window=window).ravel())
-    return np.concatenate(parts)
+    columns = [round((dataset.width - width) * share) for share in (0.0, 0.5, 1.0)]
+    rows = [round((dataset.height - height) * share) for share in (0.0, 0.5, 1.0)]
+    windows = [Window(column, row, width, height) for row in rows for column in columns]
+    return np.concatenate([dataset.read(band, window=each).ravel() for each in windows])
 
 
 def opaque(alpha: NDArray[Any]) -> NDArray[np.bool_]:

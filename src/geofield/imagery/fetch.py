@@ -9,23 +9,22 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections import Counter, deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import ImageryError
-from geofield.imagery.cache import CachedTile, TileCache
+from geofield.imagery.cache import TileCache
 from geofield.imagery.client import BrokenBodyError, Client, GaveUpError, NotThereError
 from geofield.imagery.decode import Pixels, decode_tile
-from geofield.imagery.sources.base import LocalTiles, TileSource
+from geofield.imagery.sources.base import TileSource
+from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.tiling import Block, Tile
 
-Missing = Literal["error", "mask"]
 Progress = Callable[[int, int, str], None]
 
 #: After so many failures without one success the server is left in peace.
@@ -36,31 +35,20 @@ _AHEAD = 96
 
 @dataclass
 class FetchReport:
-    """What happened while fetching.
-
-    Attributes
-    ----------
-    wanted, cached, downloaded : int
-        Tiles.
-    missing : int
-        The source has nothing there.
-    failed : int
-        The source has it, but never gave it whole.
-    reasons : Counter
-        Why, by message.
-    troubles : Counter
-        Faults survived, by kind.
-    newest : date or None
-        When the newest tile was fetched (UTC).
-    """
+    """What happened while fetching, in tiles."""
 
     wanted: int = 0
     cached: int = 0
     downloaded: int = 0
+    #: The source has nothing there.
     missing: int = 0
+    #: The source has it, but never gave it whole.
     failed: int = 0
+    #: Why tiles are absent, by message.
     reasons: Counter[str] = field(default_factory=Counter)
+    #: Faults survived, by kind.
     troubles: Counter[str] = field(default_factory=Counter)
+    #: When the newest tile was fetched (UTC).
     newest: date | None = None
 
     @property
@@ -69,25 +57,17 @@ class FetchReport:
         return self.missing + self.failed
 
 
-#: The result of a worker: pixels or None, the bytes to keep or None, the reason of absence.
-_Got = tuple[Pixels | None, bytes | None, str, bool]
+#: The result of a worker: pixels, and the bytes to keep where they are new.
+_Got = tuple[Pixels, bytes | None]
+_Row = list[tuple[Tile, Future[_Got]]]
 
 
 class TileFetcher:
-    """Fetches blocks of one source.
-
-    Parameters
-    ----------
-    source : TileSource or LocalTiles
-    client : Client or None
-        None works from the cache alone.
-    cache : TileCache or None
-    threads : int
-    """
+    """Fetches blocks of one source; without a client, from the cache alone."""
 
     def __init__(
         self,
-        source: TileSource | LocalTiles,
+        source: TileSource | MBTilesSource,
         *,
         client: Client | None,
         cache: TileCache | None = None,
@@ -102,24 +82,18 @@ class TileFetcher:
     def rows(
         self, block: Block, progress: Progress | None = None
     ) -> Generator[tuple[int, NDArray[np.uint8], NDArray[np.bool_] | None], None, None]:
-        """The rows of tiles, north to south.
+        """The rows of tiles of a block, north to south: number, pixels, and which are there.
 
-        Yields
-        ------
-        row : int
-            Within the block.
-        strip : uint8 array (tile height, width, 3)
-            Black where there is nothing; it is used again for the next row.
-        valid : bool array (tile height, width) or None
-            None where every pixel is there.
+        Pixels (tile height, width, 3) are black where there is nothing, and their array is used
+        again for the next row; the mask is None where every pixel is there.
         """
         self.report.wanted += block.count
-        pending: deque[tuple[int, list[tuple[Tile, Future[_Got]]]]] = deque()
+        pending: deque[_Row] = deque()
         executor = ThreadPoolExecutor(self._threads, thread_name_prefix="tiles")
         ahead = max(2, -(-_AHEAD // block.columns) + 1)
         width, height = block.level.tile_px
         strip = np.empty((height, width * block.columns, 3), np.uint8)
-        submitted = 0
+        waiting = iter(range(block.rows))
         numbers = itertools.count(1)
 
         def one_arrived() -> None:
@@ -127,12 +101,10 @@ class TileFetcher:
                 progress(next(numbers), block.count, "tiles")
 
         try:
-            while pending or submitted < block.rows:
-                while submitted < block.rows and len(pending) < ahead:
-                    pending.append((submitted, self._submitted(executor, block, submitted)))
-                    submitted += 1
-                row, futures = pending[0]
-                valid = self._filled(strip, futures, one_arrived)
+            for row in range(block.rows):
+                for further in itertools.islice(waiting, ahead - len(pending)):
+                    pending.append(self._submitted(executor, block, further))
+                valid = self._filled(strip, pending[0], one_arrived)
                 pending.popleft()
                 yield row, strip, valid
         except BaseException:
@@ -150,7 +122,7 @@ class TileFetcher:
     def _filled(
         self,
         strip: NDArray[np.uint8],
-        futures: list[tuple[Tile, Future[_Got]]],
+        futures: _Row,
         one_arrived: Callable[[], None],
     ) -> NDArray[np.bool_] | None:
         """Fill a strip with its row of tiles; where it has pixels, None when everywhere."""
@@ -159,18 +131,20 @@ class TileFetcher:
         width = strip.shape[1] // len(futures)
         try:
             for i, (tile, future) in enumerate(futures):
-                pixels, body, reason, is_hole = future.result()
                 part = np.s_[:, i * width : (i + 1) * width]
+                there: NDArray[np.bool_] | np.bool_ | None = np.False_
+                try:
+                    (strip[part], there), body = future.result()
+                except (NotThereError, GaveUpError, BrokenBodyError) as error:
+                    self._absent(error)
+                    strip[part], body = 0, None
                 if body is not None:
                     keep.append((tile.zoom, tile.column, tile.row, body))
                     self.report.downloaded += 1
-                if pixels is None:
-                    self._absent(reason, is_hole)
-                strip[part] = 0 if pixels is None else pixels[0]
-                if pixels is None or pixels[1] is not None:
+                if there is not None:
                     if valid is None:
                         valid = np.ones(strip.shape[:2], bool)
-                    valid[part] = False if pixels is None else pixels[1]
+                    valid[part] = there
                 one_arrived()
         finally:
             # Also when this stops here: a restart then fetches only the rest.
@@ -178,54 +152,46 @@ class TileFetcher:
                 self._cache.put(keep)
         return valid
 
-    def _submitted(
-        self, executor: ThreadPoolExecutor, block: Block, row: int
-    ) -> list[tuple[Tile, Future[_Got]]]:
+    def _submitted(self, executor: ThreadPoolExecutor, block: Block, row: int) -> _Row:
         tiles = list(block.tiles(row))
-        kept: dict[int, CachedTile] = {}
+        kept: dict[int, tuple[bytes, int]] = {}
         if self._cache is not None:
-            kept = self._cache.get_row(
-                tiles[0].zoom,
-                tiles[0].row,
-                [tile.column for tile in tiles],
-                stale=self._client is None,
-            )
-        for tile in kept.values():
-            self._seen(datetime.fromtimestamp(tile.time_s, UTC).date())
+            columns, stale = [tile.column for tile in tiles], self._client is None
+            kept = self._cache.get_row(tiles[0].zoom, tiles[0].row, columns, stale=stale)
+        days = [datetime.fromtimestamp(time_s, UTC).date() for _, time_s in kept.values()]
+        self.report.cached += len(days)
+        self.report.newest = max(filter(None, (self.report.newest, *days)), default=None)
         size = block.level.tile_px
+        bodies = {column: body for column, (body, _) in kept.items()}
         return [
-            (tile, executor.submit(self._get, tile, size, kept.get(tile.column))) for tile in tiles
+            (tile, executor.submit(self._get, tile, size, bodies.get(tile.column)))
+            for tile in tiles
         ]
 
-    def _get(self, tile: Tile, size_px: tuple[int, int], kept: CachedTile | None) -> _Got:
+    def _get(self, tile: Tile, size_px: tuple[int, int], kept: bytes | None) -> _Got:
         """One tile, in a worker thread."""
         if kept is not None:
             # A tile damaged on disk is fetched anew.
             with contextlib.suppress(BrokenBodyError):
-                return decode_tile(kept.body, "", size_px), None, "", False
-        if isinstance(self.source, LocalTiles):
-            return _of_file(self.source.read(tile), size_px)
+                return decode_tile(kept, "", size_px), None
+        if isinstance(self.source, MBTilesSource):
+            held = self.source.read(tile)
+            if held is None:
+                raise NotThereError("not in the file")
+            return decode_tile(held, "", size_px), None
         if self._client is None:
-            return None, None, "not in the cache (offline)", True
+            raise NotThereError("not in the cache (offline)")
         request = self.source.request(tile)
+        return self._client.get(
+            request.url,
+            lambda body, kind: (decode_tile(body, kind, size_px), body),
+            dict(request.headers),
+        )
 
-        def accept(body: bytes, kind: str) -> tuple[Pixels, bytes]:
-            return decode_tile(body, kind, size_px), body
-
-        try:
-            pixels, body = self._client.get(request.url, accept, dict(request.headers))
-        except NotThereError as error:
-            return None, None, str(error), True
-        except GaveUpError as error:
-            return None, None, str(error), False
-        return pixels, body, "", False
-
-    def _absent(self, reason: str, is_hole: bool) -> None:
-        if is_hole:
-            self.report.missing += 1
-        else:
-            self.report.failed += 1
-        self.report.reasons[reason] += 1
+    def _absent(self, why: Exception) -> None:
+        self.report.missing += isinstance(why, NotThereError)
+        self.report.failed += not isinstance(why, NotThereError)
+        self.report.reasons[str(why)] += 1
         hopeless = not (self.report.downloaded or self.report.cached)
         if hopeless and self.report.failed >= _HOPELESS:
             raise ImageryError(
@@ -234,32 +200,16 @@ class TileFetcher:
                 hint="Check the key, the terms and the address; nothing more was asked for.",
             )
 
-    def _seen(self, day: date) -> None:
-        self.report.cached += 1
-        if self.report.newest is None or day > self.report.newest:
-            self.report.newest = day
-
-    def _keep_finished(self, pending: deque[tuple[int, list[tuple[Tile, Future[_Got]]]]]) -> None:
+    def _keep_finished(self, pending: Iterable[_Row]) -> None:
         """Keep what had arrived when the work was stopped."""
         if self._cache is None:
             return
-        keep = []
-        for _, futures in pending:
-            for tile, future in futures:
-                if future.done() and not future.cancelled() and future.exception() is None:
-                    body = future.result()[1]
-                    if body is not None:
-                        keep.append((tile.zoom, tile.column, tile.row, body))
-        self._cache.put(keep)
-
-
-def _of_file(body: bytes | None, size_px: tuple[int, int]) -> _Got:
-    if body is None:
-        return None, None, "not in the file", True
-    try:
-        return decode_tile(body, "", size_px), None, "", False
-    except BrokenBodyError as error:
-        return None, None, str(error), False
+        done = (
+            (tile, future.result()[1])
+            for tile, future in itertools.chain.from_iterable(pending)
+            if future.done() and not future.cancelled() and future.exception() is None
+        )
+        self._cache.put((t.zoom, t.column, t.row, body) for t, body in done if body is not None)
 
 
 def absence_error(name: str, report: FetchReport, *, offline: bool) -> ImageryError:

@@ -29,19 +29,14 @@ _HOP = frozenset(
 
 
 class Gateway(ThreadingHTTPServer):
-    """A proxy for this process.
-
-    Attributes
-    ----------
-    refused : list of str
-        Addresses out of reach that were asked for.
-    """
+    """A proxy for this process."""
 
     daemon_threads = True
     request_queue_size = 64
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
+        #: Addresses out of reach that were asked for.
         self.refused: list[str] = []
         self._reaches: set[Reach] = set()
         self._proxies = getproxies()

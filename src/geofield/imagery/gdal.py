@@ -101,14 +101,8 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
     """Open a picture with rasterio, or say why it cannot be opened.
 
     Only drivers are used whose files hold the pixels themselves, and VRTs that were looked
-    at: nothing is opened beyond what the user named and its folder.
-
-    Parameters
-    ----------
-    path : str
-        File, address, or a VRT as text.
-    reach : Reach
-        What the user allowed besides.
+    at: nothing is opened beyond what the user named, its folder and `reach`. The path is a file, an
+    address, or a VRT as text.
 
     Raises
     ------
@@ -127,7 +121,9 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
     try:
         drivers = _drivers_for(path, reach)
         if is_remote(path) or drivers == ["VRT"]:
-            _through_gateway(reach.of(path))
+            from geofield.imagery.gateway import gateway
+
+            rasterio.env.setenv(**gateway().options(reach.of(path)))
         dataset = DatasetReader(path, driver=drivers)
         if "OVERVIEW_FILE" in dataset.tags(ns="OVERVIEWS"):
             dataset.close()
@@ -144,12 +140,6 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
                 "`gdalinfo` tells more."
             ),
         ) from None
-
-
-def _through_gateway(reach: Reach) -> None:
-    from geofield.imagery.gateway import gateway
-
-    rasterio.env.setenv(**gateway().options(reach))
 
 
 def _tell_refused(path: str, reach: Reach = OWN_FOLDER) -> None:

@@ -83,10 +83,11 @@ class Staging:
             valid = None
         if valid is not None and not self._masked:
             self._masked = True
-            for start in range(0, int(window.row_off), 256):
-                rows = min(256, int(window.row_off) - start)
-                above = Window(0, start, self.grid.width_px, rows)
-                file.write_mask(np.full((rows, self.grid.width_px), 255, np.uint8), window=above)
+            width, top = self.grid.width_px, int(window.row_off)
+            for start in range(0, top, 256):
+                rows = min(256, top - start)
+                above = Window(0, start, width, rows)
+                file.write_mask(np.full((rows, width), 255, np.uint8), window=above)
         if self._masked:
             shape = (int(window.height), int(window.width))
             mask = np.full(shape, 255, np.uint8) if valid is None else valid.astype(np.uint8) * 255
@@ -105,7 +106,4 @@ def stage_to_cog(staged: Path, target: Path, tags: Mapping[str, str]) -> None:
 
 def _overviews(side_px: int) -> list[int]:
     """Factors of two until the coarsest overview fits one block."""
-    factors: list[int] = []
-    while side_px > 512 * 2 ** len(factors):
-        factors.append(2 ** (len(factors) + 1))
-    return factors
+    return [2**n for n in range(1, 32) if side_px > 256 * 2**n]

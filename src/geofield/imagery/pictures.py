@@ -20,22 +20,10 @@ _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
 
 
 def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneReader:
-    """A reader of any picture or set of pictures.
+    """A reader of any picture or set of pictures: a file, folder, index, STAC file or address.
 
-    Parameters
-    ----------
-    path : str
-        A file, folder, tile index or STAC file, or an address.
-    allow : sequence of str
-        Files, folders and addresses that VRTs, indexes and STAC files may lead to besides
-        their own folder.
-    **known
-        What is known of the picture: `lat`, `lon`, `bands`, `crs`, `scaling` and `source` of
-        `OpenOptions`.
-
-    Raises
-    ------
-    ImageryError
+    VRTs, indexes and STAC files may lead to what `allow` names besides their own folder; `known` is
+    `lat`, `lon`, `bands`, `crs`, `scaling` and `source` of `OpenOptions`.
     """
     options = OpenOptions(**known, reach=Reach(tuple(allow)))
     if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):
@@ -55,13 +43,7 @@ def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneR
 
 
 def pictures_in(folder: Path) -> list[str]:
-    """The pictures of a folder and its sub-folders, in the order of their names.
-
-    Raises
-    ------
-    ImageryError
-        There are none.
-    """
+    """The pictures of a folder and its sub-folders, in the order of their names."""
     found = sorted(
         str(file)
         for file in folder.rglob("*")
@@ -82,7 +64,7 @@ def pictures_of_index(index: Path) -> list[str]:
 
     check_vector(index)
     try:
-        with fiona.open(index) as table:
+        with fiona.open(index, ignore_geometry=True) as table:
             names = {name.lower(): name for name in table.schema["properties"]}
             column = names.get("location") or names.get("path")
             if column is None:

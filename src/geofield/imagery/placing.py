@@ -54,15 +54,9 @@ class Place:
 
 
 def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
-    """The grid on which an open raster dataset is read.
+    """The grid on which an open raster dataset is read; `crs` is its own or what the user says.
 
-    Parameters
-    ----------
-    dataset : rasterio dataset
-    crs : CRS
-        Of the dataset, or as the user says.
-    point : (lon, lat), optional
-        Where the ground pixel is measured and a reprojection is centred; else the centre.
+    At `point` the ground pixel is measured and a reprojection is centred; else at the centre.
 
     Raises
     ------
@@ -92,11 +86,9 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     aspect, skew_deg = pixel_shape(native, point)
     if aspect <= MAX_ASPECT and skew_deg <= MAX_SKEW_DEG:
         return Place(native)
-    why = (
-        f"its pixels are {aspect:.2f} times longer one way"
-        if aspect > MAX_ASPECT
-        else f"its pixels are skewed by {skew_deg:.0f} degrees"
-    )
+    why = f"its pixels are skewed by {skew_deg:.0f} degrees"
+    if aspect > MAX_ASPECT:
+        why = f"its pixels are {aspect:.2f} times longer one way"
     grid = _square_grid(native, point)
     note = f"Reprojected from {crs.name} to {grid.crs.name}: {why} on the ground."
     return Place(grid, WarpOrigin(crs, transform), (note,))
@@ -105,12 +97,8 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
 def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
     """How far a ground pixel is from a square, at a point or the centre.
 
-    Returns
-    -------
-    aspect : float
-        Longer side by shorter side.
-    skew_deg : float
-        Deviation of the angle between the sides from a right angle.
+    Its longer side by the shorter one, and how far the angle between them is from a right one,
+    degrees.
     """
     x, y = grid.width_px / 2, grid.height_px / 2
     if point is not None:
@@ -154,10 +142,8 @@ def _square_grid(native: Grid, point: LonLat | None) -> Grid:
     finite = np.isfinite(xs) & np.isfinite(ys)
     xs = np.clip(np.append(xs[finite], cx), cx - REACH_M, cx + REACH_M)
     ys = np.clip(np.append(ys[finite], cy), cy - REACH_M, cy + REACH_M)
-    west, north = (
-        np.floor(xs.min() / resolution) * resolution,
-        np.ceil(ys.max() / resolution) * resolution,
-    )
+    west = np.floor(xs.min() / resolution) * resolution
+    north = np.ceil(ys.max() / resolution) * resolution
     return Grid(
         int(np.ceil((xs.max() - west) / resolution)) or 1,
         int(np.ceil((north - ys.min()) / resolution)) or 1,

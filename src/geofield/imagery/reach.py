@@ -19,14 +19,9 @@ _CURL = "/vsicurl/"
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Folders and hosts that may be reached.
+    """Folders and hosts that may be reached."""
 
-    Attributes
-    ----------
-    allowed : tuple of str
-        Folders, files (they stand for their folder) and addresses (for their host).
-    """
-
+    #: Folders, files (they stand for their folder) and addresses (for their host).
     allowed: tuple[str, ...] = ()
 
     def of(self, named: str | Path) -> Reach:
@@ -45,19 +40,7 @@ class Reach:
         return any(place.is_relative_to(folder) for folder in self._folders())
 
     def require(self, what: str | Path, by: str) -> None:
-        """Refuse what may not be opened.
-
-        Parameters
-        ----------
-        what : str or Path
-            File or address.
-        by : str
-            Who names it, for the message.
-
-        Raises
-        ------
-        ImageryError
-        """
+        """Refuse a file or address that may not be opened; `by` is who names it."""
         if self.holds(what):
             return
         text = str(what).removeprefix(_CURL)

@@ -11,12 +11,11 @@ from __future__ import annotations
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import rasterio.shutil
-from affine import Affine
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.vrt import WarpedVRT
@@ -27,22 +26,12 @@ from geofield.errors import ImageryError, PointOutsideError
 from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of
-from geofield.imagery.gdal import (
-    display_name,
-    gdal_env,
-    open_picture,
-    reading,
-    to_rasterio,
-)
+from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading, to_rasterio
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scale_limits, to_uint8
-from geofield.imagery.tags import (
-    notes_from_tags,
-    scaling_from_tags,
-    source_from_tags,
-)
+from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource, Scene, outside_message
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
@@ -52,52 +41,33 @@ _NOTHING = OpenOptions()
 
 @dataclass(frozen=True, eq=False)
 class SceneReader:
-    """A picture that scenes are read from.
+    """A picture that scenes are read from: facts of its file, found by :meth:`open`."""
 
-    Make one with :meth:`open`. The attributes are facts of the file.
-
-    Attributes
-    ----------
-    path : str
-        Path or address, as GDAL takes it.
-    grid : Grid
-        Of the whole picture, as it is read (reprojected where that is needed).
-    roles : BandRoles
-        What each band of the file shows.
-    source : ImagerySource
-    scaling : (float, float) or None
-        Values that become 0 and 255 in every window; None means the window's percentiles.
-    notes : tuple of str
-        What was decided about the whole picture.
-    """
-
+    #: Path or address, as GDAL takes it.
     path: str
+    #: Of the whole picture, as it is read (reprojected where that is needed).
     grid: Grid
+    #: What each band of the file shows.
     roles: BandRoles
     dtype: str
     source: ImagerySource
+    #: Values that become 0 and 255 in every window; None means the window's percentiles.
     scaling: tuple[float, float] | None = None
+    #: What was decided about the whole picture.
     notes: tuple[str, ...] = ()
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
     has_mask: bool = False
-    # The scaling that made the file's own bytes.
+    #: The scaling that made the file's own bytes.
     scaled_before: tuple[float, float] | None = None
-    # Set where the file is read through a warp: its own CRS, control points or transform.
+    #: Set where the file is read through a warp: its own CRS, control points or transform.
     warped_from: WarpOrigin | None = None
-    # What a VRT may lead to.
+    #: What a VRT may lead to.
     reach: Reach = OWN_FOLDER
 
     @classmethod
     def open(cls, path: str, options: OpenOptions = _NOTHING) -> SceneReader:
-        """Look at a picture without reading its pixels.
-
-        Parameters
-        ----------
-        path : str
-            Path, or an http(s) address of a GeoTIFF; anything GDAL opens.
-        options : OpenOptions
-            What is known of it.
+        """Look at a picture, by its path or http(s) address, without reading its pixels.
 
         Raises
         ------
@@ -110,14 +80,12 @@ class SceneReader:
         crs, reach = options.crs, options.reach
         with gdal_env(path), open_picture(path, reach) as dataset:
             if dataset.count == 0:
+                inner, told, hint = dataset.subdatasets, "", "Give a raster file."
+                if inner:
+                    told = f", but {len(inner)} others"
+                    hint = f"Open one of them, for instance {inner[0]!r}."
                 raise ImageryError(
-                    f"The file {display_name(path)} holds no picture itself"
-                    + (f", but {len(dataset.subdatasets)} others." if dataset.subdatasets else "."),
-                    hint=(
-                        f"Open one of them, for instance {dataset.subdatasets[0]!r}."
-                        if dataset.subdatasets
-                        else "Give a raster file."
-                    ),
+                    f"The file {display_name(path)} holds no picture itself{told}.", hint=hint
                 )
             dtypes = set(dataset.dtypes)
             if any("complex" in each for each in dtypes):
@@ -129,28 +97,23 @@ class SceneReader:
                 palette = palette_of(dataset)
                 roles = roles_of(dataset, options.bands) if not palette else BandRoles(("red",))
             own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
-            flags = dataset.mask_flag_enums[0]
-            reader = cls(
+            flags, tags = dataset.mask_flag_enums[0], dataset.tags()
+            dtype = str(np.result_type(*dtypes))
+            place = find_place(dataset, own_crs, point=options.point)
+            return cls(
                 path=path,
-                grid=Grid(1, 1, Affine.identity(), own_crs),
+                grid=place.grid,
                 roles=roles,
-                dtype=str(np.result_type(*dtypes)),
-                source=options.source or source_from_tags(dataset.tags(), path),
+                dtype=dtype,
+                source=options.source or source_from_tags(tags, path),
                 scaling=options.scaling,
-                notes=(*notes_from_tags(dataset.tags()), *roles.notes),
+                notes=(*notes_from_tags(tags), *roles.notes, *place.notes),
                 nodata=dataset.nodata,
                 palette=palette,
                 reach=reach,
                 has_mask=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
-            )
-            if reader.dtype == "uint8":
-                reader = replace(reader, scaled_before=scaling_from_tags(dataset.tags()))
-            place = find_place(dataset, own_crs, point=options.point)
-            return replace(
-                reader,
-                grid=place.grid,
+                scaled_before=scaling_from_tags(tags) if dtype == "uint8" else None,
                 warped_from=place.warped_from,
-                notes=(*reader.notes, *place.notes),
             )
 
     # -- which part ------------------------------------------------------------------------
@@ -163,43 +126,29 @@ class SceneReader:
         size_m: float | None = None,
         size_px: int | None = None,
     ) -> tuple[int, int, int, int]:
-        """The part of the picture around a point, cut at its edges.
+        """Column, row, width and height of a square around a point (degrees, WGS 84), cut at edges.
 
-        Parameters
-        ----------
-        lat, lon : float
-            Degrees, WGS 84.
-        size_m, size_px : optional
-            Side of the square; without both, all of the picture or, where it is enormous,
-            `MAX_SIDE_PX` pixels.
-
-        Returns
-        -------
-        column, row, width_px, height_px : int
-
-        Raises
-        ------
-        PointOutsideError
+        Without a size it is all of the picture or, where that is enormous, `MAX_SIDE_PX` pixels.
         """
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
             raise PointOutsideError(outside_message(self.grid, lat, lon))
-        if size_px is None:
-            if size_m is None:
-                size_px = MAX_SIDE_PX
-                if max(self.grid.shape) <= size_px:
-                    return 0, 0, self.grid.width_px, self.grid.height_px
-            else:
-                if not size_m > 0:
-                    raise ImageryError(
-                        f"A window of {size_m} m shows nothing.", hint="Give a size above 0."
-                    )
-                centred = self.grid.crop(int(x), int(y), 1, 1)
-                size_px = max(1, round(size_m / centred.ground_resolution_m))
-        elif size_px < 1:
-            raise ImageryError(
-                f"A window of {size_px} px shows nothing.", hint="Give at least 1 pixel."
-            )
+        if size_px is not None:
+            if size_px < 1:
+                raise ImageryError(
+                    f"A window of {size_px} px shows nothing.", hint="Give at least 1 pixel."
+                )
+        elif size_m is not None:
+            if not size_m > 0:
+                raise ImageryError(
+                    f"A window of {size_m} m shows nothing.", hint="Give a size above 0."
+                )
+            centred = self.grid.crop(int(x), int(y), 1, 1)
+            size_px = max(1, round(size_m / centred.ground_resolution_m))
+        elif max(self.grid.shape) <= MAX_SIDE_PX:
+            return 0, 0, self.grid.width_px, self.grid.height_px
+        else:
+            size_px = MAX_SIDE_PX
         column, row = round(x - size_px / 2), round(y - size_px / 2)
         c0, r0 = max(column, 0), max(row, 0)
         c1 = min(column + size_px, self.grid.width_px)
@@ -215,16 +164,11 @@ class SceneReader:
         shape_px: tuple[int, int] | None = None,
         scaling: tuple[float, float] | None = None,
     ) -> Scene:
-        """Read a part of the picture.
+        """Read a part of the picture: column, row, width and height; all of it by default.
 
-        Parameters
-        ----------
-        window : (column, row, width_px, height_px), optional
-            Must lie inside the picture; all of it by default.
-        shape_px : (rows, columns), optional
-            Read that many pixels instead, each the average of those it covers.
-        scaling : (float, float), optional
-            File values that become 0 and 255; a scene's `scaling` makes a second window fit.
+        `shape_px` reads that many rows and columns instead, each pixel the average of those it
+        covers; `scaling` are the file values that become 0 and 255: that of another scene makes a
+        second window fit.
 
         Raises
         ------
@@ -232,12 +176,9 @@ class SceneReader:
             The window reaches outside, or the file is damaged.
         """
         column, row, width, height = window or (0, 0, self.grid.width_px, self.grid.height_px)
-        if (
-            min(column, row) < 0
-            or min(width, height) < 1
-            or column + width > self.grid.width_px
-            or row + height > self.grid.height_px
-        ):
+        right, bottom = column + width, row + height
+        inside = right <= self.grid.width_px and bottom <= self.grid.height_px
+        if min(column, row) < 0 or min(width, height) < 1 or not inside:
             raise ImageryError(
                 f"The window {width} x {height} px at column {column}, row {row} reaches outside "
                 f"the picture of {self.grid.width_px} x {self.grid.height_px} px."
@@ -336,11 +277,9 @@ class SceneReader:
                 "height": self.grid.height_px,
             }
         alpha = self.roles.alpha
-        options |= (
-            {"src_alpha": alpha + 1, "add_alpha": False}
-            if alpha is not None
-            else {"add_alpha": True}
-        )
+        options["add_alpha"] = alpha is None
+        if alpha is not None:
+            options["src_alpha"] = alpha + 1
         with (
             _as_it_is_taken(dataset, alpha) as plain,
             WarpedVRT(

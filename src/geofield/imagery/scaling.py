@@ -21,11 +21,7 @@ PERCENTILES = (0.5, 99.5)
 def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[float, float] | None:
     """The values that become 0 and 255; None for 8 bit bands, which stay as they are.
 
-    Parameters
-    ----------
-    bands : array (bands, rows, columns)
-        The colour bands, of any real type.
-    valid : bool array (rows, columns)
+    `bands` are the colour bands (bands, rows, columns), of any real type.
     """
     if bands.dtype == np.uint8:
         return None

@@ -80,16 +80,8 @@ def read_scene(
         )
     if size_m is not None and size_px is not None:
         raise ImageryError("The size is given twice.", hint="Give size_m or size_px, not both.")
-    reader = open_reader(
-        str(path),
-        lat=lat,
-        lon=lon,
-        bands=bands,
-        crs=crs,
-        scaling=scaling,
-        source=source,
-        allow=allow,
-    )
+    known: dict[str, Any] = {"bands": bands, "crs": crs, "scaling": scaling, "source": source}
+    reader = open_reader(str(path), lat=lat, lon=lon, allow=allow, **known)
     if lat is None or lon is None:
         if max(reader.grid.shape) > MAX_SIDE_PX and resolution_m is None:
             raise ImageryError(

@@ -31,12 +31,9 @@ _SINGLE = ("red", "green", "blue", "nir")
 class Item:
     """One item: the picture to read and what is said of it."""
 
-    identifier: str
     path: str
     bands: tuple[str, ...] | None
-    date: str | None
-    licence: str
-    attribution: str
+    source: ImagerySource
 
 
 def is_stac(path: Path) -> bool:
@@ -65,14 +62,10 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
         lon, lat = point
         here = [f for f in features if _holds(f, lat, lon)]
         if not here:
-            raise PointOutsideError(
-                f"No item of {path.name} holds the point lat {lat}, lon {lon}."
-                + (
-                    f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
-                    if any(_holds(f, lon, lat) for f in features)
-                    else ""
-                )
-            )
+            message = f"No item of {path.name} holds the point lat {lat}, lon {lon}."
+            if any(_holds(f, lon, lat) for f in features):
+                message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+            raise PointOutsideError(message)
         features = here
     features = sorted(features, key=lambda f: _date(f) or "", reverse=True)
     items = [item for item in (_item(f, path, reach) for f in features) if item is not None]
@@ -82,12 +75,7 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
             hint="Give items with assets of the role `data` or `visual`.",
         )
     first = items[0]
-    source = options.source or ImagerySource(
-        name=first.identifier,
-        date=first.date,
-        attribution=first.attribution,
-        licence=first.licence,
-    )
+    source = options.source or first.source
     known = replace(options, bands=options.bands or first.bands, source=source, reach=reach)
     return open_collection([item.path for item in items], known, name=path.name)
 
@@ -117,15 +105,7 @@ def _date(feature: Mapping[str, Any]) -> str | None:
 
 def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
     rasters = {
-        name: asset
-        for name, asset in feature.get("assets", {}).items()
-        if str(asset.get("type", "")).lower().startswith(_RASTER)
-        or str(asset.get("href", "")).lower().partition("?")[0].endswith((".tif", ".tiff", ".jp2"))
-    }
-    rasters = {
-        name: asset
-        for name, asset in rasters.items()
-        if not {"thumbnail", "overview", "metadata"} & set(asset.get("roles", []))
+        name: asset for name, asset in feature.get("assets", {}).items() if _is_picture(asset)
     }
     if not rasters:
         return None
@@ -136,14 +116,21 @@ def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
     properties = feature.get("properties", {})
     providers = [p.get("name", "") for p in properties.get("providers", [])]
     licence = str(properties.get("license", ""))
-    return Item(
-        str(feature.get("id", path.stem)),
-        places[0] if len(places) == 1 else stacked(places, roles or (), reach),
-        roles,
-        _date(feature),
-        "" if licence in ("proprietary", "various", "other") else licence,
-        ", ".join(filter(None, providers)),
+    source = ImagerySource(
+        name=str(feature.get("id", path.stem)),
+        date=_date(feature),
+        attribution=", ".join(filter(None, providers)),
+        licence="" if licence in ("proprietary", "various", "other") else licence,
     )
+    whole = places[0] if len(places) == 1 else stacked(places, roles or (), reach)
+    return Item(whole, roles, source)
+
+
+def _is_picture(asset: Mapping[str, Any]) -> bool:
+    kind, address = str(asset.get("type", "")).lower(), str(asset.get("href", "")).lower()
+    named = address.partition("?")[0].endswith((".tif", ".tiff", ".jp2"))
+    aside = {"thumbnail", "overview", "metadata"} & set(asset.get("roles", []))
+    return (kind.startswith(_RASTER) or named) and not aside
 
 
 def _chosen(

@@ -9,24 +9,15 @@ from geofield.errors import TermsError
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What a source's owner asks for and allows.
-
-    Attributes
-    ----------
-    attribution, licence : str
-        Travel into every product.
-    may_cache : bool
-        Whether tiles may be kept on disk.
-    may_derive : bool
-        Whether geodata may be derived from the imagery.
-    url : str
-        Where the terms can be read.
-    """
+    """What a source's owner asks for and allows; attribution and licence travel into products."""
 
     attribution: str = ""
     licence: str = ""
+    #: Whether tiles may be kept on disk.
     may_cache: bool = False
+    #: Whether geodata may be derived from the imagery.
     may_derive: bool = True
+    #: Where the terms can be read.
     url: str = ""
 
     @property
@@ -36,12 +27,7 @@ class Terms:
 
 
 def check_terms(name: str, terms: Terms, *, acknowledged: bool) -> None:
-    """Refuse a source whose terms forbid derivation, unless the user takes responsibility.
-
-    Raises
-    ------
-    TermsError
-    """
+    """Refuse a source whose terms forbid derivation, unless the user takes responsibility."""
     if terms.may_derive or acknowledged:
         return
     where = f" ({terms.url})" if terms.url else ""

@@ -33,33 +33,22 @@ class Tile:
 
 @dataclass(frozen=True, slots=True)
 class TileLevel:
-    """One zoom of a pyramid.
-
-    Attributes
-    ----------
-    zoom : int
-    resolution : float
-        CRS units per pixel.
-    left, top : float
-        The corner of tile (0, 0) in the CRS.
-    columns, rows : int
-        Tiles of the whole map.
-    tile_px : (int, int)
-        Width and height of a tile.
-    identifier : str
-        The service's own name of the level (WMTS).
-    wraps : bool
-        Whether column `columns` is column 0 again, all around the earth.
-    """
+    """One zoom of a pyramid."""
 
     zoom: int
+    #: CRS units per pixel.
     resolution: float
+    #: left, top: the corner of tile (0, 0) in the CRS.
     left: float
     top: float
+    #: columns, rows: tiles of the whole map.
     columns: int
     rows: int
+    #: Width and height of a tile.
     tile_px: tuple[int, int] = (256, 256)
+    #: The service's own name of the level (WMTS).
     identifier: str = ""
+    #: Whether column `columns` is column 0 again, all around the earth.
     wraps: bool = False
 
     @property
@@ -70,19 +59,10 @@ class TileLevel:
     def grid(self, column: int, row: int, width_px: int, height_px: int, crs: CRS) -> Grid:
         """The grid that starts at a pixel of the level."""
         # One product from the corner, so that tiles get the same bounds however they are met.
-        return Grid(
-            width_px,
-            height_px,
-            Affine(
-                self.resolution,
-                0.0,
-                self.left + column * self.resolution,
-                0.0,
-                -self.resolution,
-                self.top - row * self.resolution,
-            ),
-            crs,
-        )
+        step = self.resolution
+        corner = self.left + column * step, self.top - row * step
+        transform = Affine(step, 0.0, corner[0], 0.0, -step, corner[1])
+        return Grid(width_px, height_px, transform, crs)
 
     def to_px(self, x: float, y: float) -> tuple[float, float]:
         """A position in the CRS to continuous pixels of the level."""
@@ -102,50 +82,28 @@ class TilePyramid:
     ) -> TilePyramid:
         """The ``z/x/y`` scheme of web maps; 512 px tiles (@2x) cover the same ground.
 
-        Parameters
-        ----------
-        min_zoom, max_zoom : int
-        tile_px : int
-        shift : int
-            Zoom z takes the tiles of scheme zoom z - shift: with ``tile_px=512, shift=1`` a
-            zoom has its usual resolution in tiles twice as wide.
+        Zoom z takes the tiles of scheme zoom z - `shift`: with ``tile_px=512, shift=1`` a zoom
+        has its usual resolution in tiles twice as wide.
         """
         levels = []
         for zoom in range(max(min_zoom, shift), max_zoom + 1):
-            count = 2 ** (zoom - shift)
-            levels.append(
-                TileLevel(
-                    zoom,
-                    _WORLD_M / count / tile_px,
-                    -_WORLD_M / 2,
-                    _WORLD_M / 2,
-                    count,
-                    count,
-                    (tile_px, tile_px),
-                    str(zoom),
-                    wraps=True,
-                )
-            )
+            count, half, size = 2 ** (zoom - shift), _WORLD_M / 2, (tile_px, tile_px)
+            corner = (_WORLD_M / count / tile_px, -half, half)
+            levels.append(TileLevel(zoom, *corner, count, count, size, str(zoom), wraps=True))
         return cls(WEB_MERCATOR, tuple(levels))
 
     @classmethod
-    def metric(
-        cls,
-        crs: CRS,
-        *,
-        finest_m: float = 0.125,
-        count: int = 12,
-        tile_px: int = 512,
-        reach: float = 2.0**24,
-    ) -> TilePyramid:
-        """Levels of halving resolution over a projected CRS: windows of a WMS that stay put."""
-        levels = []
-        for zoom in range(count):
-            resolution = finest_m * 2.0 ** (count - 1 - zoom)
+    def metric(cls, crs: CRS, tile_px: int) -> TilePyramid:
+        """Levels over a projected CRS: windows of a WMS that stay put.
+
+        From 256 to 0.125 units per pixel, each half of the one before.
+        """
+        reach, levels = 2.0**24, []
+        for zoom in range(12):
+            resolution = 2.0 ** (8 - zoom)
             tiles = math.ceil(2 * reach / resolution / tile_px)
-            levels.append(
-                TileLevel(zoom, resolution, -reach, reach, tiles, tiles, (tile_px, tile_px))
-            )
+            size = (tile_px, tile_px)
+            levels.append(TileLevel(zoom, resolution, -reach, reach, tiles, tiles, size))
         return cls(crs, tuple(levels))
 
     @property
@@ -154,13 +112,7 @@ class TilePyramid:
         return self.levels[0].zoom, self.levels[-1].zoom
 
     def level(self, zoom: int) -> TileLevel:
-        """The level of a zoom.
-
-        Raises
-        ------
-        ImageryError
-            The source does not have it.
-        """
+        """The level of a zoom; an error where the source does not have it."""
         for level in self.levels:
             if level.zoom == zoom:
                 return level
@@ -204,20 +156,10 @@ class TilePyramid:
         size_m: float | None = None,
         whole_tiles: bool = False,
     ) -> Block:
-        """The tiles under a square around a point.
+        """The tiles under a square of 640 pixels, or of a size, around a point (degrees, WGS 84).
 
         The picture is cut on the level's own pixel edges, so nothing is resampled: the point
-        lies within half a pixel of its centre.
-
-        Parameters
-        ----------
-        zoom : int
-        lat, lon : float
-            Degrees, WGS 84.
-        size_px, size_m : optional
-            Side of the square in pixels (640 by default) or ground metres.
-        whole_tiles : bool
-            Keep every pixel of the tiles touched instead of cutting them.
+        lies within half a pixel of its centre. `whole_tiles` keeps every pixel of them instead.
         """
         level = self.level(zoom)
         x, y = level.to_px(*self._position(lat, lon))
@@ -231,19 +173,13 @@ class TilePyramid:
         column, row = round(x - size_px / 2), round(y - size_px / 2)
         return self._block(level, (column, row, column + size_px, row + size_px), whole_tiles)
 
-    def block_over(
-        self, zoom: int, area: BaseGeometry, *, margin_px: int = 0, whole_tiles: bool = False
-    ) -> Block:
+    def block_over(self, zoom: int, area: BaseGeometry, *, whole_tiles: bool = False) -> Block:
         """The tiles under an area given in lon/lat degrees."""
         level = self.level(zoom)
         left, top, right, bottom = self._bounds_px(level, area)
-        window = (
-            math.floor(left + 1e-6) - margin_px,
-            math.floor(top + 1e-6) - margin_px,
-            math.ceil(right - 1e-6) + margin_px,
-            math.ceil(bottom - 1e-6) + margin_px,
-        )
-        return self._block(level, window, whole_tiles)
+        first = math.floor(left + 1e-6), math.floor(top + 1e-6)
+        last = math.ceil(right - 1e-6), math.ceil(bottom - 1e-6)
+        return self._block(level, (*first, *last), whole_tiles)
 
     # -- inside ----------------------------------------------------------------------------
 
@@ -265,14 +201,9 @@ class TilePyramid:
         if area.is_empty:
             raise ImageryError("The area asked for is empty.")
         west, south, east, north = area.bounds
-        steps = np.linspace(0.0, 1.0, 17)
-        lons = west + (east - west) * np.tile(steps, 17)
-        lats = south + (north - south) * np.repeat(steps, 17)
-        corners = [
-            self._position(float(lat), float(lon)) for lat, lon in zip(lats, lons, strict=True)
-        ]
-        px = np.array([level.to_px(x, y) for x, y in corners])
-        return px[:, 0].min(), px[:, 1].min(), px[:, 0].max(), px[:, 1].max()
+        lats, lons = np.linspace(south, north, 17), np.linspace(west, east, 17)
+        px = np.array([level.to_px(*self._position(lat, lon)) for lat in lats for lon in lons])
+        return *px.min(axis=0), *px.max(axis=0)
 
     def _block(
         self, level: TileLevel, window: tuple[int, int, int, int], whole_tiles: bool
@@ -289,35 +220,25 @@ class TilePyramid:
             raise ImageryError("The part asked for lies outside the source's map.")
         first = (left // width, top // height)
         last = (-(-right // width), -(-bottom // height))
-        block = Block(self.crs, level, *first, last[0] - first[0], last[1] - first[1])
-        if whole_tiles:
-            return block
         crop = (left - first[0] * width, top - first[1] * height, right - left, bottom - top)
-        return Block(self.crs, level, *first, last[0] - first[0], last[1] - first[1], crop)
+        size = last[0] - first[0], last[1] - first[1]
+        return Block(self.crs, level, *first, *size, None if whole_tiles else crop)
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A rectangle of tiles, and the part of it that is wanted.
-
-    Attributes
-    ----------
-    crs : CRS
-    level : TileLevel
-    column, row : int
-        The first tile; the column may lie outside 0 .. columns - 1 across the antimeridian.
-    columns, rows : int
-        Tiles.
-    crop : (column, row, width, height) or None
-        The wanted pixels within the block; None for all.
-    """
+    """A rectangle of tiles, and the part of it that is wanted."""
 
     crs: CRS
     level: TileLevel
+    #: column, row: the first tile; the column may lie outside 0 .. columns - 1 across the
+    #: antimeridian.
     column: int
     row: int
+    #: columns, rows: tiles.
     columns: int
     rows: int
+    #: Column, row, width and height of the wanted pixels within the block; None for all.
     crop: tuple[int, int, int, int] | None = None
 
     @property

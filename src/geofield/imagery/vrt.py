@@ -43,22 +43,7 @@ _MAGIC_MORE = (b"\xff\x4f\xff\x51", b"EHFA_HEADER_TAG", b"RIFF", b"SQLite format
 
 
 def check_vrt(body: bytes, name: str, folder: Path, reach: Reach, *, level: int = 0) -> None:
-    """Refuse a VRT that leads out of reach.
-
-    Parameters
-    ----------
-    body : bytes
-        The VRT.
-    name : str
-        For messages.
-    folder : Path
-        Where relative names begin.
-    reach : Reach
-
-    Raises
-    ------
-    ImageryError
-    """
+    """Refuse a VRT that leads out of reach; relative names begin at the folder."""
     try:
         root = parse_xml(body, name)
     except ET.ParseError as error:
@@ -82,12 +67,7 @@ def check_vrt(body: bytes, name: str, folder: Path, reach: Reach, *, level: int 
 
 
 def check_beside(file: Path) -> None:
-    """Refuse files beside a picture that GDAL would follow elsewhere: overviews, masks, PAM.
-
-    Raises
-    ------
-    ImageryError
-    """
+    """Refuse files beside a picture that GDAL would follow elsewhere: overviews, masks, PAM."""
     for ending in (".ovr", ".OVR", ".msk", ".MSK", ".msk.ovr", ".ovr.ovr"):
         beside = file.with_name(file.name + ending)
         if beside.is_file() and not holds_pixels(beside):

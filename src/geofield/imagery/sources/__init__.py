@@ -1,12 +1,11 @@
-"""Imagery sources behind one small protocol: servers, files, folders."""
+"""Imagery sources: servers, files, folders."""
 
-from geofield.imagery.sources.base import LocalTiles, PictureSource, Source, TileSource
+from geofield.imagery.sources.base import PictureSource, Source, TileSource
 from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
 from geofield.imagery.sources.registry import find_source, merged_catalogue
 
 __all__ = [
     "BUILTIN",
-    "LocalTiles",
     "PictureSource",
     "Source",
     "SourceEntry",

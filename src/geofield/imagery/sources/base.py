@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from urllib.parse import quote
 
+from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.terms import Terms
-from geofield.imagery.tiling import Block, Tile, TilePyramid
+from geofield.imagery.tiling import Tile, TilePyramid
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -17,94 +18,53 @@ class Request:
     headers: tuple[tuple[str, str], ...] = ()
 
 
-@runtime_checkable
-class TileSource(Protocol):
-    """Tiles from a server.
+@dataclass(frozen=True, slots=True)
+class TileSource:
+    """Tiles from a server; each kind of server says what to ask it for."""
 
-    Attributes
-    ----------
-    name : str
-    terms : Terms
-    pyramid : TilePyramid
-    identity : str
-        What makes this source differ from others (address, layer, style), without any key.
-    secrets : tuple of str
-        Keys that must never be shown.
-    rate_per_s : float or None
-        Requests per second that the server's owner tolerates.
-    date : str or None
-        When the imagery was taken, where the source says so.
-    """
+    name: str
+    terms: Terms = field(default_factory=Terms, kw_only=True)
+    #: Never shown.
+    key: str = field(default="", repr=False, kw_only=True)
+    #: Requests per second that the server's owner tolerates.
+    rate_per_s: float | None = field(default=None, kw_only=True)
+    #: When the imagery was taken, where the source says so.
+    date: str | None = field(default=None, kw_only=True)
+    #: Sent with each request, for instance a Referer.
+    headers: tuple[tuple[str, str], ...] = field(default=(), kw_only=True)
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def pyramid(self) -> TilePyramid:
+        """The tiles that there are."""
+        raise NotImplementedError
+
     @property
-    def terms(self) -> Terms: ...  # noqa: D102
+    def identity(self) -> str:
+        """What makes this source differ from others (address, layer, style), without any key.
+
+        The tile cache asks for it, so that sources which are never cached need none.
+        """
+        raise NotImplementedError
+
     @property
-    def pyramid(self) -> TilePyramid: ...  # noqa: D102
-    @property
-    def identity(self) -> str: ...  # noqa: D102
-    @property
-    def secrets(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def rate_per_s(self) -> float | None: ...  # noqa: D102
-    @property
-    def date(self) -> str | None: ...  # noqa: D102
+    def secrets(self) -> tuple[str, ...]:
+        """The spellings of the key that may stand in an address."""
+        return tuple({self.key, quote(self.key, safe=""), quote(self.key)} - {""})
 
     def request(self, tile: Tile) -> Request:
         """What to ask for."""
-        ...
-
-
-@runtime_checkable
-class FrameSource(Protocol):
-    """A tile source that delivers single frames around a point instead of fixed tiles."""
-
-    def framed(
-        self, zoom: int, *, lat: float, lon: float, size_px: int
-    ) -> tuple[TileSource, Block]:
-        """The source of one tile with the point at its centre, and its block."""
-        ...
-
-
-@runtime_checkable
-class LocalTiles(Protocol):
-    """Tiles in a file here; `read` gives None where there is none."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def terms(self) -> Terms: ...  # noqa: D102
-    @property
-    def pyramid(self) -> TilePyramid: ...  # noqa: D102
-    @property
-    def date(self) -> str | None: ...  # noqa: D102
-
-    def read(self, tile: Tile) -> bytes | None:
-        """The bytes of a tile."""
-        ...
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSource:
-    """One picture, a folder of them, or those of a STAC file.
-
-    Attributes
-    ----------
-    name : str
-    terms : Terms
-    path : str
-        File, folder, address or STAC file.
-    bands : tuple of str or None
-        What the bands show, where the user says so.
-    date : str or None
-    """
+    """One picture, a folder of them, or those of a STAC file."""
 
     name: str
     terms: Terms
+    #: File, folder, address or STAC file.
     path: str
-    bands: tuple[str, ...] | None = None
     date: str | None = None
 
 
-Source = TileSource | LocalTiles | PictureSource
+Source = TileSource | MBTilesSource | PictureSource

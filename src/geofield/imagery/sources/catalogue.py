@@ -14,38 +14,27 @@ from geofield.imagery.terms import Terms
 
 @dataclass(frozen=True, slots=True)
 class SourceEntry:
-    """How a source is reached, and on what terms.
+    """How a source is reached, and on what terms."""
 
-    Attributes
-    ----------
-    kind : str
-        xyz, wmts, wms, mbtiles, google or picture.
-    address : str
-        Template, address or path.
-    title, region : str
-        For people.
-    layer : str
-        Of a WMS or WMTS.
-    key_parameter : str
-        Name of the query value that carries the key (WMS, WMTS).
-    needs_key : bool
-    """
-
+    #: xyz, wmts, wms, mbtiles, google or picture.
     kind: str
+    #: Template, address or path.
     address: str
     terms: Terms = field(default_factory=Terms)
+    #: title, region: for people.
     title: str = ""
     region: str = ""
     min_zoom: int = 0
     max_zoom: int = 22
     tile_px: int | None = None
     subdomains: tuple[str, ...] = ("a", "b", "c")
+    #: Of a WMS or WMTS.
     layer: str = ""
+    #: Name of the query value that carries the key (WMS, WMTS).
     key_parameter: str = ""
     needs_key: bool = False
     rate_per_s: float | None = None
     date: str | None = None
-    bands: tuple[str, ...] | None = None
     headers: tuple[tuple[str, str], ...] = ()
 
 

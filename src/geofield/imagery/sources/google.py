@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from urllib.parse import quote
 
 from geofield.errors import ImageryError
 from geofield.grid import Grid
-from geofield.imagery.sources.base import Request
-from geofield.imagery.sources.xyz import key_variable, secrets_of
+from geofield.imagery.sources.base import Request, TileSource
+from geofield.imagery.sources.xyz import key_variable
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Block, Tile, TileLevel, TilePyramid
 
@@ -25,19 +25,18 @@ GOOGLE_TERMS = Terms(
 
 
 @dataclass(frozen=True, slots=True)
-class GoogleStaticSource:
+class GoogleStaticSource(TileSource):
     """Satellite pictures of at most 640 x 640 px with the point exactly at the centre.
 
     The service takes positions to six decimals of a degree (0.1 m): the point is rounded to
     that first, so that the georeference is exact for what was asked.
     """
 
-    key: str = field(default="", repr=False)
-    address: str = "https://maps.googleapis.com/maps/api/staticmap"
     name: str = "google"
     terms: Terms = GOOGLE_TERMS
     rate_per_s: float | None = 10.0
-    date: str | None = None
+    address: str = "https://maps.googleapis.com/maps/api/staticmap"
+    #: Latitude and longitude, degrees.
     centre: tuple[float, float] | None = None
     size_px: int = MAX_FRAME_PX
 
@@ -53,16 +52,6 @@ class GoogleStaticSource:
     def pyramid(self) -> TilePyramid:
         """The zooms of Web Mercator, 0 to 22."""
         return TilePyramid.web_mercator(0, 22)
-
-    @property
-    def identity(self) -> str:
-        """Never used for a cache file."""
-        return self.address
-
-    @property
-    def secrets(self) -> tuple[str, ...]:
-        """The key."""
-        return secrets_of(self.key)
 
     def framed(
         self, zoom: int, *, lat: float, lon: float, size_px: int

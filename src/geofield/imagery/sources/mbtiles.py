@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import sqlite3
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PIL import Image, UnidentifiedImageError
@@ -27,13 +27,7 @@ class MBTilesSource:
 
     @classmethod
     def open(cls, path: str | Path, terms: Terms | None = None) -> MBTilesSource:
-        """Look at an MBTiles file.
-
-        Raises
-        ------
-        ImageryError
-            Not an MBTiles file, empty, or of vector tiles.
-        """
+        """Look at an MBTiles file; its metadata say who made it where the terms do not."""
         file = Path(path)
         if not file.is_file():
             raise ImageryError(f"There is no file {path}.", hint="Check the path.")
@@ -57,17 +51,13 @@ class MBTilesSource:
                 tile_px = image.width
         except UnidentifiedImageError:
             raise ImageryError(f"The tiles in {file.name} are not pictures.") from None
-        return cls(
-            name=words.get("name") or file.name,
-            path=str(file),
-            terms=terms
-            or Terms(
-                attribution=words.get("attribution", ""),
-                licence=words.get("licence", ""),
-                may_cache=True,
-            ),
-            pyramid=TilePyramid.web_mercator(int(low), int(high), tile_px),
+        known = terms or Terms(may_cache=True)
+        credit = known.attribution or words.get("attribution", "")
+        known = replace(
+            known, attribution=credit, licence=known.licence or words.get("licence", "")
         )
+        pyramid = TilePyramid.web_mercator(int(low), int(high), tile_px)
+        return cls(words.get("name") or file.name, str(file), known, pyramid)
 
     def read(self, tile: Tile) -> bytes | None:
         """The bytes of a tile, or None."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -14,40 +15,34 @@ from pyproj.exceptions import CRSError as ProjCRSError
 from geofield.errors import FormatError, ImageryError
 from geofield.imagery.client import Client
 from geofield.imagery.reach import OWN_FOLDER, Reach
+from geofield.imagery.sources.base import TileSource
 from geofield.imagery.terms import Terms
+from geofield.imagery.tiling import TilePyramid
 from geofield.strangers import parse_xml
+from geofield.wording import nearest
 
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service:
-    """A WMS or WMTS as a user or the catalogue names it.
+    """A WMS or WMTS as a user or the catalogue names it."""
 
-    Attributes
-    ----------
-    address : str
-        Of the capabilities document or of the service; a layer (and a style) may stand in it as
-        ``layer=NAME`` (WMS: ``layers=NAME``, ``styles=NAME``).
-    client : Client or None
-        None offline.
-    name, layer : str
-        For people, and as the service calls it; empty for what the document says.
-    terms : Terms, optional
-        Better known than the document's own words.
-    key, key_parameter : str
-        Added to each request as ``key_parameter=key``.
-    reach : Reach
-        Hosts that the document may lead to besides its own.
-    """
-
+    #: Of the capabilities document or of the service; a layer (and a style) may stand in it as
+    #: ``layer=NAME`` (WMS: ``layers=NAME``, ``styles=NAME``).
     address: str = field(repr=False)
+    #: None offline.
     client: Client | None
-    name: str = ""
+    #: As the service calls it; empty for what the document says.
     layer: str = ""
+    #: Better known than the document's own words.
     terms: Terms | None = None
+    #: key, key_parameter: added to each request as ``key_parameter=key``.
     key: str = field(default="", repr=False)
     key_parameter: str = ""
+    #: Sent with each request.
+    headers: tuple[tuple[str, str], ...] = ()
+    #: Hosts that the document may lead to besides its own.
     reach: Reach = OWN_FOLDER
 
     def capabilities(self, **query: str) -> ET.Element:
@@ -57,29 +52,44 @@ class Service:
             if self.key and self.key_parameter:
                 query[self.key_parameter] = self.key
             document = with_query(document, **query) if query else document
-        return read_document(document, self.client)
+        return read_document(document, self.client, dict(self.headers))
 
     def require(self, target: str) -> None:
         """Refuse an address of the document that is none of the web, or of a foreign host."""
-        require_web_address(target, self.address)
-        self.reach.of(self.address).require(target, plain_address(self.address))
+        parts, shown = urlsplit(target), plain_address(self.address)
+        if parts.scheme not in ("http", "https") or not parts.netloc:
+            raise ImageryError(
+                f"{shown} names no web address of its service.",
+                hint="Give the address of the service itself, which begins with https://.",
+            )
+        self.reach.of(self.address).require(target, shown)
+
+    def terms_by(self, credit: str, constraints: str) -> Terms:
+        """The terms that are known, else the document's own words."""
+        plain = constraints if constraints.lower() != "none" else ""
+        return self.terms or Terms(attribution=credit, licence=plain, may_cache=True)
 
 
-def read_document(address: str, client: Client | None) -> ET.Element:
-    """A capabilities document from a file or a server.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServiceSource(TileSource):
+    """What the sources of both kinds of services have in common."""
 
-    Raises
-    ------
-    ImageryError
-        Not XML, or a service exception, whose text is passed on.
-    """
+    layer: str
+    pyramid: TilePyramid = field()
+    key_parameter: str = ""
+
+
+def read_document(
+    address: str, client: Client | None, headers: Mapping[str, str] | None = None
+) -> ET.Element:
+    """A capabilities document from a file or a server; a service's exception is passed on."""
     if urlsplit(address).scheme in ("http", "https"):
         if client is None:
             raise ImageryError(
                 f"The capabilities of {urlsplit(address).netloc} are not here (offline).",
                 hint="Save the capabilities document and give its path.",
             )
-        body = client.text(address)
+        body = client.text(address, headers)
     else:
         try:
             body = Path(address).read_bytes()
@@ -124,20 +134,6 @@ def link(element: ET.Element) -> str:
     return element.get(_XLINK, "")
 
 
-def require_web_address(target: str, document: str) -> None:
-    """Refuse a service whose document does not say where it is asked, but for a path.
-
-    Raises
-    ------
-    ImageryError
-    """
-    if urlsplit(target).scheme not in ("http", "https") or not urlsplit(target).netloc:
-        raise ImageryError(
-            f"{plain_address(document)} names no web address of its service.",
-            hint="Give the address of the service itself, which begins with https://.",
-        )
-
-
 def with_query(address: str, **values: str) -> str:
     """An address with query values set, whatever their case was."""
     parts = urlsplit(address)
@@ -174,22 +170,13 @@ def parse_ogc_crs(name: str) -> CRS | None:
 
 
 def choose_layer(names: list[str], wanted: str, address: str) -> str:
-    """The wanted layer, or the only one.
-
-    Raises
-    ------
-    ImageryError
-        Listing what there is.
-    """
+    """The wanted layer, or the only one; the error lists what there is."""
     if wanted:
         if wanted in names:
             return wanted
-        import difflib
-
-        close = difflib.get_close_matches(wanted, names, n=1)
         raise ImageryError(
             f"{plain_address(address)} has no layer {wanted!r}.",
-            hint=f"Did you mean {close[0]!r}?" if close else f"Layers: {_listed(names)}.",
+            hint=nearest(wanted, names).strip() or f"Layers: {_listed(names)}.",
         )
     if len(names) == 1:
         return names[0]

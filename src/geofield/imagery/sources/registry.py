@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -20,6 +20,7 @@ from geofield.imagery.sources.wms import open_wms
 from geofield.imagery.sources.wmts import open_wmts
 from geofield.imagery.sources.xyz import XYZSource
 from geofield.imagery.terms import Terms
+from geofield.wording import nearest
 
 #: The user's own pictures, and addresses whose owner's terms we do not know: the user answers
 #: for those. Their tiles are kept, so that a restart goes on where it stopped.
@@ -55,22 +56,11 @@ def find_source(
 ) -> Source:
     """The source that a name, address or path means.
 
-    Parameters
-    ----------
-    what : str
-        A name of the catalogue; a tile address with ``{z}``, ``{x}``, ``{y}``; the address of
-        a WMS, WMTS or GeoTIFF (``wms:`` or ``wmts:`` in front settles doubt); a file or folder.
-    catalogue : mapping, optional
-        Sources by name; the built-in ones by default.
-    keys : mapping of source name to key, optional
-    client : Client, optional
-        For capabilities documents.
-    layer : str
-        Of a WMS or WMTS.
-    point : (lon, lat), optional
-        Where the picture will be; a WMS without Web Mercator is asked in its UTM zone.
-    allow : sequence of str
-        Hosts that a capabilities document may lead to besides its own.
+    It is a name of the catalogue (the built-in one by default); a tile address with ``{z}``,
+    ``{x}``, ``{y}``; the address of a WMS, WMTS or GeoTIFF (``wms:`` or ``wmts:`` in front settles
+    doubt); a file or folder. `keys` are by source name. The client is for capabilities documents,
+    which may lead to the hosts of `allow` besides their own; a WMS without Web Mercator is asked in
+    the UTM zone of the point (longitude, latitude) where the picture will be.
 
     Raises
     ------
@@ -79,68 +69,39 @@ def find_source(
     """
     catalogue = BUILTIN if catalogue is None else catalogue
     if what in catalogue:
-        entry = catalogue[what]
-        return open_entry(
-            what,
-            entry,
-            key=(keys or {}).get(what, ""),
-            client=client,
-            layer=layer,
-            point=point,
-            allow=allow,
-        )
-    kind, address = kind_of(what)
-    if not kind:
-        raise _unknown(what, catalogue)
-    entry = SourceEntry(kind=kind, address=address, terms=terms_of_host(address))
-    name = urlsplit(address).hostname or display_name(address)
-    return open_entry(name, entry, key="", client=client, layer=layer, point=point, allow=allow)
-
-
-def open_entry(
-    name: str,
-    entry: SourceEntry,
-    *,
-    key: str,
-    client: Client | None,
-    layer: str = "",
-    point: tuple[float, float] | None = None,
-    allow: Sequence[str] = (),
-) -> Source:
-    """The source of a catalogue entry."""
-    kind = entry.kind.removesuffix("-file")
+        name, entry = what, catalogue[what]
+    else:
+        guess, address = kind_of(what)
+        if not guess:
+            raise _unknown(what, catalogue)
+        name = urlsplit(address).hostname or display_name(address)
+        entry = SourceEntry(kind=guess, address=address, terms=terms_of_host(address))
+    kind, key = entry.kind, (keys or {}).get(what, "")
+    # Of an address or file given by hand its own document or metadata know more.
+    terms = entry.terms if entry.terms != _OWN else None
+    shared = {each: getattr(entry, each) for each in ("rate_per_s", "date", "headers")}
     if kind == "xyz":
-        return XYZSource(
-            name,
-            entry.address,
-            entry.terms,
-            entry.min_zoom,
-            entry.max_zoom,
-            entry.tile_px,
-            entry.subdomains,
-            key,
-            entry.rate_per_s,
-            entry.date,
-            entry.headers,
-        )
+        own = ("terms", "min_zoom", "max_zoom", "tile_px", "subdomains")
+        own_values = {each: getattr(entry, each) for each in own}
+        return XYZSource(name, entry.address, key=key, **own_values, **shared)
     if kind == "google":
-        return GoogleStaticSource(key=key, address=entry.address, name=name, terms=entry.terms)
+        return GoogleStaticSource(name, terms=entry.terms, key=key, address=entry.address, **shared)
     if kind == "mbtiles":
-        known = entry.terms if entry.terms.attribution else None
-        return MBTilesSource.open(entry.address, known)
+        return replace(MBTilesSource.open(entry.address, terms), date=entry.date)
     if kind in ("wmts", "wms"):
         service = Service(
             address=entry.address,
             client=client,
-            name=name,
             layer=layer or entry.layer,
-            terms=entry.terms if entry.terms != _OWN else None,
+            terms=terms,
             key=key,
             key_parameter=entry.key_parameter,
+            headers=entry.headers,
             reach=Reach(tuple(allow)),
         )
-        return open_wmts(service) if kind == "wmts" else open_wms(service, point)
-    return PictureSource(name, entry.terms, entry.address, entry.bands, entry.date)
+        served = open_wmts(service) if kind == "wmts" else open_wms(service, point)
+        return replace(served, name=name, key=key, key_parameter=entry.key_parameter, **shared)
+    return PictureSource(name, entry.terms, entry.address, entry.date)
 
 
 def terms_of_host(address: str) -> Terms:
@@ -184,26 +145,25 @@ def _kind_of_file(file: Path) -> str:
     if not file.exists():
         return ""
     if file.suffix.lower() == ".mbtiles":
-        return "mbtiles-file"
+        return "mbtiles"
     if file.suffix.lower() == ".xml":
         head = file.read_bytes()[:2000]
         if b"wmts" in head.lower():
-            return "wmts-file"
+            return "wmts"
         if b"WMS_Capabilities" in head or b"WMT_MS_Capabilities" in head:
-            return "wms-file"
-    return "picture-file"
+            return "wms"
+    return "picture"
 
 
 def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
-    close = difflib.get_close_matches(what.lower(), catalogue, n=1, cutoff=0.5)
+    near = nearest(what.lower(), catalogue, cutoff=0.5)
     looks_like_path = "/" in what or "\\" in what or Path(what).suffix != ""
-    if looks_like_path and not close:
+    if looks_like_path and not near:
         return ImageryError(
             f"There is no picture {what}.",
             hint="Check the path. `geofield sources` lists the sources known by name.",
         )
     return ImageryError(
         f"There is no imagery source or file {what!r}.",
-        hint=(f"Did you mean {close[0]!r}? " if close else "")
-        + "`geofield sources` lists them; an address or a path will do too.",
+        hint=f"{near} `geofield sources` lists them; an address or a path will do too.".strip(),
     )

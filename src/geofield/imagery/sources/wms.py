@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
-from pyproj import CRS
-
 from geofield.crs import WEB_MERCATOR, is_metric, metric_crs, northing_first
 from geofield.errors import ImageryError
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     Service,
+    ServiceSource,
     children,
     choose_layer,
     link,
@@ -21,8 +20,6 @@ from geofield.imagery.sources.ows import (
     text,
     with_query,
 )
-from geofield.imagery.sources.xyz import secrets_of
-from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TilePyramid
 
 _FORMATS = ("image/png", "image/jpeg", "image/jpg", "image/webp", "image/png8")
@@ -30,34 +27,21 @@ _FORMATS = ("image/png", "image/jpeg", "image/jpg", "image/webp", "image/png8")
 _TILE_PX = 512
 
 
-@dataclass(frozen=True, slots=True)
-class WMSSource:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WMSSource(ServiceSource):
     """One layer of a WMS in one CRS."""
 
-    name: str
     service: str = field(repr=False)
-    layer: str
-    pyramid: TilePyramid
-    terms: Terms
     version: str = "1.3.0"
     crs_name: str = "EPSG:3857"
     style: str = ""
     form: str = "image/png"
-    key: str = field(default="", repr=False)
-    key_parameter: str = ""
-    rate_per_s: float | None = None
-    date: str | None = None
 
     @property
     def identity(self) -> str:
         """Service, layer, style, CRS and format, without any key."""
         service = plain_address(self.service)
         return f"wms {service} {self.layer} {self.style} {self.crs_name} {self.form}"
-
-    @property
-    def secrets(self) -> tuple[str, ...]:
-        """The key."""
-        return secrets_of(self.key)
 
     def request(self, tile: Tile) -> Request:
         """The address of a window."""
@@ -85,24 +69,15 @@ class WMSSource:
         }
         if self.key and self.key_parameter:
             values[self.key_parameter] = self.key
-        return Request(with_query(self.service, **values))
+        return Request(with_query(self.service, **values), self.headers)
 
 
 def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSSource:
     """A WMS source from the address or path of its capabilities.
 
     Web Mercator is asked for where the service knows it, so that the windows are those of
-    web maps; else the UTM zone of the point; else any metric CRS it names.
-
-    Parameters
-    ----------
-    service : Service
-    point : (lon, lat), optional
-        Where the picture will be, for the choice of the CRS.
-
-    Raises
-    ------
-    ImageryError
+    web maps; else the UTM zone of the point (lon, lat) where the picture will be; else any
+    metric CRS it names.
     """
     address = service.address
     version = query_value(address, "version") or "1.3.0"
@@ -110,7 +85,10 @@ def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSS
     named = _layers(children(root, "Capability", "Layer"), [])
     wanted = service.layer or query_value(address, "layers")
     chosen = choose_layer(sorted(named), wanted, address)
-    names, _ = named[chosen]
+    names, element = named[chosen]
+    credit = text(element, "Attribution", "Title") or text(
+        root, "Service", "ContactInformation", "ContactPersonPrimary", "ContactOrganization"
+    )
     crs_name, pyramid = _pyramid(names, point, address)
     get_map = children(root, "Capability", "Request", "GetMap")
     target, offered = address, []
@@ -121,17 +99,15 @@ def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSS
     form = next((f for f in _FORMATS if f in offered), "image/png")
     service.require(target)
     return WMSSource(
-        name=service.name or chosen,
+        name=chosen,
         service=with_query(target, SERVICE="WMS"),
         layer=chosen,
         pyramid=pyramid,
-        terms=service.terms or _terms(root, named[chosen][1]),
+        terms=service.terms_by(credit, text(root, "Service", "AccessConstraints")),
         version=root.get("version", "1.3.0"),
         crs_name=crs_name,
         style=query_value(address, "styles"),
         form=form,
-        key=service.key,
-        key_parameter=service.key_parameter,
     )
 
 
@@ -141,12 +117,8 @@ def _layers(
     """The named layers with their CRS names; children inherit their parents' CRS."""
     found: dict[str, tuple[list[str], ET.Element]] = {}
     for element in elements:
-        own = [
-            part
-            for each in (*children(element, "CRS"), *children(element, "SRS"))
-            for part in (each.text or "").split()
-        ]
-        names = [*inherited, *own]
+        systems = (*children(element, "CRS"), *children(element, "SRS"))
+        names = [*inherited, *(part for each in systems for part in (each.text or "").split())]
         name = text(element, "Name")
         inner = _layers(children(element, "Layer"), names)
         if name and not inner:
@@ -158,32 +130,17 @@ def _layers(
 def _pyramid(
     names: list[str], point: tuple[float, float] | None, address: str
 ) -> tuple[str, TilePyramid]:
-    known: list[tuple[str, CRS]] = []
-    for each in names:
-        crs = parse_ogc_crs(each)
-        if crs is not None:
-            known.append((each, crs))
+    known = [(name, crs) for name in names if (crs := parse_ogc_crs(name)) is not None]
     for name, crs in known:
         if crs == WEB_MERCATOR:
             return name, TilePyramid.web_mercator(1, 22, _TILE_PX, shift=1)
     metric = [(name, crs) for name, crs in known if is_metric(crs)]
-    if point is not None:
-        zone = metric_crs(*point).utm_zone
-        for name, crs in metric:
-            if crs.utm_zone == zone:
-                return name, TilePyramid.metric(crs, tile_px=_TILE_PX)
+    zone = None if point is None else metric_crs(*point).utm_zone
+    metric = [each for each in metric if point is None or each[1].utm_zone == zone] or metric
     if metric:
-        return metric[0][0], TilePyramid.metric(metric[0][1], tile_px=_TILE_PX)
+        name, crs = metric[0]
+        return name, TilePyramid.metric(crs, _TILE_PX)
     raise ImageryError(
         f"{plain_address(address)} offers the layer in no metric coordinate reference system.",
         hint="Give another service, or a GeoTIFF made from this one with QGIS.",
     )
-
-
-def _terms(root: ET.Element, layer: ET.Element) -> Terms:
-    credit = text(layer, "Attribution", "Title") or text(
-        root, "Service", "ContactInformation", "ContactPersonPrimary", "ContactOrganization"
-    )
-    constraints = text(root, "Service", "AccessConstraints")
-    plain = constraints if constraints.lower() not in ("none", "") else ""
-    return Terms(attribution=credit, licence=plain, may_cache=True)

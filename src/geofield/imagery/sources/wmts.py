@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
@@ -14,6 +14,7 @@ from geofield.errors import ImageryError
 from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     Service,
+    ServiceSource,
     children,
     choose_layer,
     link,
@@ -23,8 +24,6 @@ from geofield.imagery.sources.ows import (
     text,
     with_query,
 )
-from geofield.imagery.sources.xyz import secrets_of
-from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TileLevel, TilePyramid
 
 #: Metres per pixel at scale 1:1 in the standard (0.28 mm pixels).
@@ -33,29 +32,19 @@ _METRES_PER_DEGREE = 111319.49079327358
 _FORMATS = ("image/png", "image/webp", "image/jpeg", "image/jpg", "image/png8")
 
 
-@dataclass(frozen=True, slots=True)
-class WMTSSource:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WMTSSource(ServiceSource):
     """One layer of a WMTS in one tile matrix set."""
 
-    name: str
-    layer: str
-    pyramid: TilePyramid
     template: str = field(repr=False)
-    terms: Terms
-    key: str = field(default="", repr=False)
-    key_parameter: str = ""
-    rate_per_s: float | None = None
-    date: str | None = None
 
     @property
     def identity(self) -> str:
         """Template and layer, without any key."""
-        return f"wmts {self.layer} {_without_secret(self.template, self.key)}"
-
-    @property
-    def secrets(self) -> tuple[str, ...]:
-        """The key."""
-        return secrets_of(self.key)
+        address = self.template
+        for secret in self.secrets:
+            address = address.replace(secret, "")
+        return f"wmts {self.layer} {address}"
 
     def request(self, tile: Tile) -> Request:
         """The address of a tile."""
@@ -68,17 +57,11 @@ class WMTSSource:
         if self.key and self.key_parameter:
             address += f"{'&' if '?' in address else '?'}{self.key_parameter}="
             address += quote(self.key, safe="")
-        return Request(address)
+        return Request(address, self.headers)
 
 
 def open_wmts(service: Service) -> WMTSSource:
-    """A WMTS source from the address or path of its capabilities.
-
-    Raises
-    ------
-    ImageryError
-        No such layer; no tile matrix set in a CRS of use.
-    """
+    """A WMTS source from the address or path of its capabilities."""
     address = service.address
     whole = address.partition("?")[0].lower().endswith(".xml")
     query = {} if whole else {"SERVICE": "WMTS", "REQUEST": "GetCapabilities"}
@@ -93,13 +76,14 @@ def open_wmts(service: Service) -> WMTSSource:
     template = _template(root, element, set_id, address)
     service.require(template)
     return WMTSSource(
-        name=service.name or chosen,
+        name=chosen,
         layer=chosen,
         pyramid=pyramid,
         template=template,
-        terms=service.terms or _terms(root),
-        key=service.key,
-        key_parameter=service.key_parameter,
+        terms=service.terms_by(
+            text(root, "ServiceProvider", "ProviderName"),
+            text(root, "ServiceIdentification", "AccessConstraints"),
+        ),
     )
 
 
@@ -126,22 +110,15 @@ def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
     # The corner follows the authority's axis order when the CRS is named as a URN.
     swapped = northing_first(crs) and "urn:" in text(element, "SupportedCRS")
-    rough = []
+    rough: list[_Rough] = []
     for matrix in children(element, "TileMatrix"):
-        scale = float(text(matrix, "ScaleDenominator"))
+        resolution = float(text(matrix, "ScaleDenominator")) * _PIXEL_M / unit_m
         corner = [float(part) for part in text(matrix, "TopLeftCorner").split()]
         left, top = reversed(corner) if swapped else corner
-        rough.append(
-            (
-                scale * _PIXEL_M / unit_m,
-                left,
-                top,
-                int(text(matrix, "MatrixWidth")),
-                int(text(matrix, "MatrixHeight")),
-                (int(text(matrix, "TileWidth")), int(text(matrix, "TileHeight"))),
-                text(matrix, "Identifier"),
-            )
-        )
+        columns, rows = int(text(matrix, "MatrixWidth")), int(text(matrix, "MatrixHeight"))
+        tile_px = int(text(matrix, "TileWidth")), int(text(matrix, "TileHeight"))
+        name = text(matrix, "Identifier")
+        rough.append((resolution, left, top, columns, rows, tile_px, name))
     rough.sort(key=lambda each: -each[0])
     if crs == WEB_MERCATOR:
         return _web_mercator_levels(rough)
@@ -156,55 +133,35 @@ def _web_mercator_levels(rough: list[_Rough]) -> tuple[TileLevel, ...]:
 
     Documents print few digits: over a million columns they add up to metres.
     """
-    exact = {
-        (level.zoom, tile_px): level
-        for tile_px in {each[5][0] for each in rough}
-        for level in TilePyramid.web_mercator(0, 24, tile_px).levels
-    }
     levels = []
     for n, values in enumerate(rough):
-        resolution, left, top, columns, rows, tile_px, identifier = values
-        match = next(
-            (
-                level
-                for (_, size), level in exact.items()
-                if size == tile_px[0] == tile_px[1]
-                and abs(level.resolution / resolution - 1) < 1e-4
-                and abs(left - level.left) < 2 * resolution + 1.0
-                and abs(top - level.top) < 2 * resolution + 1.0
-            ),
-            None,
+        resolution, left, top, columns, rows, (width, height), identifier = values
+        near = (
+            level
+            for level in TilePyramid.web_mercator(0, 24, width).levels
+            if width == height
+            and abs(level.resolution / resolution - 1) < 1e-4
+            and abs(left - level.left) < 2 * resolution + 1.0
+            and abs(top - level.top) < 2 * resolution + 1.0
         )
+        match = next(near, None)
         if match is None:
             levels.append(TileLevel(n, *values))
         else:
-            levels.append(
-                TileLevel(
-                    match.zoom,
-                    match.resolution,
-                    match.left,
-                    match.top,
-                    columns,
-                    rows,
-                    tile_px,
-                    identifier,
-                    wraps=columns == match.columns,
-                )
-            )
+            wraps = columns == match.columns
+            own = replace(match, columns=columns, rows=rows, identifier=identifier, wraps=wraps)
+            levels.append(own)
     if len({level.zoom for level in levels}) != len(levels):
         return tuple(TileLevel(n, *values) for n, values in enumerate(rough))
     return tuple(levels)
 
 
 def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) -> str:
-    style = next(
-        (
-            text(each, "Identifier")
-            for each in children(layer, "Style")
-            if each.get("isDefault") == "true"
-        ),
-        next((text(each, "Identifier") for each in children(layer, "Style")), ""),
-    )
+    styles = sorted(children(layer, "Style"), key=lambda each: each.get("isDefault") != "true")
+    style = text(styles[0], "Identifier") if styles else ""
+    dimensions = {
+        text(each, "Identifier"): text(each, "Default") for each in children(layer, "Dimension")
+    }
     offered = [(each.text or "").strip() for each in children(layer, "Format")]
     form = next((f for f in _FORMATS if f in offered), offered[0] if offered else "image/png")
     resources = [
@@ -216,8 +173,7 @@ def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) ->
         best = next((each for each in resources if each.get("format") == form), resources[0])
         template = best.get("template", "")
         fixed = {"style": style, "tilematrixset": set_id, "layer": text(layer, "Identifier")}
-        for dimension in children(layer, "Dimension"):
-            fixed[text(dimension, "Identifier").lower()] = text(dimension, "Default")
+        fixed |= {name.lower(): value for name, value in dimensions.items()}
         return re.sub(r"\{(\w+)\}", lambda m: fixed.get(m.group(1).lower(), m.group(0)), template)
     service = address.partition("?")[0]
     for operation in children(root, "OperationsMetadata", "Operation"):
@@ -234,21 +190,6 @@ def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) ->
         "FORMAT": form,
         "TILEMATRIXSET": set_id,
     }
-    for dimension in children(layer, "Dimension"):
-        values[text(dimension, "Identifier").upper()] = text(dimension, "Default")
+    values |= {name.upper(): value for name, value in dimensions.items()}
     base = with_query(service, **values)
     return base + "&TILEMATRIX={TileMatrix}&TILEROW={TileRow}&TILECOL={TileCol}"
-
-
-def _terms(root: ET.Element) -> Terms:
-    """The document's own words."""
-    provider = text(root, "ServiceProvider", "ProviderName")
-    constraints = text(root, "ServiceIdentification", "AccessConstraints")
-    plain = constraints if constraints.lower() not in ("none", "") else ""
-    return Terms(attribution=provider, licence=plain, may_cache=True)
-
-
-def _without_secret(address: str, key: str) -> str:
-    for secret in secrets_of(key):
-        address = address.replace(secret, "")
-    return address

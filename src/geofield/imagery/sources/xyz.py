@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from urllib.parse import quote, urlsplit
 
 from geofield.errors import ImageryError
-from geofield.imagery.sources.base import Request
-from geofield.imagery.terms import Terms
+from geofield.imagery.sources.base import Request, TileSource
 from geofield.imagery.tiling import Tile, TilePyramid
 
 _PLACE = re.compile(r"\{([^{}]*)\}")
@@ -16,34 +15,17 @@ _KEY_NAMES = ("key", "apikey", "api_key", "token", "access_token")
 
 
 @dataclass(frozen=True, slots=True)
-class XYZSource:
-    """Web Mercator tiles behind an address template.
+class XYZSource(TileSource):
+    """Web Mercator tiles behind an address template."""
 
-    Attributes
-    ----------
-    name : str
-    template : str
-        With ``{z}``, ``{x}``, ``{y}`` (from the north) or ``{-y}`` (TMS, from the south), or
-        ``{q}`` (quadkey); ``{s}`` or ``{switch:a,b,c}`` (sub-domain), ``{r}`` (@2x), ``{key}``.
-    subdomains : tuple of str
-        What ``{s}`` stands for.
-    key : str
-        What ``{key}`` stands for; never shown.
-    headers : tuple of (str, str)
-        Sent with each request, for instance a Referer.
-    """
-
-    name: str
+    #: With ``{z}``, ``{x}``, ``{y}`` (from the north) or ``{-y}`` (TMS, from the south), or
+    #: ``{q}`` (quadkey); ``{s}`` or ``{switch:a,b,c}`` (sub-domain), ``{r}`` (@2x), ``{key}``.
     template: str
-    terms: Terms = field(default_factory=Terms)
     min_zoom: int = 0
     max_zoom: int = 22
     tile_px: int | None = None
+    #: What ``{s}`` stands for.
     subdomains: tuple[str, ...] = ("a", "b", "c")
-    key: str = field(default="", repr=False)
-    rate_per_s: float | None = None
-    date: str | None = None
-    headers: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         names = set(_PLACE.findall(self.template))
@@ -87,11 +69,6 @@ class XYZSource:
         """The template: it holds ``{key}``, not the key."""
         return f"xyz {self.template} {self.tile_px or ''}"
 
-    @property
-    def secrets(self) -> tuple[str, ...]:
-        """The key, as it is and as it stands in addresses."""
-        return secrets_of(self.key)
-
     def request(self, tile: Tile) -> Request:
         """The address of a tile."""
         values = {
@@ -128,11 +105,6 @@ def quadkey(tile: Tile) -> str:
 def key_variable(name: str) -> str:
     """The environment variable that holds the key of a source."""
     return "GEOFIELD_KEY_" + re.sub(r"[^A-Z0-9]+", "_", name.upper()).strip("_")
-
-
-def secrets_of(key: str) -> tuple[str, ...]:
-    """The spellings of a key that may stand in an address."""
-    return tuple({key, quote(key, safe=""), quote(key)} - {""})
 
 
 def _shown(template: str) -> str:
