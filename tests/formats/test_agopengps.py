@@ -123,9 +123,15 @@ def test_wrong_headings_are_found(folder, tmp_path):
     content[10] = f"{east},{north},{float(heading) + 0.5:.5f}"
     (broken / "Boundary.txt").write_bytes("\r\n".join(content).encode())
     assert any("1 headings do not fit" in each.message for each in validate_file(broken))
-    (broken / "Boundary.txt").write_bytes("\r\n".join(content[:30]).encode())
-    with pytest.raises(FormatError, match="ring 1"):
-        read_dataset(broken)
+    for damaged in (content[:30], [*content[:12], "100", *content[13:]], content[:10]):
+        (broken / "Boundary.txt").write_bytes("\r\n".join(damaged).encode())
+        with pytest.raises(FormatError, match="ring 1"):
+            read_dataset(broken)
+        (found,) = (each for each in validate_file(broken) if each.level == "error")
+        assert found.where == "Boundary.txt, ring 1"
+        assert found.message == "it breaks off or is damaged"
+    (broken / "Boundary.txt").write_bytes("\r\n".join(["$BoundaryX", *content[1:]]).encode())
+    assert any("not $Boundary" in each.message for each in validate_file(broken))
 
 
 def test_a_folder_without_the_file_says_so(tmp_path):

@@ -30,7 +30,7 @@ def renamed(dataset, name):
 
 def test_shapefile_names_fit_and_do_not_collide():
     for layer in schema.LAYERS:
-        names = list(shapefile_layer.short_names(layer).values())
+        names = [column.shapefile for column in layer.columns]
         assert all(0 < len(name) <= 10 and name.isascii() for name in names)
         assert len({name.lower() for name in names}) == len(names)
 

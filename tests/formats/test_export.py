@@ -10,9 +10,9 @@ import sqlite3
 import pytest
 import shapely
 
-import geofield.staging as staging_module
 from geofield.errors import FormatError, FormatWarning, OutputExistsError
 from geofield.formats import FORMATS, detect, format_named, read_dataset, write_dataset
+from geofield.staging import staged as staging_module
 from geofield.staging import staged_file, staged_folder
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*cannot carry.*:geofield.errors.FormatWarning")

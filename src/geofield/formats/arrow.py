@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import shutil
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     import pyarrow as pa
 
+    from geofield.model import Dataset
     from geofield.schema import Column, Layer
 
 #: Numbers of geometry types, as GEOS has them.
@@ -115,19 +117,12 @@ def arrow_type(column: Column) -> Any:
     """The Arrow type of a column."""
     import pyarrow as pa
 
-    return {"int": pa.int64(), "float": pa.float64(), "str": pa.string(), "date": pa.date32()}[
-        column.type
-    ]
+    types = {"int": pa.int64(), "float": pa.float64(), "str": pa.string(), "date": pa.date32()}
+    return types[column.type]
 
 
 def arrow_values(column: Column, series: Any) -> pa.Array:
-    """A column's values as Arrow; missing ones (NaN included) as null.
-
-    Raises
-    ------
-    FormatError
-        When a value does not fit the column's type.
-    """
+    """A column's values as Arrow; missing ones (NaN included) as null."""
     import pandas as pd
     import pyarrow as pa
 
@@ -151,38 +146,22 @@ def arrow_table(
     of: Layer,
     table: gpd.GeoDataFrame,
     *,
-    names: Mapping[str, str] | None = None,
     lonlat: bool = False,
     geometry_name: str = "geom",
     extras: bool = True,
 ) -> pa.Table:
     """A layer's table as Arrow, geometry as WKB in the last column.
 
-    Parameters
-    ----------
-    of : Layer
-    table : GeoDataFrame
-    names : mapping, optional
-        Column names in the file; columns that are missing here are left out.
-    lonlat : bool
-        Whether to reproject to WGS 84.
-    geometry_name : str
-    extras : bool
-        Whether columns that the schema does not know are written too.
+    `lonlat` reprojects to WGS 84; without `extras` only the schema's columns are there.
     """
     import pyarrow as pa
 
     geometry = exact_geometry(of, table)
     if lonlat and len(geometry):
         geometry = split(to_lonlat(geometry, CRS(table.crs)))
-    columns: dict[str, pa.Array] = {}
-    for column in of.columns:
-        if names is None or column.name in names:
-            key = column.name if names is None else names[column.name]
-            columns[key] = arrow_values(column, table[column.name])
-    if extras and names is None:
-        for name in schema.own_columns(of, table):
-            columns[name] = _extra_values(table[name])
+    columns = {column.name: arrow_values(column, table[column.name]) for column in of.columns}
+    if extras:
+        columns |= {name: _extra_values(table[name]) for name in schema.own_columns(of, table)}
     columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
     return pa.table(columns)
 
@@ -195,44 +174,51 @@ def _extra_values(series: Any) -> pa.Array:
         values = pa.array(series, from_pandas=True)
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):
         values = pa.array([None if pd.isna(v) else str(v) for v in series], pa.string())
-    if pa.types.is_null(values.type):
-        return values.cast(pa.string())
-    if pa.types.is_large_string(values.type):
-        return values.cast(pa.string())
-    return values
+    as_text = pa.types.is_null(values.type) or pa.types.is_large_string(values.type)
+    return values.cast(pa.string()) if as_text else values
+
+
+def layer_batches(
+    dataset: Dataset, of: Layer, *, points: bool = True, **how: Any
+) -> pa.RecordBatchReader:
+    """A layer as Arrow batches (`how` as of :func:`arrow_table`); track points as they come."""
+    import pyarrow as pa
+
+    if of.name != schema.TRACK_POINTS.name:
+        return arrow_table(of, dataset.table(of.name), **how).to_reader()
+    chunks: Iterator[Any] = iter(dataset.point_chunks() if points else ())
+    head = arrow_table(of, next(chunks, schema.empty(of, LONLAT)), **how)
+    rest = (arrow_table(of, chunk, **how).cast(head.schema) for chunk in chunks)
+    return pa.RecordBatchReader.from_batches(
+        head.schema, (batch for table in chain([head], rest) for batch in table.to_batches())
+    )
 
 
 def write_layer(
-    table: pa.Table | pa.RecordBatchReader,
+    dataset: Dataset,
+    of: Layer,
     path: Path,
-    *,
-    layer: str,
     driver: str,
-    geometry_type: str,
-    crs: CRS,
-    geometry_name: str = "geom",
+    *,
+    lonlat: bool = False,
+    points: bool = True,
     **options: Any,
 ) -> None:
-    """Write Arrow data as one layer of a file, through GDAL.
-
-    Raises
-    ------
-    FormatError
-        When GDAL refuses.
-    """
+    """Write a layer into a file through GDAL, in the dataset's CRS or WGS 84."""
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
     path.parent.mkdir(parents=True, exist_ok=True)
+    crs = LONLAT if lonlat else dataset.crs
     name = authority_name(crs)
     try:
         pyogrio.write_arrow(
-            table,
+            layer_batches(dataset, of, points=points, lonlat=lonlat),
             path,
-            layer=layer,
+            layer=of.name,
             driver=driver,
-            geometry_name=geometry_name,
-            geometry_type=geometry_type,
+            geometry_name="geom",
+            geometry_type=of.geometry,
             crs=name if ":" in name else crs.to_wkt(),
             **options,
         )
@@ -240,16 +226,3 @@ def write_layer(
         raise FormatError(
             f"{path.name} could not be written: {error}.", hint=disk_hint(path)
         ) from error
-
-
-def batches(of: Layer, chunks: Iterable[gpd.GeoDataFrame], **how: Any) -> pa.RecordBatchReader:
-    """Tables of one layer as a stream of Arrow batches (parameters of :func:`arrow_table`)."""
-    import pyarrow as pa
-
-    first = arrow_table(of, schema.empty(of, LONLAT), **how).schema
-
-    def stream() -> Iterator[pa.RecordBatch]:
-        for chunk in chunks:
-            yield from arrow_table(of, chunk, extras=False, **how).to_batches()
-
-    return pa.RecordBatchReader.from_batches(first, stream())

@@ -2,15 +2,60 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from geofield import schema
 from geofield.formats.format import Drop, Format
 
 _ALL = tuple(layer.name for layer in schema.LAYERS if not layer.working)
-_RDF_OPTIONS = ("rdf_profile", "base_iri", "plan_name", "points")
+_MAP = ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns")
+_ORIGIN = Drop("settings and evidence", "provenance")
 
 _TERMINAL_DROPS = (
     Drop("rejected obstacles and the status, radius and confidence of the others", "obstacles"),
-    Drop("settings and evidence", "provenance"),
+    _ORIGIN,
+)
+
+_RDFXML = Format(
+    "rdf",
+    "RDF/XML linked data",
+    ("obstacles.rdf", "tracks.rdf", "field.rdf"),
+    _ALL,
+    "geofield.formats.rdf.write:write_rdfxml",
+    "geofield.formats.rdf.read:read",
+    validator="geofield.formats.rdf.validate:check",
+    suffixes=(".rdf", ".owl"),
+    precision_m=0.0,
+    options=("rdf_profile", "base_iri", "plan_name", "points"),
+    fields="many",
+)
+
+
+def _linked(name: str, title: str, suffix: str) -> Format:
+    """The triples of RDF/XML in another notation, as one file."""
+    return replace(
+        _RDFXML,
+        name=name,
+        title=f"{title} linked data",
+        files=(f"{{stem}}{suffix}",),
+        writer=f"geofield.formats.rdf.write:write_{name}",
+        suffixes=(suffix,),
+    )
+
+
+_ISOXML = Format(
+    "isoxml",
+    "ISOXML version 4 (ISO 11783-10)",
+    ("isoxml/TASKDATA/TASKDATA.XML",),
+    ("field", "obstacles", "segments", "headland"),
+    "geofield.formats.isoxml:write_v4",
+    "geofield.formats.isoxml:read",
+    drops=_TERMINAL_DROPS,
+    precision_m=0.0002,
+    options=("customer", "farm", "zip", "headland"),
+    validator="geofield.formats.checks.isoxml:check",
+    reads_folders=True,
+    fields="many",
 )
 
 #: In the order in which people see them.
@@ -37,7 +82,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.geojson:write",
         "geofield.formats.geojson:read",
         suffixes=(".geojson", ".json"),
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         precision_m=0.012,
         asks_crs=True,
         validator="geofield.formats.checks.geojson:check",
@@ -52,7 +97,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.shapefile:write",
         "geofield.formats.shapefile:read",
         suffixes=(".shp",),
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         precision_m=1e-6,
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
@@ -81,7 +126,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.flatgeobuf:write",
         "geofield.formats.flatgeobuf:read",
         suffixes=(".fgb",),
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         precision_m=0.0,
         crs="metric",
         reads_folders=True,
@@ -95,7 +140,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.kml:write",
         "geofield.formats.kml:read",
         suffixes=(".kml", ".kmz"),
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         precision_m=0.0002,
         fields="many",
     ),
@@ -108,7 +153,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".gpx",),
         drops=(
             Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
-            Drop("settings and evidence", "provenance"),
+            _ORIGIN,
         ),
         validator="geofield.formats.checks.gdal:check",
     ),
@@ -118,7 +163,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("csv/track_points.csv", "csv/obstacles.csv"),
         ("track_points", "obstacles"),
         "geofield.formats.tables_csv:write",
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
     ),
     Format(
         "fiboa",
@@ -126,7 +171,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("fiboa/{stem}.geojson", "fiboa/{stem}.parquet"),
         ("field",),
         "geofield.formats.fiboa:write",
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         fields="many",
     ),
     Format(
@@ -138,38 +183,20 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".dxf",),
         drops=(
             Drop("names, numbers and statuses", "field"),
-            Drop("settings and evidence", "provenance"),
+            _ORIGIN,
         ),
         crs="metric",
         validator="geofield.formats.checks.gdal:check",
     ),
-    Format(
-        "isoxml",
-        "ISOXML version 4 (ISO 11783-10)",
-        ("isoxml/TASKDATA/TASKDATA.XML",),
-        ("field", "obstacles", "segments", "headland"),
-        "geofield.formats.isoxml:write_v4",
-        "geofield.formats.isoxml:read",
-        drops=_TERMINAL_DROPS,
-        precision_m=0.0002,
-        options=("customer", "farm", "zip", "headland"),
-        validator="geofield.formats.checks.isoxml:check",
-        reads_folders=True,
-        fields="many",
-    ),
-    Format(
-        "isoxml-v3",
-        "ISOXML version 3 (ISO 11783-10)",
-        ("isoxml-v3/TASKDATA/TASKDATA.XML",),
-        ("field", "obstacles", "segments"),
-        "geofield.formats.isoxml:write_v3",
-        "geofield.formats.isoxml:read",
-        drops=_TERMINAL_DROPS,
-        precision_m=0.0002,
+    _ISOXML,
+    replace(
+        _ISOXML,
+        name="isoxml-v3",
+        title="ISOXML version 3 (ISO 11783-10)",
+        files=("isoxml-v3/TASKDATA/TASKDATA.XML",),
+        layers=("field", "obstacles", "segments"),
+        writer="geofield.formats.isoxml:write_v3",
         options=("customer", "farm", "zip"),
-        validator="geofield.formats.checks.isoxml:check",
-        reads_folders=True,
-        fields="many",
     ),
     Format(
         "agopengps",
@@ -191,69 +218,17 @@ CATALOGUE: tuple[Format, ...] = (
         reads_folders=True,
         fields="apart",
     ),
-    Format(
-        "rdf",
-        "RDF/XML linked data",
-        ("obstacles.rdf", "tracks.rdf", "field.rdf"),
-        _ALL,
-        "geofield.formats.rdf.write:write_rdfxml",
-        "geofield.formats.rdf.read:read",
-        validator="geofield.formats.rdf.validate:check",
-        suffixes=(".rdf", ".owl"),
-        precision_m=0.0,
-        options=_RDF_OPTIONS,
-        fields="many",
-    ),
-    Format(
-        "turtle",
-        "Turtle linked data",
-        ("{stem}.ttl",),
-        _ALL,
-        "geofield.formats.rdf.write:write_turtle",
-        "geofield.formats.rdf.read:read",
-        validator="geofield.formats.rdf.validate:check",
-        suffixes=(".ttl",),
-        precision_m=0.0,
-        options=_RDF_OPTIONS,
-        fields="many",
-    ),
-    Format(
-        "jsonld",
-        "JSON-LD linked data",
-        ("{stem}.jsonld",),
-        _ALL,
-        "geofield.formats.rdf.write:write_jsonld",
-        "geofield.formats.rdf.read:read",
-        validator="geofield.formats.rdf.validate:check",
-        suffixes=(".jsonld",),
-        precision_m=0.0,
-        options=_RDF_OPTIONS,
-        fields="many",
-    ),
-    Format(
-        "ntriples",
-        "N-Triples linked data",
-        ("{stem}.nt",),
-        _ALL,
-        "geofield.formats.rdf.write:write_ntriples",
-        "geofield.formats.rdf.read:read",
-        validator="geofield.formats.rdf.validate:check",
-        suffixes=(".nt",),
-        precision_m=0.0,
-        options=_RDF_OPTIONS,
-        fields="many",
-    ),
-    Format(
-        "rdf-study",
-        "RDF/XML in the source study's vocabulary",
-        ("obstacles.rdf", "tracks.rdf", "field.rdf"),
-        _ALL,
-        "geofield.formats.rdf.write:write_study",
-        "geofield.formats.rdf.read:read",
-        validator="geofield.formats.rdf.validate:check",
-        precision_m=0.0,
+    _RDFXML,
+    _linked("turtle", "Turtle", ".ttl"),
+    _linked("jsonld", "JSON-LD", ".jsonld"),
+    _linked("ntriples", "N-Triples", ".nt"),
+    replace(
+        _RDFXML,
+        name="rdf-study",
+        title="RDF/XML in the source study's vocabulary",
+        writer="geofield.formats.rdf.write:write_study",
+        suffixes=(),
         options=("base_iri", "plan_name", "points"),
-        fields="many",
     ),
     Format(
         "study-xml",
@@ -262,7 +237,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("obstacles", "track_points"),
         "geofield.formats.rdf.study_xml:write_study_xml",
         drops=(
-            Drop("settings and evidence", "provenance"),
+            _ORIGIN,
             Drop("the outlines of obstacles that are not round", "polygons"),
             Drop("the confidence of obstacles", "obstacles.confidence"),
         ),
@@ -273,7 +248,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("scene.tif",),
         (),
         "geofield.products:write_scene",
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         crs="the picture's own",
         automatic=True,
     ),
@@ -281,9 +256,9 @@ CATALOGUE: tuple[Format, ...] = (
         "map",
         "Map picture",
         ("map.png",),
-        ("field", "obstacles", "segments", "gaps", "headland", "headland_tracks", "turns"),
+        (*_MAP[:4], "headland", *_MAP[4:]),
         "geofield.products:write_map",
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         crs="metric",
         automatic=True,
     ),
@@ -291,18 +266,18 @@ CATALOGUE: tuple[Format, ...] = (
         "map-svg",
         "Map as lines for drawing programs (SVG)",
         ("map.svg",),
-        ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns"),
-        "geofield.plotting:write_svg",
-        drops=(Drop("settings and evidence", "provenance"),),
+        _MAP,
+        "geofield.mapping.plot:write_svg",
+        drops=(_ORIGIN,),
         crs="metric",
     ),
     Format(
         "map-pdf",
         "Map on a page for print (PDF)",
         ("map.pdf",),
-        ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns"),
-        "geofield.plotting:write_pdf",
-        drops=(Drop("settings and evidence", "provenance"),),
+        _MAP,
+        "geofield.mapping.plot:write_pdf",
+        drops=(_ORIGIN,),
         crs="metric",
     ),
     Format(
@@ -319,7 +294,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("{stem}.html",),
         ("field", "obstacles", "segments", "gaps", "headland_tracks", "route", "turns"),
         "geofield.web.html:write",
-        drops=(Drop("settings and evidence", "provenance"),),
+        drops=(_ORIGIN,),
         crs="metric",
     ),
 )

@@ -66,11 +66,6 @@ def write_datasets(
     tell_drops : bool
         Warn of what a format cannot carry; False where the caller tells it another way.
 
-    Returns
-    -------
-    list of Path
-        What was written.
-
     Warns
     -----
     FormatWarning
@@ -104,13 +99,9 @@ def write_datasets(
                         hint="Write them into different folders, one after the other.",
                     )
                 written.append(place)
-    for each in chosen if tell_drops else ():
-        # Nobody takes the picture, map and report for a plan's whole content.
-        told = (
-            []
-            if each.automatic
-            else [dropped(one, each, together=len(datasets) > 1) for one in datasets]
-        )
+    # Nobody takes the picture, map and report for a plan's whole content.
+    for each in [each for each in chosen if tell_drops and not each.automatic]:
+        told = (dropped(one, each, together=len(datasets) > 1) for one in datasets)
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
@@ -176,11 +167,7 @@ def _present(dataset: Dataset, when: str) -> bool:
 def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[str, str] | None:
     """The first option that no chosen format knows, and what to tell of it; None without one.
 
-    Parameters
-    ----------
-    chosen : iterable of Format
-    given : mapping
-        Values by option, or by format mappings of them.
+    `given` has values by option, or by format mappings of them.
     """
     own = {each.name: each.options for each in chosen}
     known = {key for options in own.values() for key in options}

@@ -133,8 +133,7 @@ def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
     # GeoParquet wants boxes as obligatory as the geometry, fiboa wants them optional.
     write_geoparquet(
         path,
-        [table],
-        fields,
+        table.to_reader(),
         LONLAT,
         sorted({str(shape.geom_type) for shape in shapes}),
         {"collection": collection},

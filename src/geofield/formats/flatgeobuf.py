@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from geofield import schema
-from geofield.formats.arrow import arrow_table, batches, write_layer
+from geofield.formats.arrow import write_layer
 from geofield.formats.foreign import RawLayer, read_foreign, read_vector
 from geofield.formats.origin import lineage
 from geofield.model import Dataset
@@ -15,27 +14,13 @@ from geofield.model import Dataset
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``flatgeobuf/<layer>.fgb`` for every layer."""
-    written = []
+    written, told = [], lineage(dataset)
     for layer in dataset.layers():
         path = folder / "flatgeobuf" / f"{layer.name}.fgb"
-        if layer.name == schema.TRACK_POINTS.name:
-            table = batches(layer, dataset.point_chunks())
-        else:
-            table = arrow_table(layer, dataset.table(layer.name))
-        write_layer(
-            table,
-            path,
-            layer=layer.name,
-            driver="FlatGeobuf",
-            geometry_type=layer.geometry,
-            crs=dataset.crs,
-            # The index keeps rows near each other together; readers sort by the key again.
-            layer_options={
-                "TITLE": layer.title,
-                "DESCRIPTION": lineage(dataset),
-                "TEMPORARY_DIR": str(folder),
-            },
-        )
+        about = {"TITLE": layer.title, "DESCRIPTION": told}
+        # The index keeps rows near each other together; readers sort by the key again.
+        about["TEMPORARY_DIR"] = str(folder)
+        write_layer(dataset, layer, path, "FlatGeobuf", layer_options=about)
         written.append(path)
     return written
 

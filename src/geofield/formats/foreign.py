@@ -99,13 +99,7 @@ def _mended(path: Path, layer: str | None) -> Any:
 
 
 def layer_names(path: Path) -> list[str]:
-    """The layers of a file, in order.
-
-    Raises
-    ------
-    FormatError
-        When GDAL cannot open it.
-    """
+    """The layers of a file, in order."""
     import pyogrio
     from pyogrio.errors import DataSourceError
 
@@ -174,9 +168,9 @@ def read_foreign(
             f"{path} holds nothing that is a boundary, an obstacle or a line.",
             hint="; ".join(notes),
         )
-    field = tables.get("field")
-    if name is None and field is not None and len(field) and isinstance(field["name"].iloc[0], str):
-        name = field["name"].iloc[0]
+    named = list(tables["field"]["name"][:1]) if "field" in tables else []
+    if name is None and named and isinstance(named[0], str):
+        name = named[0]
     return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
 
 
@@ -242,10 +236,7 @@ def _own_layer(layer: RawLayer) -> schema.Layer | None:
         shared = len(columns & set(each.column_names))
         if layer.name == each.name and set(each.key) <= columns and 2 * shared >= len(each.columns):
             return each
-    for each in schema.LAYERS:
-        if len(columns & set(each.column_names)) == len(each.columns):
-            return each
-    return None
+    return next((each for each in schema.LAYERS if columns >= set(each.column_names)), None)
 
 
 def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:

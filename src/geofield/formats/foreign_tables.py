@@ -63,13 +63,7 @@ def numbers_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> np.ndarray:
 
 
 def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
-    """The one outline as layer `field`.
-
-    Raises
-    ------
-    FormatError
-        When there are several: a dataset is one field.
-    """
+    """The one outline as layer `field`; several are refused: a dataset is one field."""
     names = column_like(frame, NAME_COLUMNS)
     if len(frame) > 1:
         shown = "" if names is None else f" ({', '.join(map(str, names[:5]))}, ...)"
@@ -84,11 +78,12 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
         for column in schema.FIELD.columns
         if column.name in frame.columns and pd.notna(frame[column.name].iloc[0])
     }
+    field = Field(polygon, crs)
     data |= {
         "name": [path.stem if names is None else str(names.iloc[0])],
-        "field_id": [Field(polygon, crs).field_id if ids is None else str(ids.iloc[0])],
-        "area_ha": [Field(polygon, crs).area_ha],
-        "perimeter_m": [Field(polygon, crs).perimeter_m],
+        "field_id": [field.field_id if ids is None else str(ids.iloc[0])],
+        "area_ha": [field.area_ha],
+        "perimeter_m": [field.perimeter_m],
     }
     data.setdefault("method", ["boundary"])
     return schema.table(schema.FIELD, data, [polygon], crs)
@@ -135,10 +130,8 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         "lat": lat,
         "lon": lon,
     }
-    return schema.conform(
-        schema.OBSTACLES,
-        schema.table(schema.OBSTACLES, data, shapely.orient_polygons(geometry), crs),
-    )
+    table = schema.table(schema.OBSTACLES, data, shapely.orient_polygons(geometry), crs)
+    return schema.conform(schema.OBSTACLES, table)
 
 
 def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
@@ -155,34 +148,29 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     segment = numbers_like(frame, _SEGMENT)
     if np.isnan(segment).any():
         segment = pd.Series(track).groupby(track).cumcount().to_numpy() + 1
-    lengths = ground_lengths_m(geometry, crs)
-    segments = schema.conform(
-        schema.SEGMENTS,
-        schema.table(
-            schema.SEGMENTS,
-            {
-                "track_no": track.astype(int),
-                "segment_no": np.asarray(segment).astype(int),
-                "length_m": lengths,
-            },
-            geometry,
-            crs,
-        ),
-    )
-    rows: dict[str, list[Any]] = {name: [] for name in schema.TRACKS.column_names}
-    shapes = []
+    values = {
+        "track_no": track.astype(int),
+        "segment_no": np.asarray(segment).astype(int),
+        "length_m": ground_lengths_m(geometry, crs),
+    }
+    table = schema.table(schema.SEGMENTS, values, geometry, crs)
+    segments = schema.conform(schema.SEGMENTS, table)
+    rows, shapes = [], []
     for number, part in segments.groupby("track_no", sort=True):
         lines = part.geometry.to_numpy()
         (x0, y0), (x1, y1) = lines[0].coords[0], lines[-1].coords[-1]
         grid_heading = np.degrees(np.arctan2(x1 - x0, y1 - y0))
-        rows["track_no"].append(int(number))
-        rows["heading_deg"].append(float((grid_heading + grid_north_deg(crs, x0, y0)) % 360.0))
-        rows["segment_count"].append(len(part))
-        rows["gap_count"].append(len(part) - 1)
-        rows["point_count"].append(None)
-        rows["length_m"].append(float(part["length_m"].sum()))
+        row = {
+            "track_no": int(number),
+            "heading_deg": float((grid_heading + grid_north_deg(crs, x0, y0)) % 360.0),
+            "segment_count": len(part),
+            "gap_count": len(part) - 1,
+            "length_m": float(part["length_m"].sum()),
+        }
+        rows.append(row)
         shapes.append(shapely.multilinestrings(list(lines)))
-    return schema.table(schema.TRACKS, rows, shapes, crs), segments
+    data = {name: [row.get(name) for row in rows] for name in schema.TRACKS.column_names}
+    return schema.table(schema.TRACKS, data, shapes, crs), segments
 
 
 def _numbers_in_names(frame: gpd.GeoDataFrame) -> np.ndarray:

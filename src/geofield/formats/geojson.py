@@ -8,9 +8,7 @@ from typing import Any
 
 from pyproj import CRS
 
-from geofield import schema
-from geofield.crs import LONLAT
-from geofield.formats.arrow import arrow_table, batches, write_layer
+from geofield.formats.arrow import write_layer
 from geofield.formats.foreign import RawLayer, read_foreign, read_vector
 from geofield.formats.origin import lineage
 from geofield.model import Dataset
@@ -19,21 +17,10 @@ from geofield.model import Dataset
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``geojson/<layer>.geojson`` for every layer."""
     written = []
+    about = {"RFC7946": "YES", "DESCRIPTION": lineage(dataset)}
     for layer in dataset.layers():
         path = folder / "geojson" / f"{layer.name}.geojson"
-        if layer.name == schema.TRACK_POINTS.name:
-            table = batches(layer, dataset.point_chunks(), lonlat=True)
-        else:
-            table = arrow_table(layer, dataset.table(layer.name), lonlat=True)
-        write_layer(
-            table,
-            path,
-            layer=layer.name,
-            driver="GeoJSON",
-            geometry_type=layer.geometry,
-            crs=LONLAT,
-            layer_options={"RFC7946": "YES", "DESCRIPTION": lineage(dataset)},
-        )
+        write_layer(dataset, layer, path, "GeoJSON", lonlat=True, layer_options=about)
         written.append(path)
     return written
 

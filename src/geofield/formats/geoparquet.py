@@ -7,7 +7,7 @@ file's key-value metadata.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +16,10 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import ProjError
 
-from geofield import schema
 from geofield.crs import parse_crs
 from geofield.errors import FormatError
 from geofield.formats import origin
-from geofield.formats.arrow import arrow_table
+from geofield.formats.arrow import layer_batches
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.model import Dataset
 
@@ -38,45 +37,28 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     for layer in dataset.layers():
         path = folder / "geoparquet" / f"{layer.name}.parquet"
         path.parent.mkdir(exist_ok=True)
-        chunks = (
-            dataset.point_chunks()
-            if layer.name == schema.TRACK_POINTS.name
-            else iter([dataset.table(layer.name)])
-        )
-        tables = (arrow_table(layer, chunk, geometry_name=GEOMETRY) for chunk in chunks)
-        empty = arrow_table(layer, schema.empty(layer, dataset.crs), geometry_name=GEOMETRY)
-        write_geoparquet(
-            path,
-            tables,
-            empty.schema,
-            dataset.crs,
-            [layer.geometry],
-            {_ORIGIN_KEY: origin.to_json(dataset)},
-        )
+        batches = layer_batches(dataset, layer, geometry_name=GEOMETRY)
+        record = {_ORIGIN_KEY: origin.to_json(dataset)}
+        write_geoparquet(path, batches, dataset.crs, [layer.geometry], record)
         written.append(path)
     return written
 
 
 def write_geoparquet(
     path: Path,
-    tables: Iterable[pa.Table],
-    fallback: pa.Schema,
+    batches: pa.RecordBatchReader,
     crs: CRS,
     geometry_types: list[str],
     metadata: Mapping[str, str],
     *,
     covering: bool = True,
 ) -> None:
-    """Write Arrow tables with a WKB column `geometry` as one GeoParquet 1.1 file.
+    """Write Arrow batches with a WKB column `geometry` as one GeoParquet 1.1 file.
 
     Parameters
     ----------
-    path : Path
-    tables : iterable of pa.Table
-        Of the same columns.
-    fallback : pa.Schema
-        The columns, should there be no table.
-    crs : CRS
+    batches : pa.RecordBatchReader
+        Each becomes a row group.
     geometry_types : list of str
         All that there are.
     metadata : mapping
@@ -84,21 +66,10 @@ def write_geoparquet(
     covering : bool
         Whether each row gets its bounding box, by which readers skip rows.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    writer: pq.ParquetWriter | None = None
-    boxes: list[Any] = []
-    stream = iter(tables)
-    table = next(stream, fallback.empty_table())
-    while table is not None:
-        table, box = _with_boxes(table, covering=covering)
-        boxes.append(box)
-        if writer is None:
-            # Readers look for metadata in the Arrow schema where there is one; what is added
-            # when the last rows are in stands beside it, where only some of them look.
-            writer = pq.ParquetWriter(path, table.schema, compression="zstd", store_schema=False)
-        writer.write_table(table)
-        table = next(stream, None)
+    columns, box = batches.schema, pa.struct([(side, pa.float64()) for side in _SIDES])
     column: dict[str, Any] = {
         "encoding": "WKB",
         "crs": crs.to_json_dict(),
@@ -107,34 +78,25 @@ def write_geoparquet(
     }
     if covering:
         column["covering"] = {"bbox": {side: ["bbox", side] for side in _SIDES}}
-    known = np.array([box for box in boxes if box is not None])
-    if len(known):
-        column["bbox"] = [
-            *(float(v) for v in known[:, :2].min(axis=0)),
-            *(float(v) for v in known[:, 2:].max(axis=0)),
-        ]
-    geo = {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
-    if writer is None:
-        raise FormatError(f"{path.name}: there was no table to write.")
-    with writer:
+        # As optional as the geometry it covers.
+        columns = columns.append(pa.field("bbox", box, columns.field(GEOMETRY).nullable))
+    totals = []
+    # Readers look for metadata in the Arrow schema where there is one; what is added when the
+    # last rows are in stands beside it, where only some of them look.
+    with pq.ParquetWriter(path, columns, compression="zstd", store_schema=False) as writer:
+        for batch in batches:
+            shapes = shapely.from_wkb(batch[GEOMETRY].to_numpy(zero_copy_only=False))
+            sides = [pa.array(side) for side in shapely.bounds(shapes).T]
+            boxes = pa.StructArray.from_arrays(sides, _SIDES)
+            arrays = [*batch.columns, boxes] if covering else batch.columns
+            writer.write_table(pa.Table.from_arrays(arrays, schema=columns))
+            totals.append(shapely.total_bounds(shapes))
+        known = np.array(totals).reshape(-1, 4)
+        known = known[np.isfinite(known).all(axis=1)]
+        if len(known):
+            column["bbox"] = [*known[:, :2].min(axis=0), *known[:, 2:].max(axis=0)]
+        geo = {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
         writer.add_key_value_metadata({"geo": json.dumps(geo), **metadata})
-
-
-def _with_boxes(table: pa.Table, *, covering: bool) -> tuple[pa.Table, Any]:
-    """The table with a column of boxes, where wanted, and the box of all rows."""
-    import pyarrow as pa
-
-    shapes = shapely.from_wkb(table[GEOMETRY].to_numpy())
-    total = shapely.total_bounds(shapes) if len(shapes) else None
-    if not covering:
-        return table, total
-    bounds = shapely.bounds(shapes).reshape(-1, 4)
-    box = pa.StructArray.from_arrays(
-        [pa.array(bounds[:, side]) for side in range(4)], names=list(_SIDES)
-    )
-    # As optional as the geometry it covers.
-    field = pa.field("bbox", box.type, nullable=table.schema.field(GEOMETRY).nullable)
-    return table.append_column(field, box), total
 
 
 def read(path: Path) -> Dataset:

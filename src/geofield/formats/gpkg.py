@@ -16,7 +16,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.formats import origin
-from geofield.formats.arrow import arrow_table, batches, gdal_config, write_layer
+from geofield.formats.arrow import gdal_config, write_layer
 from geofield.formats.qgis import add_project, add_styles, frame_strip, project_xml, qgz_bytes
 from geofield.model import Dataset
 
@@ -76,24 +76,17 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     streamed; ``project`` (default true) whether the ``.qgz`` is.
     """
     path = folder / f"{stem}.gpkg"
-    with_points = bool(options.get("points", True))
     stamp = origin.timestamp(dataset)
     # The file comes into place when it is whole: waiting for the disk after every layer and
     # statement would take most of the time. It is waited for once, at the end.
     with gdal_config(OGR_CURRENT_DATE=stamp, OGR_SQLITE_SYNCHRONOUS="OFF"):
         for layer in dataset.layers(working=True):
-            if layer.name == schema.TRACK_POINTS.name:
-                chunks = dataset.point_chunks() if with_points else iter(())
-                table = batches(layer, chunks)
-            else:
-                table = arrow_table(layer, dataset.table(layer.name))
             write_layer(
-                table,
+                dataset,
+                layer,
                 path,
-                layer=layer.name,
-                driver="GPKG",
-                geometry_type=layer.geometry,
-                crs=dataset.crs,
+                "GPKG",
+                points=bool(options.get("points", True)),
                 dataset_options={"VERSION": GPKG_VERSION},
                 layer_options={
                     "IDENTIFIER": layer.name,
@@ -127,46 +120,35 @@ def _add_origin(connection: sqlite3.Connection, dataset: Dataset) -> None:
         "INSERT INTO gpkg_metadata_reference VALUES ('geopackage', NULL, NULL, NULL, ?, 1, NULL)",
         (origin.timestamp(dataset),),
     )
-    for table in ("gpkg_metadata", "gpkg_metadata_reference"):
-        _register(
-            connection,
-            table,
-            "gpkg_metadata",
-            "http://www.geopackage.org/spec120/#extension_metadata",
-        )
+    _register(connection, "metadata", "gpkg_metadata", "gpkg_metadata_reference")
 
 
 def _add_columns(connection: sqlite3.Connection, dataset: Dataset) -> None:
     """Titles, meanings, units and value lists of the columns (the Schema extension)."""
     connection.executescript(_DATA_COLUMNS)
-    lists: dict[str, tuple[str, ...]] = {}
+    described, allowed = [], []
     for layer in dataset.layers(working=True):
         for column in layer.columns:
             words = schema.meaning(layer, column)
             if column.unit:
                 words += f" Unit (UCUM): {column.unit}"
-            constraint = f"{layer.name}_{column.name}" if column.values else None
-            if constraint:
-                lists[constraint] = column.values
-            connection.execute(
-                "INSERT INTO gpkg_data_columns VALUES (?, ?, ?, ?, ?, NULL, ?)",
-                (layer.name, column.name, column.name, column.title, words, constraint),
-            )
-    for name, values in lists.items():
-        for value in values:
-            connection.execute(
-                "INSERT INTO gpkg_data_column_constraints "
-                "VALUES (?, 'enum', ?, NULL, NULL, NULL, NULL, NULL)",
-                (name, value),
-            )
-    for table in ("gpkg_data_columns", "gpkg_data_column_constraints"):
-        _register(
-            connection, table, "gpkg_schema", "http://www.geopackage.org/spec120/#extension_schema"
-        )
+            limit = f"{layer.name}_{column.name}" if column.values else None
+            described.append((layer.name, column.name, column.name, column.title, words, limit))
+            allowed += [(limit, value) for value in column.values]
+    connection.executemany(
+        "INSERT INTO gpkg_data_columns VALUES (?, ?, ?, ?, ?, NULL, ?)", described
+    )
+    connection.executemany(
+        "INSERT INTO gpkg_data_column_constraints "
+        "VALUES (?, 'enum', ?, NULL, NULL, NULL, NULL, NULL)",
+        allowed,
+    )
+    _register(connection, "schema", "gpkg_data_columns", "gpkg_data_column_constraints")
 
 
-def _register(connection: sqlite3.Connection, table: str, name: str, definition: str) -> None:
-    connection.execute(
+def _register(connection: sqlite3.Connection, extension: str, *tables: str) -> None:
+    page = f"http://www.geopackage.org/spec120/#extension_{extension}"
+    connection.executemany(
         "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
-        (table, name, definition),
+        [(table, f"gpkg_{extension}", page) for table in tables],
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 import warnings
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,7 +58,6 @@ def read(path: Path) -> Dataset:
             tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
     field = tables.get(schema.FIELD.name)
     named = field is not None and len(field) == 1 and isinstance(field["name"].iloc[0], str)
-    scene = None if record.scene is None else path.parent / record.scene
     has_points = schema.TRACK_POINTS.name in layers
     return Dataset(
         tables,
@@ -67,7 +66,7 @@ def read(path: Path) -> Dataset:
         field["name"].iloc[0] if field is not None and named else record.name,
         record.provenance,
         record.grid,
-        scene if scene is not None and scene.exists() else None,
+        _scene(record, path),
         PointsInFile(path, crs.to_wkt()) if has_points else None,
     )
 
@@ -103,9 +102,19 @@ class PointsInFile:
 
 def scene_beside(path: Path) -> Path | None:
     """The picture beside a GeoPackage of geofield that belongs to it, where it is there."""
-    record = _origin(path)
+    return _scene(_origin(path), path)
+
+
+def _scene(record: origin.Origin | None, path: Path) -> Path | None:
     scene = None if record is None or record.scene is None else path.parent / record.scene
     return scene if scene is not None and scene.exists() else None
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[sqlite3.Connection]:
+    """A GeoPackage's database, for reading alone."""
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as connection:
+        yield connection
 
 
 def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
@@ -144,9 +153,7 @@ def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
 def _origin(path: Path) -> origin.Origin | None:
     try:
-        with closing(
-            sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
-        ) as connection:
+        with opened(path) as connection:
             row = connection.execute(
                 "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ? ORDER BY id DESC",
                 (origin.URI,),

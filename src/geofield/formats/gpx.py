@@ -42,9 +42,8 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         ET.SubElement(metadata, "time").text = f"{day}T00:00:00Z"
     obstacles = avoided(dataset)
     centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
-    for row, (lon, lat) in zip(
-        obstacles.to_dict("records"), _lonlat(centres, dataset), strict=True
-    ):
+    places = shapely.get_coordinates(to_lonlat(centres, dataset.crs))
+    for row, (lon, lat) in zip(obstacles.to_dict("records"), places, strict=True):
         point = ET.SubElement(root, "wpt", _position(lon, lat))
         ET.SubElement(point, "name").text = f"Obstacle {row['obstacle_no']}"
         ET.SubElement(point, "desc").text = _describe(row)
@@ -61,10 +60,6 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     path = folder / f"{stem}.gpx"
     write_xml(root, path)
     return [path]
-
-
-def _lonlat(points: Any, dataset: Dataset) -> Any:
-    return shapely.get_coordinates(to_lonlat(np.asarray(points, dtype=object), dataset.crs))
 
 
 def _position(lon: float, lat: float) -> dict[str, str]:

@@ -15,7 +15,7 @@ from geofield import schema, theme
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.formats.origin import lineage
-from geofield.formats.xml import write_xml
+from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -59,30 +59,23 @@ def write(
     datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
     """Write ``{stem}.kml``; of several fields each has a folder of its own."""
-    root = ET.Element("kml", xmlns=KML)
-    document = ET.SubElement(root, "Document")
     alone = len(datasets) == 1
-    ET.SubElement(document, "name").text = datasets[0].name if alone else stem
     told = list(dict.fromkeys(map(lineage, datasets)))
-    # Programs show a description as HTML.
-    description = html.escape("\n".join(told), quote=False)
-    ET.SubElement(document, "description").text = description
-    for name, (colour, width, fill) in _STYLES.items():
-        _add_style(document, name, colour, width, fill)
-    for layer in LAYERS:
-        columns = ET.SubElement(document, "Schema", name=layer.name, id=f"schema_{layer.name}")
-        for name, (kind, title) in _columns(layer, datasets).items():
-            field = ET.SubElement(columns, "SimpleField", type=kind, name=name)
-            ET.SubElement(field, "displayName").text = title
+    document = node(
+        "Document",
+        node("name", datasets[0].name if alone else stem),
+        # Programs show a description as HTML.
+        node("description", html.escape("\n".join(told), quote=False)),
+        *(_style(name, *look) for name, look in _STYLES.items()),
+        *(_schema(layer, datasets) for layer in LAYERS),
+    )
     for dataset in datasets:
-        place = document if alone else ET.SubElement(document, "Folder")
-        if not alone:
-            ET.SubElement(place, "name").text = dataset.name
-        for layer in LAYERS:
-            if dataset.has(layer.name):
-                _add_layer(place, layer, dataset)
+        folders = [_folder(layer, dataset) for layer in LAYERS if dataset.has(layer.name)]
+        document.extend(
+            folders if alone else [node("Folder", node("name", dataset.name), *folders)]
+        )
     path = folder / f"{stem}.kml"
-    write_xml(root, path)
+    write_xml(node("kml", document, xmlns=KML), path)
     return [path]
 
 
@@ -99,7 +92,7 @@ def read(path: Path) -> Dataset:
     return read_foreign(layers, path)
 
 
-def _columns(layer: Layer, datasets: Sequence[Dataset]) -> dict[str, tuple[str, str]]:
+def _schema(layer: Layer, datasets: Sequence[Dataset]) -> ET.Element:
     """Type and title of a layer's columns, the user's own behind the schema's."""
     found = {column.name: (_TYPES[column.type], column.title) for column in layer.columns}
     for each in datasets:
@@ -108,7 +101,11 @@ def _columns(layer: Layer, datasets: Sequence[Dataset]) -> dict[str, tuple[str, 
             kind = {"i": "int", "u": "int", "f": "double"}.get(table[name].dtype.kind, "string")
             if found.setdefault(str(name), (kind, str(name)))[0] != kind:
                 found[str(name)] = ("string", str(name))
-    return found
+    fields = (
+        node("SimpleField", node("displayName", title), type=kind, name=name)
+        for name, (kind, title) in found.items()
+    )
+    return node("Schema", {"name": layer.name, "id": f"schema_{layer.name}"}, *fields)
 
 
 def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
@@ -123,38 +120,32 @@ def _status(row: Mapping[str, Any]) -> str:
     return str(row.get("status")).strip().lower()
 
 
-def _add_style(
-    document: ET.Element, name: str, colour: str, width: float, fill: str | None
-) -> None:
-    style = ET.SubElement(document, "Style", id=f"style_{name}")
-    line = ET.SubElement(style, "LineStyle")
-    ET.SubElement(line, "color").text = colour
-    ET.SubElement(line, "width").text = f"{width:g}"
-    if fill is not None:
-        polygon = ET.SubElement(style, "PolyStyle")
-        ET.SubElement(polygon, "color").text = fill
+def _style(name: str, colour: str, width: float, fill: str | None) -> ET.Element:
+    line = node("LineStyle", node("color", colour), node("width", f"{width:g}"))
+    polygon = [] if fill is None else [node("PolyStyle", node("color", fill))]
+    return node("Style", line, *polygon, id=f"style_{name}")
 
 
-def _add_layer(place: ET.Element, layer: Layer, dataset: Dataset) -> None:
+def _folder(layer: Layer, dataset: Dataset) -> ET.Element:
     table = dataset.table(layer.name)
     shapes = to_lonlat(exact_geometry(layer, table), dataset.crs)
-    folder = ET.SubElement(place, "Folder")
-    ET.SubElement(folder, "name").text = layer.name
+    folder = node("Folder", node("name", layer.name))
     for row, shape in zip(table.to_dict("records"), shapes, strict=True):
-        placemark = ET.SubElement(folder, "Placemark")
-        ET.SubElement(placemark, "name").text = row_name(layer, row)
-        ET.SubElement(placemark, "styleUrl").text = f"#style_{_style_name(layer, row)}"
-        data = ET.SubElement(
-            ET.SubElement(placemark, "ExtendedData"),
-            "SchemaData",
-            schemaUrl=f"#schema_{layer.name}",
-        )
+        data = node("SchemaData", schemaUrl=f"#schema_{layer.name}")
         for name in (*layer.column_names, *schema.own_columns(layer, table)):
             value = row[name]
             if not pd.isna(value):
                 text = repr(float(value)) if isinstance(value, float) else str(value)
-                ET.SubElement(data, "SimpleData", name=str(name)).text = text
-        _add_geometry(placemark, shape)
+                data.append(node("SimpleData", text, name=str(name)))
+        placemark = node(
+            "Placemark",
+            node("name", row_name(layer, row)),
+            node("styleUrl", f"#style_{_style_name(layer, row)}"),
+            node("ExtendedData", data),
+            _geometry(shape),
+        )
+        folder.append(placemark)
+    return folder
 
 
 def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
@@ -170,26 +161,19 @@ def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
     return f"Track {row['track_no']}"
 
 
-def _add_geometry(parent: ET.Element, shape: Any) -> None:
+def _geometry(shape: Any) -> ET.Element:
     if shape.geom_type == "Polygon":
-        polygon = ET.SubElement(parent, "Polygon")
-        for tag, ring in (
-            ("outerBoundaryIs", shape.exterior),
-            *(("innerBoundaryIs", ring) for ring in shape.interiors),
-        ):
-            linear = ET.SubElement(ET.SubElement(polygon, tag), "LinearRing")
-            ET.SubElement(linear, "coordinates").text = _coordinates(ring)
-    elif shape.geom_type == "LineString":
-        line = ET.SubElement(parent, "LineString")
-        ET.SubElement(line, "tessellate").text = "1"
-        ET.SubElement(line, "coordinates").text = _coordinates(shape)
-    else:
-        many = ET.SubElement(parent, "MultiGeometry")
-        for part in shape.geoms:
-            _add_geometry(many, part)
+        rings = [("outerBoundaryIs", shape.exterior)]
+        rings += [("innerBoundaryIs", ring) for ring in shape.interiors]
+        linear = ((tag, node("LinearRing", _coordinates(ring))) for tag, ring in rings)
+        return node("Polygon", *(node(tag, ring) for tag, ring in linear))
+    if shape.geom_type == "LineString":
+        return node("LineString", node("tessellate", "1"), _coordinates(shape))
+    return node("MultiGeometry", *map(_geometry, shape.geoms))
 
 
-def _coordinates(line: Any) -> str:
-    return " ".join(
+def _coordinates(line: Any) -> ET.Element:
+    places = (
         f"{lon:.{DECIMALS}f},{lat:.{DECIMALS}f},0" for lon, lat in shapely.get_coordinates(line)
     )
+    return node("coordinates", " ".join(places))

@@ -42,7 +42,6 @@ def unlike(
 
     Parameters
     ----------
-    name : str
     taken : set of str
         Keys of the names that are taken; changed.
     joint : str

@@ -92,7 +92,8 @@ def _detect_folder(folder: Path) -> Format:
         from geofield.formats.isoxml.read import task_file
 
         return _isoxml_of(_head(task_file(folder)))
-    if {"FIELD.TXT", "BOUNDARY.TXT"} & names or _below(folder, "Field.txt"):
+    deeper = (place for depth in ("*", "*/*") for place in folder.glob(f"{depth}/Field.txt"))
+    if {"FIELD.TXT", "BOUNDARY.TXT"} & names or any(deeper):
         return format_named("agopengps")
     suffixes = {Path(name).suffix.lower() for name in names}
     for each in FORMATS.values():
@@ -101,11 +102,6 @@ def _detect_folder(folder: Path) -> Format:
     raise FormatError(
         f"{folder} holds no product that is known.", hint="Name one of its files instead."
     )
-
-
-def _below(folder: Path, name: str) -> bool:
-    """Whether a file lies one or two folders deeper."""
-    return any(folder.glob(f"*/{name}")) or any(folder.glob(f"*/*/{name}"))
 
 
 def _head(path: Path) -> bytes:

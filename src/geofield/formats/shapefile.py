@@ -16,7 +16,6 @@ from geofield.formats.shapefile_layer import (
     check_limits,
     identified,
     merged,
-    short_names,
     write_shapefile,
 )
 from geofield.formats.shapefile_profiles import GENERIC, PROFILES
@@ -69,7 +68,7 @@ def _raw(file: Path) -> RawLayer:
     layer = GENERIC.get(file.stem.lower())
     if layer is None:
         return RawLayer(file.stem, frame)
-    back = {short: name for name, short in short_names(layer).items()}
+    back = {column.shapefile: column.name for column in layer.columns}
     if not set(frame.columns) >= set(back):
         return RawLayer(file.stem, frame)
     frame = frame.drop(columns=[c for c in ("CLIENT", "FARM", "FIELD") if c in frame.columns])

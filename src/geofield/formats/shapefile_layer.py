@@ -61,11 +61,6 @@ class ShapefileLayer:
     shapes: Any
 
 
-def short_names(of: schema.Layer) -> dict[str, str]:
-    """The names of a layer's columns in a Shapefile."""
-    return {column.name: column.shapefile for column in of.columns}
-
-
 def schema_layer(
     dataset: Dataset,
     path: Path,
@@ -157,13 +152,7 @@ def _cut(text: str) -> str:
 
 
 def check_limits(layer: ShapefileLayer) -> None:
-    """Refuse what a Shapefile would cut.
-
-    Raises
-    ------
-    FormatError
-        For names, text or files that are too long.
-    """
+    """Refuse names, text and files that a Shapefile would cut."""
     name = layer.path.name
     seen: set[str] = set()
     record = 1
@@ -195,24 +184,9 @@ def _longest(values: Sequence[Any]) -> str:
 
 
 def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list[Path]:
-    """Write one Shapefile with all its parts.
+    """Write one Shapefile with all its parts at a place without suffix.
 
-    Parameters
-    ----------
-    layer : ShapefileLayer
-    place : Path
-        Without suffix.
-    day : str or None
-        ISO 8601; of the last change.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    FormatError
-        When GDAL refuses.
+    `day` (ISO 8601) is that of the last change.
     """
     import fiona
     from fiona.errors import FionaError
@@ -222,10 +196,7 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
         name: _TYPES.get(kind) or f"str:{max(_TEXT_WIDTH, len(_longest(values).encode()))}"
         for name, (kind, values) in layer.columns.items()
     }
-    rows = zip(
-        *(_plain(kind, values) for kind, values in layer.columns.values()),
-        strict=True,
-    )
+    rows = zip(*(_plain(*column) for column in layer.columns.values()), strict=True)
     file = place.with_name(place.name + ".shp")
     try:
         with fiona.open(
@@ -252,8 +223,7 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
 
 def _plain(kind: schema.ColumnType, values: Sequence[Any]) -> list[Any]:
     """Values as fiona takes them; missing ones (NaN included) as None."""
-    make = {"int": int, "float": float}.get(kind, lambda value: str(value)[:10])
-    make = str if kind == "str" else make
+    make = {"int": int, "float": float, "str": str}.get(kind, lambda value: str(value)[:10])
     return [None if pd.isna(value) else make(value) for value in values]
 
 

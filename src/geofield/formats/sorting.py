@@ -21,6 +21,7 @@ import shapely
 from pyproj import CRS
 
 from geofield.crossings import mended
+from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
 
@@ -59,6 +60,13 @@ class RawLayer:
     name: str
     frame: gpd.GeoDataFrame
 
+    @classmethod
+    def of_rows(cls, name: str, rows: list[dict[str, Any]]) -> RawLayer:
+        """A layer of rows, each with its `geometry` in longitude and latitude."""
+        import geopandas as gpd
+
+        return cls(name, gpd.GeoDataFrame(rows, geometry="geometry", crs=LONLAT))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
@@ -92,7 +100,7 @@ class _Part:
 
 
 def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path) -> list[str]:
-    """Give every foreign geometry its place.
+    """Give every foreign geometry its place, and tell what was taken as what, or left out.
 
     Parameters
     ----------
@@ -100,14 +108,8 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
         In the metric CRS.
     tables : dict
         The layers found already, by name; what is found here is added.
-    metric : CRS
     path : Path
         For messages and names.
-
-    Returns
-    -------
-    list of str
-        What was taken as what, and what was left out, for people.
     """
     parts = [part for layer in layers for part in _parts(layer)]
     notes: list[str] = []

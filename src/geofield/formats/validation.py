@@ -37,22 +37,9 @@ class Finding:
 
 
 def validate_file(path: Path | str) -> list[Finding]:
-    """All findings in a product.
+    """All findings in a product, a file or folder of any format.
 
-    Parameters
-    ----------
-    path : Path
-        A file or folder of any format.
-
-    Returns
-    -------
-    list of Finding
-        The format's own rules first; empty when there is no fault.
-
-    Raises
-    ------
-    FormatError
-        When there is no such file or its format is not known.
+    The format's own rules come first; an unknown format is an error.
     """
     place = Path(path)
     if place.suffix.lower() == ".zip" and place.is_file():

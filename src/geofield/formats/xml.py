@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -13,14 +14,22 @@ from geofield.strangers import parse_xml
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
-def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
-    """Write a document as UTF-8; characters that XML cannot carry are refused.
+def node(tag: str, *inside: ET.Element | str | Mapping[str, str], **attributes: str) -> ET.Element:
+    """An element: attributes (by name, or as a mapping before those), text and what lies in it."""
+    element = ET.Element(tag)
+    for each in inside:
+        if isinstance(each, str):
+            element.text = each
+        elif isinstance(each, ET.Element):
+            element.append(each)
+        else:
+            element.attrib.update(each)
+    element.attrib.update(attributes)
+    return element
 
-    Raises
-    ------
-    FormatError
-        For such a character.
-    """
+
+def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
+    """Write a document as UTF-8; characters that XML cannot carry are refused."""
     for element in root.iter():
         for text in (element.text, *element.attrib.values()):
             if text and (found := _FORBIDDEN.search(text)):
@@ -39,13 +48,7 @@ def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
 
 
 def read_xml(path: Path) -> ET.Element:
-    """The root element of a document.
-
-    Raises
-    ------
-    FormatError
-        When it is not well-formed, or hostile.
-    """
+    """The root element of a document; one that is not well-formed, or hostile, is refused."""
     try:
         return parse_xml(path.read_bytes(), path.name)
     except ET.ParseError as error:

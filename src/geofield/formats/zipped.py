@@ -28,9 +28,6 @@ def archived(
 
     Parameters
     ----------
-    files : iterable of Path
-    path : Path
-        The archive.
     day : str or None
         ISO 8601; stamped on each entry.
     below : Path, optional
@@ -49,16 +46,7 @@ def archived(
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
-    """The folder with an archive's content, for a block.
-
-    Parameters
-    ----------
-    path : Path
-
-    Yields
-    ------
-    Path
-        The innermost folder that holds everything.
+    """The innermost folder that holds all of an archive's content, for a block.
 
     Raises
     ------

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import geopandas as gpd
 import numpy as np
 import shapely
 
-from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import LocalPlane
 from geofield.formats.foreign import RawLayer, read_foreign
@@ -36,30 +35,26 @@ def read(path: Path) -> Dataset:
     folder = field_folder(path)
     name, plane = _field(folder)
     layers = []
-    rings = [_lonlat_polygon(ring, plane) for ring in _rings(folder)]
+    boundary = folder / "Boundary.txt"
+    found = list(boundary_rings(boundary)) if boundary.exists() else []
+    rings = [_lonlat_polygon(ring, plane) for ring in found if len(ring) >= 3]
     if rings:
         holes, obstacles = _sorted_rings(rings[1:], _flags(folder, plane))
         outline = shapely.Polygon(rings[0].exterior, [hole.exterior for hole in holes])
-        layers.append(_layer("boundary", [{"name": name, "geometry": outline}]))
+        layers.append(RawLayer.of_rows("boundary", [{"name": name, "geometry": outline}]))
         if obstacles:
-            layers.append(_layer("obstacles", obstacles))
+            layers.append(RawLayer.of_rows("obstacles", obstacles))
     lines = [
         {"name": name, "geometry": shapely.LineString(plane.to_lonlat(*points.T))}
         for name, points in _lines(folder)
     ]
     if lines:
-        layers.append(_layer("guidance", lines))
+        layers.append(RawLayer.of_rows("guidance", lines))
     return read_foreign(layers, folder, name=name)
 
 
 def field_folder(path: Path) -> Path:
-    """The folder that holds ``Field.txt``: the path, its parent, or its only field.
-
-    Raises
-    ------
-    FormatError
-        When there is none, or more than one.
-    """
+    """The folder that holds ``Field.txt``: the path, its parent, or its only field."""
     start = path if path.is_dir() else path.parent
     if (start / "Field.txt").is_file():
         return start
@@ -120,13 +115,10 @@ def _sorted_rings(
     ]
 
 
-def _rings(folder: Path) -> list[np.ndarray]:
-    """The rings of ``Boundary.txt`` as (n, 2) arrays of easting and northing."""
-    path = folder / "Boundary.txt"
-    if not path.exists():
-        return []
+def boundary_rings(path: Path) -> Iterator[list[list[float]]]:
+    """The rings of ``Boundary.txt``: easting, northing and heading of each vertex."""
     lines = [line for line in _text(path)[1:] if line]
-    rings, position = [], 0
+    position, number = 0, 1
     try:
         while position < len(lines):
             # One or two words (drive-through, and in old files one more), then the count.
@@ -134,13 +126,13 @@ def _rings(folder: Path) -> list[np.ndarray]:
                 position += 1
             count = int(lines[position])
             rows = lines[position + 1 : position + 1 + count]
-            if len(rows) != count:
+            ring = [_numbers(row) for row in rows]
+            if len(rows) != count or any(len(vertex) < 2 for vertex in ring):
                 raise IndexError
-            rings.append(np.array([_numbers(row)[:2] for row in rows]))
-            position += 1 + count
+            yield ring
+            position, number = position + 1 + count, number + 1
     except (ValueError, IndexError) as error:
-        raise FormatError(f"{path} breaks off or is damaged in ring {len(rings) + 1}.") from error
-    return [ring for ring in rings if len(ring) >= 3]
+        raise FormatError(f"{path} breaks off or is damaged in ring {number}.") from error
 
 
 def _lines(folder: Path) -> list[tuple[str, np.ndarray]]:
@@ -165,14 +157,11 @@ def _lines(folder: Path) -> list[tuple[str, np.ndarray]]:
     return found
 
 
-def _lonlat_polygon(ring: np.ndarray, plane: LocalPlane) -> Any:
-    simple = shapely.simplify(shapely.Polygon(ring), COLLINEAR_M)
-    polygon = simple if simple.is_valid and not simple.is_empty else shapely.Polygon(ring)
+def _lonlat_polygon(ring: list[list[float]], plane: LocalPlane) -> Any:
+    drawn = shapely.Polygon([vertex[:2] for vertex in ring])
+    simple = shapely.simplify(drawn, COLLINEAR_M)
+    polygon = simple if simple.is_valid and not simple.is_empty else drawn
     return shapely.transform(polygon, lambda c: plane.to_lonlat(c[:, 0], c[:, 1]))
-
-
-def _layer(name: str, rows: list[dict[str, Any]]) -> RawLayer:
-    return RawLayer(name, gpd.GeoDataFrame(rows, geometry="geometry", crs=LONLAT))
 
 
 def _numbers(text: str) -> list[float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import ring_headings
-from geofield.formats.agopengps.read import field_folder
+from geofield.formats.agopengps.read import boundary_rings, field_folder
 from geofield.formats.validation import Finding
 
 #: Headings are written with five decimals of vertices with three.
@@ -35,31 +35,22 @@ def check(path: Path) -> Iterator[Finding]:
 
 
 def _check_boundary(path: Path) -> Iterator[Finding]:
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
-    lines = [line.strip() for line in text.splitlines()]
-    if not lines or lines[0] != "$Boundary":
+    first = path.read_text("utf-8-sig", errors="replace").partition("\n")[0]
+    if first.strip() != "$Boundary":
         yield Finding("error", path.name, "the first line is not $Boundary")
         return
-    position, number = 1, 0
-    outer = None
-    while position < len(lines) and lines[position]:
-        number += 1
-        where = f"{path.name}, ring {number}"
-        while position < len(lines) and lines[position] in ("True", "False"):
-            position += 1
-        try:
-            count = int(lines[position])
-            rows = lines[position + 1 : position + 1 + count]
-            vertices = np.array([[float(part) for part in row.split(",")] for row in rows])
-        except (ValueError, IndexError):
-            yield Finding("error", where, "it breaks off or is damaged")
-            return
-        position += 1 + count
-        if len(rows) != count or count < 3 or vertices.shape[1] != 3:
-            yield Finding("error", where, f"{len(rows)} vertices instead of {count}, or too few")
-            return
-        yield from _check_ring(vertices, outer, where)
-        outer = shapely.Polygon(vertices[:, :2]) if outer is None else outer
+    outer, where = None, f"{path.name}, ring 1"
+    try:
+        for number, ring in enumerate(boundary_rings(path), start=1):
+            if len(ring) < 3 or any(len(vertex) != 3 for vertex in ring):
+                yield Finding("error", where, "fewer than 3 vertices, or one without its 3 figures")
+                return
+            vertices = np.array(ring)
+            yield from _check_ring(vertices, outer, where)
+            outer = shapely.Polygon(vertices[:, :2]) if outer is None else outer
+            where = f"{path.name}, ring {number + 1}"
+    except FormatError:
+        yield Finding("error", where, "it breaks off or is damaged")
 
 
 def _check_ring(

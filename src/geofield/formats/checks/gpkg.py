@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from geofield.formats.gpkg_read import opened
 from geofield.formats.validation import Finding
 
 _APPLICATION_ID = 0x47504B47  # "GPKG"
@@ -17,9 +17,7 @@ _REQUIRED = ("gpkg_spatial_ref_sys", "gpkg_contents", "gpkg_geometry_columns")
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a GeoPackage's own structure."""
     try:
-        with closing(
-            sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
-        ) as connection:
+        with opened(path) as connection:
             yield from _check(connection, path.name)
     except sqlite3.DatabaseError as error:
         yield Finding("error", path.name, f"not a database that SQLite can read: {error}")

@@ -33,23 +33,10 @@ _REACH_M = 500.0
 
 
 def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]], list[str]]:
-    """The lines to drive in a field.
+    """The lines to drive in a field (a PFD), and what was drawn or left out, for people.
 
-    A line that a terminal is to repeat is left out where explicit lines are there.
-
-    Parameters
-    ----------
-    field : ET.Element
-        A PFD.
-    outline : shapely geometry
-        The field's, degrees.
-
-    Returns
-    -------
-    list of dict
-        A row each, geometry in degrees.
-    list of str
-        What was drawn or left out, for people.
+    A line that a terminal is to repeat is left out where explicit lines are there. The outline
+    and the lines, a row each, are in degrees.
     """
     rows: list[dict[str, Any]] = []
     repeated: list[dict[str, Any]] = []
@@ -75,13 +62,7 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
 
 
 def position(point: ET.Element) -> tuple[float, float]:
-    """Longitude and latitude of a PNT.
-
-    Raises
-    ------
-    FormatError
-        When they are no numbers.
-    """
+    """Longitude and latitude of a PNT."""
     try:
         return float(point.get("D", "")), float(point.get("C", ""))
     except ValueError as error:

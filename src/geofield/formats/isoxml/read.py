@@ -13,7 +13,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import shapely
 
-from geofield.crs import LONLAT
 from geofield.errors import FormatError, SeveralFieldsError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
@@ -57,12 +56,12 @@ def read(path: Path) -> Dataset:
     boundaries = list(_boundaries(field))
     outline = shapely.union_all([row["geometry"] for row in boundaries])
     lines, lines_told = guidance_lines(field, outline)
-    layers = [
-        _layer("boundary", boundaries),
-        _layer("obstacles", list(_obstacles(field, outline))),
-        _layer("guidance", lines),
-    ]
-    found = [layer for layer in layers if layer is not None]
+    layers = {
+        "boundary": boundaries,
+        "obstacles": list(_obstacles(field, outline)),
+        "guidance": lines,
+    }
+    found = [RawLayer.of_rows(name, rows) for name, rows in layers.items() if rows]
     dataset = read_foreign(found, file, name=field.get("C") or file.parent.name)
     return replace(dataset, notes=(*_told(field), *lines_told))
 
@@ -98,14 +97,6 @@ def _unwrap(field: ET.Element) -> None:
     if len(lons) and np.ptp(lons) > 180.0:
         for point, lon in zip(points, lons, strict=True):
             point.set("D", repr(float(lon % 360.0)))
-
-
-def _layer(name: str, rows: list[dict[str, Any]]) -> RawLayer | None:
-    import geopandas as gpd
-
-    if not rows:
-        return None
-    return RawLayer(name, gpd.GeoDataFrame(rows, geometry="geometry", crs=LONLAT))
 
 
 def _boundaries(field: ET.Element) -> Iterable[dict[str, Any]]:

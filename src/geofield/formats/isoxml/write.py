@@ -35,7 +35,7 @@ from geofield.formats.isoxml.codes import (
 from geofield.formats.many import last_imagery_day, owner_of
 from geofield.formats.names import cut_name, line_names
 from geofield.formats.terminal import main_field, terminal_obstacles
-from geofield.formats.xml import write_xml
+from geofield.formats.xml import node, write_xml
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
@@ -53,30 +53,31 @@ def write_v4(
     these names; ``zip`` (true: the folder TASKDATA in one archive); ``headland`` (``line``: its
     inner edge as AgOpenGPS reads it, or ``strip``: the area).
     """
-    return _written(datasets, folder, f"{stem}_isoxml", 4, options)
+    return _written(datasets, folder, stem, "isoxml", 4, options)
 
 
 def write_v3(
     datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
     """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
-    return _written(datasets, folder, f"{stem}_isoxml-v3", 3, options)
+    return _written(datasets, folder, stem, "isoxml-v3", 3, options)
 
 
 def _written(
     datasets: Sequence[Dataset],
     folder: Path,
-    archive: str,
+    stem: str,
+    name: str,
     version: int,
     options: Mapping[str, Any],
 ) -> list[Path]:
-    below = folder / ("isoxml" if version == 4 else "isoxml-v3")
+    below = folder / name
     path = below / "TASKDATA" / "TASKDATA.XML"
     write_xml(_task_data(datasets, version, options), path)
     if not options.get("zip"):
         return [path]
     day = last_imagery_day(datasets)
-    return [archived([path], folder / f"{archive}.zip", day=day, below=below)]
+    return [archived([path], folder / f"{stem}_{name}.zip", day=day, below=below)]
 
 
 def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, Any]) -> ET.Element:
@@ -97,13 +98,8 @@ def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, 
     for place, customer in enumerate(customers, start=1):
         ET.SubElement(root, "CTR", A=f"CTR{place}", B=cut_name(customer, DESIGNATOR))
     for place, (customer, farm) in enumerate(farms, start=1):
-        ET.SubElement(
-            root,
-            "FRM",
-            A=f"FRM{place}",
-            B=cut_name(farm, DESIGNATOR),
-            I=f"CTR{customers.index(customer) + 1}",
-        )
+        of = f"CTR{customers.index(customer) + 1}"
+        ET.SubElement(root, "FRM", A=f"FRM{place}", B=cut_name(farm, DESIGNATOR), I=of)
     groups = itertools.count(1)
     for place, (dataset, owner) in enumerate(zip(datasets, owners, strict=True), start=1):
         field = dataset.table(schema.FIELD.name)
@@ -149,9 +145,8 @@ def _add_polygons(
         ]
     placed = np.array([shape for _, _, shape in shapes], dtype=object)
     areas_m2 = ground_areas_m2(placed, dataset.crs)
-    for (kind, each, _), area_m2, lonlat in zip(
-        shapes, areas_m2, to_lonlat(placed, dataset.crs), strict=True
-    ):
+    rows = zip(shapes, areas_m2, to_lonlat(placed, dataset.crs), strict=True)
+    for (kind, each, _), area_m2, lonlat in rows:
         _add_polygon(part, kind, each, area_m2, lonlat)
     trees = [tree for each in obstacles for tree in each.trees] if version == 4 else []
     centres = to_lonlat(np.array([centre for _, centre in trees], dtype=object), dataset.crs)
@@ -186,78 +181,60 @@ def _add_polygon(
 
 def _add_guidance_groups(part: ET.Element, dataset: Dataset, numbers: Iterator[int]) -> None:
     """One group per line: some readers look at the first pattern of a group only."""
-    segments = dataset.table(schema.SEGMENTS.name)
-    width_mm = _width_mm(dataset)
+    width = _width(dataset)
     reference = _reference(dataset)
     if reference is not None:
         line, left, right = reference
         lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
-        _add_group(
-            part,
-            next(numbers),
-            "Reference AB",
-            lonlat,
-            width_mm,
-            # The terminal may lay the same pattern itself from this one line.
-            {"E": REPEAT_BOTH, "N": str(left), "O": str(right)},
-        )
-    if not len(segments):
-        return
-    placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
-    explicit = {"E": REPEAT_NONE, "F": EXTEND_NONE}
-    for name, lonlat in zip(line_names(segments), placed, strict=True):
-        _add_group(part, next(numbers), name, lonlat, width_mm, explicit)
+        # The terminal may lay the same pattern itself from this one line.
+        how, sides = {"E": REPEAT_BOTH}, {"N": str(left), "O": str(right)}
+        part.append(_group(next(numbers), "Reference AB", lonlat, width, how, sides))
+    for name, lonlat in _lines(dataset):
+        how = {"E": REPEAT_NONE, "F": EXTEND_NONE}
+        part.append(_group(next(numbers), name, lonlat, width, how, {}))
 
 
-def _add_group(
-    part: ET.Element,
+def _group(
     number: int,
     name: str,
     lonlat: Any,
-    width_mm: int | None,
+    width: Mapping[str, str],
     how: Mapping[str, str],
-) -> None:
-    straight = len(lonlat.coords) == 2
-    group = ET.SubElement(part, "GGP", A=f"GGP{number}", B=cut_name(name, DESIGNATOR))
-    attributes = {
-        "A": f"GPN{number}",
-        "B": cut_name(name, DESIGNATOR),
-        "C": str(Guidance.AB if straight else Guidance.CURVE),
-    }
-    pattern = ET.SubElement(
-        group, "GPN", attributes | {key: how[key] for key in ("E", "F") if key in how}
+    sides: Mapping[str, str],
+) -> ET.Element:
+    inner = len(lonlat.coords) - 2
+    straight = {} if inner else {"G": f"{_heading_deg(lonlat):.4f}"}
+    line = node("LSG", {"A": LineType.GUIDANCE}, width)
+    kinds = [PointType.GUIDANCE_A, *[PointType.GUIDANCE_POINT] * inner, PointType.GUIDANCE_B]
+    for kind, (lon, lat) in zip(kinds, lonlat.coords, strict=True):
+        _add_point(line, kind, lon, lat)
+    pattern = node(
+        "GPN",
+        {"A": f"GPN{number}", "B": name, "C": Guidance.CURVE if inner else Guidance.AB},
+        how,
+        straight,
+        {"I": DESKTOP},
+        sides,
+        line,
     )
-    if straight:
-        pattern.set("G", f"{_heading_deg(lonlat):.4f}")
-    pattern.set("I", DESKTOP)
-    for key in ("N", "O"):
-        if key in how:
-            pattern.set(key, how[key])
-    element = ET.SubElement(pattern, "LSG", A=LineType.GUIDANCE)
-    if width_mm is not None:
-        element.set("C", str(width_mm))
-    last = len(lonlat.coords) - 1
-    for index, (lon, lat) in enumerate(lonlat.coords):
-        kind = PointType.GUIDANCE_POINT
-        if index == 0:
-            kind = PointType.GUIDANCE_A
-        elif index == last:
-            kind = PointType.GUIDANCE_B
-        _add_point(element, kind, lon, lat)
+    return node("GGP", pattern, A=f"GGP{number}", B=name)
 
 
 def _add_guidance_lines(part: ET.Element, dataset: Dataset) -> None:
+    width = _width(dataset)
+    for name, lonlat in _lines(dataset):
+        line = node("LSG", {"A": LineType.GUIDANCE, "B": name}, width)
+        for lon, lat in lonlat.coords:
+            _add_point(line, PointType.OTHER, lon, lat)
+        part.append(line)
+
+
+def _lines(dataset: Dataset) -> Iterator[tuple[str, Any]]:
+    """The names of the segments, and their lines in longitude and latitude."""
     segments = dataset.table(schema.SEGMENTS.name)
-    if not len(segments):
-        return
-    width_mm = _width_mm(dataset)
     placed = to_lonlat(np.asarray(segments.geometry.to_numpy(), dtype=object), dataset.crs)
-    for name, line in zip(line_names(segments), placed, strict=True):
-        element = ET.SubElement(part, "LSG", A=LineType.GUIDANCE, B=cut_name(name, DESIGNATOR))
-        if width_mm is not None:
-            element.set("C", str(width_mm))
-        for lon, lat in line.coords:
-            _add_point(element, PointType.OTHER, lon, lat)
+    names = (cut_name(name, DESIGNATOR) for name in line_names(segments))
+    return zip(names, placed, strict=True)
 
 
 def _add_point(
@@ -300,11 +277,9 @@ def _reference(dataset: Dataset) -> tuple[Any, int, int] | None:
     return line, int((offset < -0.01).sum()), int((offset > 0.01).sum())
 
 
-def _width_mm(dataset: Dataset) -> int | None:
-    """The distance of neighbouring tracks, whole millimetres; None for a single track."""
+def _width(dataset: Dataset) -> dict[str, str]:
+    """The distance of neighbouring tracks, whole millimetres, as C; nothing for a single track."""
     found = _offsets(dataset)
-    if found is None or len(found[1]) < 2:
-        return None
-    steps = np.diff(np.sort(found[1]))
+    steps = np.array([]) if found is None else np.diff(np.sort(found[1]))
     steps = steps[steps > 0.01]
-    return round(float(np.median(steps)) * 1000) if len(steps) else None
+    return {"C": str(round(float(np.median(steps)) * 1000))} if len(steps) else {}

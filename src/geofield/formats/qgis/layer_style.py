@@ -5,16 +5,18 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.looks import LOOKS, Look, field_rules
-from geofield.formats.qgis.symbols import QGIS_VERSION, rule_labels, rule_renderer
+from geofield.formats.qgis.symbols import (
+    QGIS_VERSION,
+    document,
+    option_map,
+    rule_labels,
+    rule_renderer,
+)
+from geofield.formats.xml import node
 from geofield.schema import Column, Layer, unit_in_words
 
-_GEOMETRY = {
-    "Point": "0",
-    "LineString": "1",
-    "MultiLineString": "1",
-    "Polygon": "2",
-    "MultiPolygon": "2",
-}
+#: QGIS's numbers of what is drawn.
+_GEOMETRY = {"Point": "0", "LineString": "1", "Polygon": "2"}
 #: What a person's newly drawn row starts with.
 _DEFAULTS = {("obstacles", "status"): "'added'", ("obstacles", "kind"): "'other'"}
 
@@ -36,14 +38,8 @@ WEB_MAP = _MAP.format(lat=_LAT, lon=_LON)
 
 def look_of(layer: Layer) -> Look:
     """The look of a layer; a plain one for layers that nobody gave one."""
-    return (
-        LOOKS.get(layer.name)
-        or LOOKS[
-            {"Point": "track_points", "Polygon": "headland", "MultiPolygon": "headland"}.get(
-                layer.geometry, "segments"
-            )
-        ]
-    )
+    plain = {"Point": "track_points", "Polygon": "headland", "MultiPolygon": "headland"}
+    return LOOKS.get(layer.name) or LOOKS[plain.get(layer.geometry, "segments")]
 
 
 def style_elements(layer: Layer, frame: str = "") -> list[ET.Element]:
@@ -53,35 +49,32 @@ def style_elements(layer: Layer, frame: str = "") -> list[ET.Element]:
     """
     look = look_of(layer)
     rules = field_rules(frame) if layer.name == "field" else look.rules
-    elements = [rule_renderer(rules, layer.name)]
-    if look.labels:
-        elements.append(rule_labels(look.labels, layer.name))
-    elements.append(_element("blendMode", "0"))
-    elements.append(_element("layerOpacity", "1"))
-    elements.append(_field_configuration(layer))
-    aliases = ET.Element("aliases")
-    for index, column in enumerate(layer.columns, start=1):
-        ET.SubElement(aliases, "alias", index=str(index), field=column.name, name=heading(column))
-    elements.append(aliases)
-    defaults = ET.Element("defaults")
-    for column in layer.columns:
-        ET.SubElement(
-            defaults,
-            "default",
-            field=column.name,
-            expression=_DEFAULTS.get((layer.name, column.name), ""),
-            applyOnUpdate="0",
-        )
-    elements.append(defaults)
-    editable = ET.Element("editable")
-    for column in layer.columns:
-        is_editable = column.name in EDITABLE.get(layer.name, ())
-        ET.SubElement(editable, "field", name=column.name, editable=str(int(is_editable)))
-    elements.append(editable)
-    elements.append(_actions())
-    elements.append(_element("previewExpression", _preview(layer)))
-    elements.append(_element("mapTip", map_tip(layer)))
-    return elements
+    aliases = (
+        node("alias", index=str(index), field=column.name, name=heading(column))
+        for index, column in enumerate(layer.columns, start=1)
+    )
+    first = {name: _DEFAULTS.get((layer.name, name), "") for name in layer.column_names}
+    defaults = (
+        node("default", field=name, expression=value, applyOnUpdate="0")
+        for name, value in first.items()
+    )
+    open_ = EDITABLE.get(layer.name, ())
+    editable = (
+        node("field", name=name, editable=str(int(name in open_))) for name in layer.column_names
+    )
+    return [
+        rule_renderer(rules, layer.name),
+        *([rule_labels(look.labels, layer.name)] if look.labels else []),
+        node("blendMode", "0"),
+        node("layerOpacity", "1"),
+        _field_configuration(layer),
+        node("aliases", *aliases),
+        node("defaults", *defaults),
+        node("editable", *editable),
+        _actions(),
+        node("previewExpression", " || ' / ' || ".join(f'"{name}"' for name in layer.key)),
+        node("mapTip", map_tip(layer)),
+    ]
 
 
 def style_attributes(layer: Layer) -> dict[str, str]:
@@ -101,13 +94,14 @@ def style_attributes(layer: Layer) -> dict[str, str]:
 
 def qml(layer: Layer, frame: str = "") -> str:
     """The style of a layer as a QML document."""
-    root = ET.Element("qgis", {"styleCategories": "AllStyleCategories"} | style_attributes(layer))
-    root.extend(style_elements(layer, frame))
-    root.append(_element("layerGeometryType", _GEOMETRY[layer.geometry]))
-    return (
-        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
-        f"{ET.tostring(root, encoding='unicode')}\n"
+    root = node(
+        "qgis",
+        {"styleCategories": "AllStyleCategories"},
+        style_attributes(layer),
+        *style_elements(layer, frame),
+        node("layerGeometryType", _GEOMETRY[layer.geometry.removeprefix("Multi")]),
     )
+    return document(root)
 
 
 def heading(column: Column) -> str:
@@ -122,50 +116,37 @@ def map_tip(layer: Layer) -> str:
     return f'{tip}<br><a href="{WEB_MAP}">Open this spot in a web map</a>'
 
 
-def _element(name: str, text: str) -> ET.Element:
-    element = ET.Element(name)
-    element.text = text
-    return element
-
-
-def _preview(layer: Layer) -> str:
-    return " || ' / ' || ".join(f'"{name}"' for name in layer.key)
-
-
 def _field_configuration(layer: Layer) -> ET.Element:
-    root = ET.Element("fieldConfiguration")
-    fid = ET.SubElement(root, "field", name="fid", configurationFlags="None")
-    _widget(fid, "Hidden", None)
-    for column in layer.columns:
-        field = ET.SubElement(root, "field", name=column.name, configurationFlags="None")
-        if column.values:
-            _widget(field, "ValueMap", _value_map(column.values))
-        else:
-            kind = {"int": "Range", "float": "TextEdit", "str": "TextEdit", "date": "DateTime"}
-            _widget(field, kind[column.type], None)
-    return root
+    kinds = {"int": "Range", "float": "TextEdit", "str": "TextEdit", "date": "DateTime"}
+    return node(
+        "fieldConfiguration",
+        _field("fid", "Hidden", node("Option")),
+        *(
+            _field(column.name, "ValueMap", _value_map(column.values))
+            if column.values
+            else _field(column.name, kinds[column.type], node("Option"))
+            for column in layer.columns
+        ),
+    )
 
 
-def _widget(field: ET.Element, kind: str, options: ET.Element | None) -> None:
-    widget = ET.SubElement(field, "editWidget", type=kind)
-    config = ET.SubElement(widget, "config")
-    config.append(ET.Element("Option") if options is None else options)
+def _field(name: str, widget: str, options: ET.Element) -> ET.Element:
+    config = node("config", options)
+    return node(
+        "field", node("editWidget", config, type=widget), name=name, configurationFlags="None"
+    )
 
 
 def _value_map(values: tuple[str, ...]) -> ET.Element:
-    root = ET.Element("Option", type="Map")
-    entries = ET.SubElement(root, "Option", type="List", name="map")
-    for value in values:
-        entry = ET.SubElement(entries, "Option", type="Map")
-        ET.SubElement(entry, "Option", type="QString", name=value.capitalize(), value=value)
-    return root
+    entries = (option_map({value.capitalize(): value}) for value in values)
+    return node("Option", node("Option", *entries, type="List", name="map"), type="Map")
 
 
 def _actions() -> ET.Element:
-    root = ET.Element("attributeactions")
-    action = ET.SubElement(
-        root,
+    action = node(
         "actionsetting",
+        node("actionScope", id="Canvas"),
+        node("actionScope", id="Feature"),
         id="{6b6f9f52-6f2e-4a63-9d0a-0d8f1c6a2b10}",
         type="5",  # open a URL
         name="Open this spot in a web map",
@@ -176,6 +157,4 @@ def _actions() -> ET.Element:
         capture="0",
         isEnabledOnlyWhenEditable="0",
     )
-    for scope in ("Canvas", "Feature"):
-        ET.SubElement(action, "actionScope", id=scope)
-    return root
+    return node("attributeactions", action)

@@ -24,6 +24,7 @@ from geofield.formats.qgis.symbols import (
 _BLACK = "0,0,0,190"
 _WHITE = "255,255,255,255"
 _DARK = "20,20,20,255"
+_PAPER = "255,255,255,230"
 
 
 def _rgba(color: str, opacity: int = 255) -> str:
@@ -66,32 +67,17 @@ def _shown(column: str) -> str:
     return f"replace(\"{column}\", map('&', '&amp;', '<', '&lt;'))"
 
 
-def _is(status: str) -> str:
-    return f"\"status\" = '{status}'"
-
-
-#: Legends of the rules of obstacles, from top to bottom, and their statuses.
-OBSTACLE_RULES = {
-    "Confirmed": "confirmed",
-    "Detected": "detected",
-    "Possible, not avoided": "possible",
-    "Added by a person": "added",
-    "Rejected by a person": "rejected",
-}
-
-
 def _obstacle_rule(label: str, status: str) -> Rule:
     look = theme.STATUS[status]
-    colour, condition = _rgba(look.color), _is(status)
+    colour, condition = _rgba(look.color), f"\"status\" = '{status}'"
     if status == "added":
         condition += ' OR "status" IS NULL'
     if look.dash is None:
         width = 0.4 if status == "detected" else 0.6
         return Rule(label, "fill", (fill(_rgba(look.color, 90), colour, width),), condition)
     dash = ";".join(f"{_DASH_MM * part:g}" for part in look.dash)
-    return Rule(
-        label, "fill", (line(_BLACK, 0.6, dash=dash), line(colour, 0.4, dash=dash)), condition
-    )
+    lines = line(_BLACK, 0.6, dash=dash), line(colour, 0.4, dash=dash)
+    return Rule(label, "fill", lines, condition)
 
 
 def field_rules(frame: str) -> tuple[Rule, ...]:
@@ -139,7 +125,7 @@ LOOKS: dict[str, Look] = {
                 "\"name\" || '\\n' || format_number(\"area_ha\", 2) || ' ha'",
                 10,
                 _DARK,
-                "255,255,255,230",
+                _PAPER,
                 geometry=(
                     "make_point((x_min($geometry) + x_max($geometry)) / 2, "
                     "y_max($geometry) + 0.06 * (y_max($geometry) - y_min($geometry)))"
@@ -150,7 +136,7 @@ LOOKS: dict[str, Look] = {
                 "\"name\" || ' (' || format_number(\"area_ha\", 1) || ' ha)'",
                 9,
                 _DARK,
-                "255,255,255,230",
+                _PAPER,
                 geometry="point_on_surface($geometry)",
                 min_scale=REGION_SCALE,
                 above=True,
@@ -165,7 +151,13 @@ LOOKS: dict[str, Look] = {
         f"{_shown('doubts')}) %]",
     ),
     "obstacles": Look(
-        tuple(_obstacle_rule(label, status) for label, status in OBSTACLE_RULES.items()),
+        (
+            _obstacle_rule("Confirmed", "confirmed"),
+            _obstacle_rule("Detected", "detected"),
+            _obstacle_rule("Possible, not avoided", "possible"),
+            _obstacle_rule("Added by a person", "added"),
+            _obstacle_rule("Rejected by a person", "rejected"),
+        ),
         (
             Label(
                 'to_string("obstacle_no")',
@@ -198,23 +190,16 @@ LOOKS: dict[str, Look] = {
                 max_scale=1000,
             ),
         ),
-        (
+        tuple(
             Label(
                 'to_string("track_no")',
                 7,
                 "0,60,80,255",
-                "255,255,255,230",
-                geometry=_FIRST.format(_END_OFFSET_M),
+                _PAPER,
+                geometry=end.format(_END_OFFSET_M),
                 max_scale=4000,
-            ),
-            Label(
-                'to_string("track_no")',
-                7,
-                "0,60,80,255",
-                "255,255,255,230",
-                geometry=_LAST.format(_END_OFFSET_M),
-                max_scale=4000,
-            ),
+            )
+            for end in (_FIRST, _LAST)
         ),
         max_scale=REGION_SCALE,
         tip='<b>Track [% "track_no" %]</b>: [% round("length_m", 1) %] m, '
@@ -236,15 +221,7 @@ LOOKS: dict[str, Look] = {
     ),
     "track_points": Look(
         (Rule("Track point", "marker", (marker("circle", _WHITE, "0,60,80,255", 0.9),)),),
-        (
-            Label(
-                'to_string("point_no")',
-                6,
-                _DARK,
-                "255,255,255,200",
-                max_scale=120,
-            ),
-        ),
+        (Label('to_string("point_no")', 6, _DARK, "255,255,255,200", max_scale=120),),
         max_scale=500,
         tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
     ),
@@ -262,7 +239,7 @@ LOOKS: dict[str, Look] = {
                 "to_string(round(100 * \"certainty\")) || ' %'",
                 8,
                 "255,60,220,255",
-                "255,255,255,230",
+                _PAPER,
             ),
         ),
         visible=False,

@@ -15,7 +15,8 @@ from geofield.crs import authority_name
 from geofield.formats import origin
 from geofield.formats.qgis.layer_style import look_of, style_attributes, style_elements
 from geofield.formats.qgis.looks import ORDER
-from geofield.formats.qgis.symbols import QGIS_VERSION
+from geofield.formats.qgis.symbols import QGIS_VERSION, document
+from geofield.formats.xml import node
 from geofield.model import Dataset
 from geofield.model.frame import NEAR_PX, picture_frame
 
@@ -23,13 +24,6 @@ from geofield.model.frame import NEAR_PX, picture_frame
 MARGIN = 0.08
 # QGIS throws away layer ids of ten characters or fewer.
 _ID = "geofield_{}"
-_GEOMETRY = {
-    "Point": "Point",
-    "LineString": "Line",
-    "MultiLineString": "Line",
-    "Polygon": "Polygon",
-    "MultiPolygon": "Polygon",
-}
 
 
 def project_xml(dataset: Dataset, gpkg_name: str) -> str:
@@ -43,32 +37,47 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
         File name of the GeoPackage.
     """
     layers = sorted(dataset.layers(working=True), key=lambda each: _place(each.name))
-    root = ET.Element("qgis", projectname=dataset.name, version=QGIS_VERSION)
-    ET.SubElement(root, "homePath", path="")
-    ET.SubElement(root, "title").text = dataset.name
-    root.append(_crs_element("projectCrs", dataset.crs))
-    scene = None if dataset.scene_path is None else dataset.scene_path.name
-    root.append(_layer_tree(dataset.name, layers, gpkg_name, scene))
-    bounds = _first_view(dataset)
-    root.append(_canvas(dataset.crs, bounds))
-    root.append(_view_settings(dataset.crs, bounds))
+    scene = dataset.scene_path
     names = [each.name for each in layers] + (["scene"] if scene else [])
-    order = ET.SubElement(root, "layerorder")
-    for name in names:
-        ET.SubElement(order, "layer", id=_ID.format(name))
-    project_layers = ET.SubElement(root, "projectlayers")
-    for layer in layers:
-        project_layers.append(_vector_layer(layer, dataset, gpkg_name))
-    if dataset.scene_path is not None:
-        project_layers.append(_raster_layer(dataset, dataset.scene_path))
-    root.append(_properties(dataset))
-    metadata = ET.SubElement(root, "projectMetadata")
-    ET.SubElement(metadata, "title").text = dataset.name
-    ET.SubElement(metadata, "abstract").text = origin.lineage(dataset)
-    return (
-        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
-        f"{ET.tostring(root, encoding='unicode')}\n"
+    frame, view = frame_strip(dataset), _first_view(dataset)
+    pictures = [] if scene is None else [_raster_layer(dataset, scene)]
+    root = node(
+        "qgis",
+        node("homePath", path=""),
+        node("title", dataset.name),
+        node("projectCrs", _system(dataset.crs)),
+        _layer_tree(dataset.name, layers, gpkg_name, scene),
+        node(
+            "mapcanvas",
+            node("units", "meters"),
+            node("extent", *(node(tag, value) for tag, value in view.items())),
+            node("rotation", "0"),
+            node("destinationsrs", _system(dataset.crs)),
+            name="theMapCanvas",
+            annotationsVisible="1",
+        ),
+        node(
+            "ProjectViewSettings",
+            node("Scales"),
+            node("DefaultViewExtent", view, _system(dataset.crs)),
+            UseProjectScales="0",
+        ),
+        node("layerorder", *(node("layer", id=_ID.format(name)) for name in names)),
+        node(
+            "projectlayers",
+            *(_vector_layer(each, dataset.crs, gpkg_name, frame) for each in layers),
+            *pictures,
+        ),
+        _properties(),
+        node(
+            "projectMetadata",
+            node("title", dataset.name),
+            node("abstract", origin.lineage(dataset)),
+        ),
+        projectname=dataset.name,
+        version=QGIS_VERSION,
     )
+    return document(root)
 
 
 def qgz_bytes(xml: str, stem: str, timestamp: str) -> bytes:
@@ -96,26 +105,26 @@ def _place(name: str) -> int:
     return ORDER.index(name) if name in ORDER else len(ORDER)
 
 
-def _crs_element(tag: str, crs: CRS) -> ET.Element:
-    root = ET.Element(tag)
-    system = ET.SubElement(root, "spatialrefsys", nativeFormat="Wkt")
+def _system(crs: CRS) -> ET.Element:
     name = authority_name(crs)
-    ET.SubElement(system, "wkt").text = crs.to_wkt()
-    ET.SubElement(system, "authid").text = name if ":" in name else ""
-    ET.SubElement(system, "srid").text = name.rpartition(":")[2] if ":" in name else "0"
-    ET.SubElement(system, "description").text = crs.name
-    ET.SubElement(system, "geographicflag").text = "true" if crs.is_geographic else "false"
-    return root
+    known = ":" in name
+    return node(
+        "spatialrefsys",
+        node("wkt", crs.to_wkt()),
+        node("authid", name if known else ""),
+        node("srid", name.rpartition(":")[2] if known else "0"),
+        node("description", crs.name),
+        node("geographicflag", "true" if crs.is_geographic else "false"),
+        nativeFormat="Wkt",
+    )
 
 
 def _layer_tree(
-    name: str, layers: list[schema.Layer], gpkg_name: str, scene: str | None
+    name: str, layers: list[schema.Layer], gpkg_name: str, scene: Path | None
 ) -> ET.Element:
-    root = ET.Element("layer-tree-group")
-    group = ET.SubElement(root, "layer-tree-group", name=name, expanded="1", checked="Qt::Checked")
+    group = node("layer-tree-group", name=name, expanded="1", checked="Qt::Checked")
     for layer in layers:
-        ET.SubElement(
-            group,
+        leaf = node(
             "layer-tree-layer",
             id=_ID.format(layer.name),
             name=layer.title,
@@ -124,17 +133,19 @@ def _layer_tree(
             checked="Qt::Checked" if look_of(layer).visible else "Qt::Unchecked",
             expanded="1" if layer.name == "obstacles" else "0",
         )
+        group.append(leaf)
+    root = node("layer-tree-group", group)
     if scene is not None:
-        ET.SubElement(
-            root,
+        leaf = node(
             "layer-tree-layer",
             id=_ID.format("scene"),
             name="Picture",
-            source=f"./{scene}",
+            source=f"./{scene.name}",
             providerKey="gdal",
             checked="Qt::Checked",
             expanded="0",
         )
+        root.append(leaf)
     return root
 
 
@@ -142,54 +153,47 @@ def _source(gpkg_name: str, layer: str) -> str:
     return f"./{gpkg_name}|layername={layer}"
 
 
-def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str) -> ET.Element:
-    root = ET.Element(
+def _vector_layer(layer: schema.Layer, crs: CRS, gpkg_name: str, frame: str) -> ET.Element:
+    shape = layer.geometry.removeprefix("Multi").removesuffix("String")
+    return node(
         "maplayer",
-        {"type": "vector", "geometry": _GEOMETRY[layer.geometry], "autoRefreshEnabled": "0"}
-        | style_attributes(layer),
+        {"type": "vector", "geometry": shape, "autoRefreshEnabled": "0"},
+        style_attributes(layer),
+        node("id", _ID.format(layer.name)),
+        node("datasource", _source(gpkg_name, layer.name)),
+        node("layername", layer.title),
+        node("abstract", layer.description),
+        node("srs", _system(crs)),
+        node("provider", "ogr", encoding="UTF-8"),
+        *style_elements(layer, frame),
     )
-    _text(root, "id", _ID.format(layer.name))
-    _text(root, "datasource", _source(gpkg_name, layer.name))
-    _text(root, "layername", layer.title)
-    _text(root, "abstract", layer.description)
-    root.append(_crs_element("srs", dataset.crs))
-    _text(root, "provider", "ogr").set("encoding", "UTF-8")
-    root.extend(style_elements(layer, frame_strip(dataset)))
-    return root
 
 
 def _raster_layer(dataset: Dataset, path: Path) -> ET.Element:
-    root = ET.Element("maplayer", type="raster", autoRefreshEnabled="0")
-    _text(root, "id", _ID.format("scene"))
-    _text(root, "datasource", f"./{path.name}")
-    _text(root, "layername", "Picture")
-    _text(root, "abstract", origin.lineage(dataset))
-    if dataset.grid is not None:
-        root.append(_crs_element("srs", dataset.grid.crs))
-    _text(root, "provider", "gdal")
-    pipe = ET.SubElement(root, "pipe")
-    bands = _colour_bands(path)
-    attributes = {"opacity": "1", "alphaBand": "-1"}
+    bands = [str(band) for band in _colour_bands(path)]
     if len(bands) == 3:
-        red, green, blue = (str(band) for band in bands)
-        ET.SubElement(
-            pipe,
-            "rasterrenderer",
-            {"type": "multibandcolor", "redBand": red, "greenBand": green, "blueBand": blue}
-            | attributes,
-        )
+        names = {"type": "multibandcolor"}
+        names |= dict(zip(("redBand", "greenBand", "blueBand"), bands, strict=True))
+        stretch = []
     else:
-        renderer = ET.SubElement(
-            pipe,
-            "rasterrenderer",
-            {"type": "singlebandgray", "grayBand": str(bands[0]), "gradient": "BlackToWhite"}
-            | attributes,
-        )
-        stretch = ET.SubElement(renderer, "contrastEnhancement")
-        _text(stretch, "minValue", "0")
-        _text(stretch, "maxValue", "255")
-        _text(stretch, "algorithm", "StretchToMinimumMaximum")
-    return root
+        names = {"type": "singlebandgray", "grayBand": bands[0], "gradient": "BlackToWhite"}
+        limits = {"minValue": "0", "maxValue": "255", "algorithm": "StretchToMinimumMaximum"}
+        parts = (node(tag, value) for tag, value in limits.items())
+        stretch = [node("contrastEnhancement", *parts)]
+    renderer = node("rasterrenderer", names, *stretch, opacity="1", alphaBand="-1")
+    system = [] if dataset.grid is None else [node("srs", _system(dataset.grid.crs))]
+    return node(
+        "maplayer",
+        node("id", _ID.format("scene")),
+        node("datasource", f"./{path.name}"),
+        node("layername", "Picture"),
+        node("abstract", origin.lineage(dataset)),
+        *system,
+        node("provider", "gdal"),
+        node("pipe", renderer),
+        type="raster",
+        autoRefreshEnabled="0",
+    )
 
 
 def _colour_bands(path: Path) -> tuple[int, ...]:
@@ -215,56 +219,26 @@ def _first_view(dataset: Dataset) -> dict[str, str]:
     bounds = tables[0].total_bounds if tables else (0.0, 0.0, 1.0, 1.0)
     west, south, east, north = (float(value) for value in bounds)
     margin = MARGIN * max(east - west, north - south)
-    return {
-        "xmin": repr(west - margin),
-        "ymin": repr(south - margin),
-        "xmax": repr(east + margin),
-        "ymax": repr(north + margin),
-    }
+    corners = (west - margin, south - margin, east + margin, north + margin)
+    return dict(zip(("xmin", "ymin", "xmax", "ymax"), map(repr, corners), strict=True))
 
 
-def _canvas(crs: CRS, bounds: dict[str, str]) -> ET.Element:
-    root = ET.Element("mapcanvas", name="theMapCanvas", annotationsVisible="1")
-    _text(root, "units", "meters")
-    extent = ET.SubElement(root, "extent")
-    for tag, value in bounds.items():
-        _text(extent, tag, value)
-    _text(root, "rotation", "0")
-    root.append(_crs_element("destinationsrs", crs))
-    return root
-
-
-def _view_settings(crs: CRS, bounds: dict[str, str]) -> ET.Element:
-    root = ET.Element("ProjectViewSettings", UseProjectScales="0")
-    ET.SubElement(root, "Scales")
-    extent = ET.SubElement(root, "DefaultViewExtent", bounds)
-    extent.append(_crs_element("crs", crs)[0])
-    return root
-
-
-def _properties(dataset: Dataset) -> ET.Element:
-    root = ET.Element("properties")
-    reference = ET.SubElement(root, "SpatialRefSys")
-    # Without this property QGIS ignores the project's CRS in silence.
-    _text(reference, "ProjectionsEnabled", "1").set("type", "int")
-    paths = ET.SubElement(root, "Paths")
-    _text(paths, "Absolute", "false").set("type", "bool")
-    measurement = ET.SubElement(root, "Measurement")
-    _text(measurement, "DistanceUnits", "meters").set("type", "QString")
-    _text(measurement, "AreaUnits", "ha").set("type", "QString")
-    measure = ET.SubElement(root, "Measure")
-    _text(measure, "Ellipsoid", "EPSG:7030").set("type", "QString")
-    gui = ET.SubElement(root, "Gui")
-    for tag, value in (
-        ("CanvasColorRedPart", "245"),
-        ("CanvasColorGreenPart", "245"),
-        ("CanvasColorBluePart", "240"),
-    ):
-        _text(gui, tag, value).set("type", "int")
-    return root
-
-
-def _text(parent: ET.Element, tag: str, text: str) -> ET.Element:
-    element = ET.SubElement(parent, tag)
-    element.text = text
-    return element
+def _properties() -> ET.Element:
+    return node(
+        "properties",
+        # Without this property QGIS ignores the project's CRS in silence.
+        node("SpatialRefSys", node("ProjectionsEnabled", "1", type="int")),
+        node("Paths", node("Absolute", "false", type="bool")),
+        node(
+            "Measurement",
+            node("DistanceUnits", "meters", type="QString"),
+            node("AreaUnits", "ha", type="QString"),
+        ),
+        node("Measure", node("Ellipsoid", "EPSG:7030", type="QString")),
+        node(
+            "Gui",
+            node("CanvasColorRedPart", "245", type="int"),
+            node("CanvasColorGreenPart", "245", type="int"),
+            node("CanvasColorBluePart", "240", type="int"),
+        ),
+    )

@@ -6,115 +6,98 @@ symbols of QGIS do not.
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.layer_style import look_of
-from geofield.formats.qgis.looks import OBSTACLE_RULES
 from geofield.formats.qgis.symbols import Rule, SymbolLayer
+from geofield.formats.xml import node
 from geofield.schema import Layer
 
 SLD = "http://www.opengis.net/sld"
 OGC = "http://www.opengis.net/ogc"
 #: OGC's standard pixel is 0.28 mm.
 PIXEL_MM = 0.28
+_TERM = re.compile(r"\"(\w+)\" (?:= '(\w+)'|IS (NOT )?NULL)")
 
 
 def sld(layer: Layer) -> str:
     """The style of a layer as an SLD document."""
     ET.register_namespace("sld", SLD)
     ET.register_namespace("ogc", OGC)
-    root = ET.Element(f"{{{SLD}}}StyledLayerDescriptor", version="1.0.0")
-    named = _sub(root, "NamedLayer")
-    _sub(named, "Name", layer.name)
-    user = _sub(named, "UserStyle")
-    _sub(user, "Title", layer.title)
-    style = _sub(user, "FeatureTypeStyle")
-    for rule in look_of(layer).rules:
-        _add_rule(style, rule)
+    style = _sld("FeatureTypeStyle", *map(_rule, look_of(layer).rules))
+    user = _sld("UserStyle", _sld("Title", layer.title), style)
+    named = _sld("NamedLayer", _sld("Name", layer.name), user)
+    root = _sld("StyledLayerDescriptor", named, version="1.0.0")
     return ET.tostring(root, encoding="unicode", xml_declaration=True)
 
 
-def _add_rule(style: ET.Element, rule: Rule) -> None:
-    element = _sub(style, "Rule")
-    _sub(element, "Name", rule.label)
-    if rule.filter:
-        _add_filter(element, rule.label)
-    if rule.min_scale:
-        _sub(element, "MinScaleDenominator", str(rule.min_scale))
-    if rule.max_scale:
-        _sub(element, "MaxScaleDenominator", str(rule.max_scale))
-    for each in rule.layers:
-        if each.kind == "SimpleLine":
-            line = _sub(element, "LineSymbolizer")
-            _stroke(line, each.values["line_color"], each.values["line_width"], each)
-        elif each.kind == "SimpleFill":
-            polygon = _sub(element, "PolygonSymbolizer")
-            _fill(polygon, each.values["color"])
-            if float(each.values["outline_width"]):
-                _stroke(polygon, each.values["outline_color"], each.values["outline_width"])
-        elif each.kind == "SimpleMarker":
-            point = _sub(element, "PointSymbolizer")
-            graphic = _sub(point, "Graphic")
-            mark = _sub(graphic, "Mark")
-            _sub(mark, "WellKnownName", "circle")
-            _fill(mark, each.values["color"])
-            _stroke(mark, each.values["outline_color"], each.values["outline_width"])
-            _sub(graphic, "Size", f"{float(each.values['size']) / PIXEL_MM:.1f}")
+def _rule(rule: Rule) -> ET.Element:
+    scales = {"MinScaleDenominator": rule.min_scale, "MaxScaleDenominator": rule.max_scale}
+    return _sld(
+        "Rule",
+        _sld("Name", rule.label),
+        *([_filter(rule.filter)] if rule.filter else []),
+        *(_sld(tag, str(scale)) for tag, scale in scales.items() if scale),
+        *(made for each in rule.layers if (made := _symbolizer(each)) is not None),
+    )
 
 
-#: The filters of the rules by their legend: what QGIS's expressions say.
-_MISSING = {"Outline": "doubts", "Field": "doubts"}
-_PRESENT = {
-    "Outline to be checked": "doubts",
-    "Field to be checked": "doubts",
-    "Place without a plan": "error",
-}
-_CONDITIONS: dict[str, tuple[str, str]] = {
-    **{label: ("status", status) for label, status in OBSTACLE_RULES.items()},
-    "Turn": ("fits", "yes"),
-    "Turn that does not fit": ("fits", "no"),
-}
+def _symbolizer(of: SymbolLayer) -> ET.Element | None:
+    values = of.values
+    if of.kind == "SimpleLine":
+        dash = values.get("customdash", "")
+        stroke = _stroke(values["line_color"], values["line_width"], dash)
+        return _sld("LineSymbolizer", stroke)
+    if of.kind not in ("SimpleFill", "SimpleMarker"):
+        return None
+    parts = [_fill(values["color"])]
+    if of.kind == "SimpleMarker" or float(values["outline_width"]):
+        parts.append(_stroke(values["outline_color"], values["outline_width"]))
+    if of.kind == "SimpleFill":
+        return _sld("PolygonSymbolizer", *parts)
+    mark = _sld("Mark", _sld("WellKnownName", "circle"), *parts)
+    size = _sld("Size", f"{float(values['size']) / PIXEL_MM:.1f}")
+    return _sld("PointSymbolizer", _sld("Graphic", mark, size))
 
 
-def _add_filter(element: ET.Element, label: str) -> None:
-    root = ET.SubElement(element, f"{{{OGC}}}Filter")
-    column = _PRESENT.get(label) or _MISSING.get(label)
-    if column is not None:
-        if label in _PRESENT:
-            root = ET.SubElement(root, f"{{{OGC}}}Not")
-        none = ET.SubElement(root, f"{{{OGC}}}PropertyIsNull")
-        ET.SubElement(none, f"{{{OGC}}}PropertyName").text = column
-        return
-    name, value = _CONDITIONS[label]
-    element = ET.SubElement(root, f"{{{OGC}}}PropertyIsEqualTo")
-    ET.SubElement(element, f"{{{OGC}}}PropertyName").text = name
-    ET.SubElement(element, f"{{{OGC}}}Literal").text = value
+def _filter(expression: str) -> ET.Element:
+    """What the first term of a rule's QGIS expression says."""
+    term = _TERM.match(expression)
+    if term is None:
+        raise ValueError(f"no filter of SLD: {expression}")
+    column, value, present = term.groups()
+    name = _ogc("PropertyName", column)
+    if value is not None:
+        return _ogc("Filter", _ogc("PropertyIsEqualTo", name, _ogc("Literal", value)))
+    test = _ogc("PropertyIsNull", name)
+    return _ogc("Filter", _ogc("Not", test) if present else test)
 
 
-def _colour(rgba: str) -> tuple[str, str]:
+def _fill(rgba: str) -> ET.Element:
+    return _css("Fill", **_colour("fill", rgba))
+
+
+def _stroke(rgba: str, width_mm: str, dash_mm: str = "") -> ET.Element:
+    values = _colour("stroke", rgba) | {"stroke-width": f"{float(width_mm) / PIXEL_MM:.1f}"}
+    if dash_mm:
+        dash = [float(part) / PIXEL_MM for part in dash_mm.split(";")]
+        values["stroke-dasharray"] = " ".join(f"{d:.1f}" for d in dash)
+    return _css("Stroke", **values)
+
+
+def _colour(name: str, rgba: str) -> dict[str, str]:
     r, g, b, a = (int(part) for part in rgba.split(","))
-    return f"#{r:02x}{g:02x}{b:02x}", f"{a / 255:.2f}"
+    return {name: f"#{r:02x}{g:02x}{b:02x}", f"{name}-opacity": f"{a / 255:.2f}"}
 
 
-def _fill(parent: ET.Element, rgba: str) -> None:
-    colour, opacity = _colour(rgba)
-    fill = _sub(parent, "Fill")
-    _sub(fill, "CssParameter", colour, name="fill")
-    _sub(fill, "CssParameter", opacity, name="fill-opacity")
+def _css(tag: str, **values: str) -> ET.Element:
+    return _sld(tag, *(_sld("CssParameter", text, name=name) for name, text in values.items()))
 
 
-def _stroke(parent: ET.Element, rgba: str, width_mm: str, layer: SymbolLayer | None = None) -> None:
-    colour, opacity = _colour(rgba)
-    stroke = _sub(parent, "Stroke")
-    _sub(stroke, "CssParameter", colour, name="stroke")
-    _sub(stroke, "CssParameter", opacity, name="stroke-opacity")
-    _sub(stroke, "CssParameter", f"{float(width_mm) / PIXEL_MM:.1f}", name="stroke-width")
-    if layer is not None and "customdash" in layer.values:
-        dash = [float(part) / PIXEL_MM for part in layer.values["customdash"].split(";")]
-        _sub(stroke, "CssParameter", " ".join(f"{d:.1f}" for d in dash), name="stroke-dasharray")
+def _sld(tag: str, *inside: ET.Element | str, **attributes: str) -> ET.Element:
+    return node(f"{{{SLD}}}{tag}", *inside, **attributes)
 
 
-def _sub(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
-    element = ET.SubElement(parent, f"{{{SLD}}}{tag}", attributes)
-    element.text = text
-    return element
+def _ogc(tag: str, *inside: ET.Element | str) -> ET.Element:
+    return node(f"{{{OGC}}}{tag}", *inside)

@@ -6,16 +6,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
+from geofield.formats.xml import node
+
 #: The version that the XML is written for; later ones read it.
 QGIS_VERSION = "3.22.0-Białowieża"
 
 
+def document(root: ET.Element) -> str:
+    """A QML file or project as text."""
+    return (
+        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
+        f"{ET.tostring(root, encoding='unicode')}\n"
+    )
+
+
 def option_map(values: dict[str, str]) -> ET.Element:
     """The property list of a symbol layer."""
-    root = ET.Element("Option", type="Map")
-    for name, value in values.items():
-        ET.SubElement(root, "Option", type="QString", name=name, value=value)
-    return root
+    options = (
+        node("Option", type="QString", name=name, value=value) for name, value in values.items()
+    )
+    return node("Option", *options, type="Map")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +39,14 @@ class SymbolLayer:
 
 def symbol(kind: str, name: str, layers: Sequence[SymbolLayer]) -> ET.Element:
     """A symbol of type ``fill``, ``line`` or ``marker``."""
-    root = ET.Element("symbol", type=kind, name=name, alpha="1", clip_to_extent="1", force_rhr="0")
+    root = node("symbol", type=kind, name=name, alpha="1", clip_to_extent="1", force_rhr="0")
     for position, each in enumerate(layers):
-        layer = ET.SubElement(
-            root, "layer", {"class": each.kind, "enabled": "1", "locked": "0", "pass": "0"}
-        )
-        layer.append(option_map(each.values))
+        attributes = {"class": each.kind, "enabled": "1", "locked": "0", "pass": "0"}
+        layer = node("layer", attributes, option_map(each.values))
         if each.marker is not None:
             sub = "line" if each.kind == "GeometryGenerator" else "marker"
             layer.append(symbol(sub, f"@{name}@{position}", [each.marker]))
+        root.append(layer)
     return root
 
 
@@ -146,18 +155,24 @@ class Rule:
 
 def rule_renderer(rules: Sequence[Rule], prefix: str) -> ET.Element:
     """The renderer of a layer."""
-    root = ET.Element(
-        "renderer-v2", type="RuleRenderer", symbollevels="0", enableorderby="0", forceraster="0"
-    )
-    tree = ET.SubElement(root, "rules", key=f"{{{prefix}}}")
-    symbols = ET.SubElement(root, "symbols")
-    for number, rule in enumerate(rules):
-        attributes = {"key": f"{{{prefix}-{number}}}", "symbol": str(number), "label": rule.label}
-        ET.SubElement(
-            tree, "rule", attributes | _limits(rule.filter, rule.min_scale, rule.max_scale)
+    named = [
+        node(
+            "rule",
+            {"key": f"{{{prefix}-{number}}}", "symbol": str(number), "label": rule.label},
+            _limits(rule),
         )
-        symbols.append(symbol(rule.kind, str(number), rule.layers))
-    return root
+        for number, rule in enumerate(rules)
+    ]
+    symbols = [symbol(rule.kind, str(number), rule.layers) for number, rule in enumerate(rules)]
+    return node(
+        "renderer-v2",
+        node("rules", *named, key=f"{{{prefix}}}"),
+        node("symbols", *symbols),
+        type="RuleRenderer",
+        symbollevels="0",
+        enableorderby="0",
+        forceraster="0",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,59 +207,63 @@ class Label:
 
 def rule_labels(labels: Sequence[Label], prefix: str) -> ET.Element:
     """The labels of a layer."""
-    root = ET.Element("labeling", type="rule-based")
-    tree = ET.SubElement(root, "rules", key=f"{{{prefix}-labels}}")
-    for number, label in enumerate(labels):
-        rule = ET.SubElement(
-            tree,
+    rules = (
+        node(
             "rule",
-            {"key": f"{{{prefix}-label-{number}}}", "active": "1"}
-            | _limits(label.filter, label.min_scale, label.max_scale),
+            {"key": f"{{{prefix}-label-{number}}}", "active": "1"},
+            _limits(label),
+            _label_settings(label),
         )
-        settings = ET.SubElement(rule, "settings", calloutType="simple")
-        text = ET.SubElement(
-            settings,
-            "text-style",
-            fieldName=label.expression,
-            isExpression="1",
-            fontFamily="Sans Serif",
-            fontSize=f"{label.size_pt:g}",
-            fontSizeUnit="Point",
-            fontWeight="75",
-            namedStyle="Bold",
-            textColor=label.colour,
-            textOpacity="1",
-        )
-        ET.SubElement(
-            text,
-            "text-buffer",
-            bufferDraw="1",
-            bufferSize="0.7",
-            bufferSizeUnits="MM",
-            bufferColor=label.halo,
-            bufferOpacity="1",
-        )
-        placement = {"placement": "1", "centroidWhole": "1"}
-        # QGIS counts the places around a point from the top left: 1 is above, 4 on it.
-        placement |= {"quadOffset": "1" if label.above else "4", "yOffset": "0"}
-        if label.above:
-            placement |= {"yOffset": "-2.5", "offsetUnits": "MM"}
-        if label.geometry:
-            placement |= {
-                "geometryGenerator": label.geometry,
-                "geometryGeneratorEnabled": "1",
-                "geometryGeneratorType": "PointGeometry",
-                "layerType": "PointGeometry",
-            }
-        ET.SubElement(settings, "placement", placement)
-        ET.SubElement(settings, "rendering", drawLabels="1", obstacle="0", zIndex="0")
-    return root
+        for number, label in enumerate(labels)
+    )
+    tree = node("rules", *rules, key=f"{{{prefix}-labels}}")
+    return node("labeling", tree, type="rule-based")
 
 
-def _limits(expression: str, min_scale: int, max_scale: int) -> dict[str, str]:
-    limits = {"filter": expression} if expression else {}
-    if min_scale:
-        limits["scalemindenom"] = str(min_scale)
-    if max_scale:
-        limits["scalemaxdenom"] = str(max_scale)
-    return limits
+def _label_settings(label: Label) -> ET.Element:
+    placement = {"placement": "1", "centroidWhole": "1"}
+    # QGIS counts the places around a point from the top left: 1 is above, 4 on it.
+    placement |= {"quadOffset": "1" if label.above else "4", "yOffset": "0"}
+    if label.above:
+        placement |= {"yOffset": "-2.5", "offsetUnits": "MM"}
+    if label.geometry:
+        placement |= {
+            "geometryGenerator": label.geometry,
+            "geometryGeneratorEnabled": "1",
+            "geometryGeneratorType": "PointGeometry",
+            "layerType": "PointGeometry",
+        }
+    halo = node(
+        "text-buffer",
+        bufferDraw="1",
+        bufferSize="0.7",
+        bufferSizeUnits="MM",
+        bufferColor=label.halo,
+        bufferOpacity="1",
+    )
+    text = node(
+        "text-style",
+        halo,
+        fieldName=label.expression,
+        isExpression="1",
+        fontFamily="Sans Serif",
+        fontSize=f"{label.size_pt:g}",
+        fontSizeUnit="Point",
+        fontWeight="75",
+        namedStyle="Bold",
+        textColor=label.colour,
+        textOpacity="1",
+    )
+    return node(
+        "settings",
+        text,
+        node("placement", placement),
+        node("rendering", drawLabels="1", obstacle="0", zIndex="0"),
+        calloutType="simple",
+    )
+
+
+def _limits(of: Rule | Label) -> dict[str, str]:
+    scales = {"scalemindenom": of.min_scale, "scalemaxdenom": of.max_scale}
+    limits = {"filter": of.filter} if of.filter else {}
+    return limits | {name: str(scale) for name, scale in scales.items() if scale}
