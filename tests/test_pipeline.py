@@ -17,6 +17,7 @@ import geofield as gf
 from geofield.errors import FieldError, OutputExistsError, TrackError
 from geofield.model.evidence import Evidence
 from geofield.model.review import reconcile
+from geofield.model.written import Written
 from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.settings import Settings, load_settings
@@ -215,6 +216,22 @@ def test_incomplete_rows_become_added_obstacles(plan: Plan) -> None:
     assert done["obstacle_no"].notna().all()
     assert done["status"].isin(["detected", "possible", "added"]).all()
     assert (done["status"] == "added").sum() == 3
+
+
+@pytest.mark.parametrize("recorded", [None, float("nan")])  # NaN: as earlier versions wrote it
+def test_an_obstacle_without_a_kind_is_no_edit(plan: Plan, recorded: float | None) -> None:
+    assert plan.obstacles is not None
+    table = plan.obstacles.copy()
+    table["kind"] = table["kind"].astype(object)
+    table.loc[0, "kind"] = None
+    table["status"] = "detected"
+    done, written = reconcile(table)
+    said = json.loads(json.dumps(written.to_json(), allow_nan=False))
+    assert said["rows"][0][1] is None
+    said["rows"][0][1] = recorded
+    again, written = reconcile(done, Written.from_json(said))
+    assert set(again["status"]) == {"detected"}
+    assert not any(row.kept for row in written.rows)
 
 
 def test_products_of_a_run(plan: Plan, tmp_path: Path) -> None:

@@ -11,19 +11,15 @@ from typing import Any
 def late_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     """What a package gives as its ``__getattr__`` (PEP 562).
 
-    Parameters
-    ----------
-    package : str
-        Its ``__name__``.
-    homes : mapping
-        The module of each name, as seen from the package.
+    `package` is its ``__name__``, `homes` the names in each module as seen from the package.
     """
+    home = {name: module for module, names in homes.items() for name in names.split()}
 
     def get(name: str) -> Any:
-        if name not in homes:
+        if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         # Kept, so that a submodule of the same name never stands before it.
-        value = getattr(import_module(f".{homes[name]}", package), name)
+        value = getattr(import_module(f".{home[name]}", package), name)
         setattr(sys.modules[package], name, value)
         return value
 

@@ -404,7 +404,7 @@ def test_parcels_that_overlap_are_told(tmp_path: Path) -> None:
 
 
 def test_two_runs_do_not_write_into_one_farm(tmp_path: Path) -> None:
-    from geofield.claims import claimed
+    from geofield.staging import claimed
 
     places = parcels(tmp_path / "p.gpkg", 4)
     with claimed(tmp_path / "farm"):

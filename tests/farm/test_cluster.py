@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import shapely
 
+import geofield as gf
 from geofield.farm import read_farm
 
 BIN = Path(sys.executable).parent
@@ -151,18 +152,93 @@ def test_a_farm_stays_whole_where_nobody_can_do_the_work(tmp_path: Path) -> None
     assert len(read_farm(farm)) == 4
 
 
-def test_workers_of_this_machine_keep_their_memory() -> None:
-    script = (
-        "import os\n"
-        "from geofield.farm.cluster import Cluster\n"
-        "if __name__ == '__main__':\n"
-        "    own = Cluster.here(1)\n"
-        "    print(own._client.run(os.getenv, 'MALLOC_TRIM_THRESHOLD_'))\n"
-        "    print(own._client.run(os.getenv, 'OMP_NUM_THREADS'))\n"
-        "    own.close()\n"
+#: A stop that comes when the first of the workers is begun.
+STOPPED_MAKING = """
+import os, signal, sys
+from distributed import Nanny
+make = Nanny.__init__
+def stopped(self, *args, **given):
+    make(self, *args, **given)
+    os.kill(os.getpid(), signal.SIGTERM)
+Nanny.__init__ = stopped
+from geofield.cli import main
+if __name__ == "__main__":
+    main(["batch", *sys.argv[1:]])
+"""
+
+
+def test_a_stop_while_a_cluster_is_made(tmp_path: Path) -> None:
+    words = [str(parcels(tmp_path / "p.gpkg", 4)), "--workers", "2", "--out", "farm"]
+    line = [sys.executable, "-c", STOPPED_MAKING, *words]
+    done = subprocess.run(
+        line, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False
     )
+    assert done.returncode == 1, done.stderr
+    said = [each for each in done.stderr.splitlines() if each]
+    assert said == ["Places     4 of p.gpkg", "Stopped; nothing half-written is left."]
+
+
+#: What Dask says when a connection ends.
+SAID = ("import logging", "said = logging.getLogger('distributed.batched').info")
+
+
+def with_a_cluster(made: str, *lines: str) -> subprocess.CompletedProcess[str]:
+    """A process that makes a cluster, `own`, and runs these lines."""
+    head = "from geofield.farm.cluster import Cluster, Store\nif __name__ == '__main__':"
+    script = "\n    ".join((head, f"own = {made}", *lines))
     line = [sys.executable, "-c", script]
-    done = subprocess.run(line, capture_output=True, text=True, timeout=100, check=True)
+    return subprocess.run(line, capture_output=True, text=True, timeout=100, check=True)
+
+
+def test_workers_of_this_machine_keep_their_memory() -> None:
+    done = with_a_cluster(
+        "Cluster.here(1)",
+        "import os",
+        "print(own._client.run(os.getenv, 'MALLOC_TRIM_THRESHOLD_'))",
+        "print(own._client.run(os.getenv, 'OMP_NUM_THREADS'))",
+        "own.close()",
+    )
     trim, threads = (text.rpartition(": ")[2] for text in done.stdout.splitlines())
     # With the limit that Dask sets, pictures take a third longer.
     assert (trim, threads) == ("None}", "'1'}")
+
+
+def test_the_end_of_our_own_cluster_is_not_talked_of() -> None:
+    done = with_a_cluster(
+        "Cluster.here(1)",
+        *SAID,
+        "end = own._own[-1].close",
+        "own._own[-1].close = lambda **given: (end(**given), said('a comm is closed'))",
+        "own.close()",
+        "said('a cluster of somebody else')",
+    )
+    assert "a comm is closed" not in done.stderr
+    assert "a cluster of somebody else" in done.stderr
+
+
+def test_a_given_cluster_is_told_of_in_our_words(daskers: Daskers, tmp_path: Path) -> None:
+    daskers.hire()
+    done = with_a_cluster(
+        f"Cluster.at({daskers.address!r}, Store({str(tmp_path)!r}))",
+        *SAID,
+        "said('a comm is closed')",
+        "own.close()",
+        "said('a cluster of somebody else')",
+    )
+    assert "a comm is closed" not in done.stderr
+    assert "a cluster of somebody else" in done.stderr
+
+
+def test_plans_of_a_cluster_are_those_of_this_process(tmp_path: Path) -> None:
+    from distributed import Client
+
+    # More than are in the scheduler at a time.
+    places = parcels(tmp_path / "parcels.gpkg", 11)
+    with Client(
+        processes=False, protocol="tcp", host="127.0.0.1", n_workers=1, threads_per_worker=1,
+        dashboard_address="127.0.0.1:0", set_as_default=False,
+    ) as client:  # fmt: skip
+        there = list(gf.plan_fields(places, spacing_m=10, client=client))
+    here = {plan.field.field_id: plan for plan in gf.plan_fields(places, spacing_m=10)}
+    assert len(there) == len(here) == 11
+    assert all(plan == here[plan.field.field_id] for plan in there)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -42,26 +43,59 @@ main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])
 """
 
 
-@pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
-def test_a_stop_in_a_destructor(kind: str, tmp_path: object) -> None:
+#: A bare `except` of a library.
+PASSED_OVER = """
+import signal, sys, time
+import geofield.formats
+from geofield.cli import main
+def read(*_, **__):
+    for _ in range(2):
+        try:
+            signal.raise_signal(getattr(signal, sys.argv[1]))
+        except:
+            pass
+    try:
+        time.sleep(20)
+    finally:
+        time.sleep(0.5)
+        print("cleaned up")
+geofield.formats.read_dataset = read
+main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])
+"""
+
+
+def ended(*words: str, folder: Path) -> tuple[int, str, str]:
+    """Exit code and what was said of a Python that was told in these words what to do."""
     done = subprocess.run(
-        [sys.executable, "-c", DESTRUCTOR, kind, f"{tmp_path}/out"],
+        [sys.executable, *words, "out"],
+        cwd=folder,
         capture_output=True,
         text=True,
         check=False,
         timeout=15,
     )
-    assert (done.returncode, done.stderr.strip()) == (1, STOPPED)
+    return done.returncode, done.stderr.strip(), done.stdout.strip()
+
+
+@pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
+def test_a_stop_that_is_passed_over(kind: str, tmp_path: Path) -> None:
+    assert ended("-c", PASSED_OVER, kind, folder=tmp_path) == (1, STOPPED, "cleaned up")
+
+
+@pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
+def test_a_stop_while_a_dataclass_is_made(kind: str, tmp_path: Path) -> None:
+    in_text = PASSED_OVER.replace("time.sleep(20)", 'exec("import time; time.sleep(20)")')
+    (tmp_path / "as_module.py").write_text(in_text)
+    assert ended("-m", "as_module", kind, folder=tmp_path) == (1, STOPPED, "cleaned up")
+
+
+@pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
+def test_a_stop_in_a_destructor(kind: str, tmp_path: Path) -> None:
+    assert ended("-c", DESTRUCTOR, kind, folder=tmp_path) == (1, STOPPED, "")
 
 
 @pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
 @pytest.mark.parametrize("error", ["RuntimeError", "FormatError"])
-def test_a_stop_in_a_call_back(kind: str, error: str, tmp_path: object) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", CODE.format(error=error), kind, f"{tmp_path}/out"],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert (done.returncode, done.stderr.strip()) == (1, STOPPED)
+def test_a_stop_in_a_call_back(kind: str, error: str, tmp_path: Path) -> None:
+    code = CODE.format(error=error)
+    assert ended("-c", code, kind, folder=tmp_path) == (1, STOPPED, "")

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.claiming import claim_folder
 from geofield.cli.console import echo_json, progress_bar, say, say_note
+from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
-from geofield.cli.options import acknowledge_option, section_values, stage_options
+from geofield.cli.options import acknowledge_option, stage_options
 from geofield.cli.place_options import place_options, places_of
 from geofield.errors import FieldError, GeofieldError
 
@@ -33,7 +33,7 @@ Examples (on the project's own sample):
   geofield batch places.parquet ortho/ --scheduler tcp://10.0.0.5:8786 --out s3://bucket/farm
 """,
 )
-@click.argument("places", metavar="PLACES", type=click.Path(path_type=Path))
+@click.argument("places", metavar="PLACES", type=PATH)
 @click.argument("imagery", required=False)
 @click.option(
     "--out",
@@ -51,7 +51,7 @@ Examples (on the project's own sample):
 @click.option(
     "--obstacles",
     "obstacle_file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=OLD_FILE,
     help="File of what to avoid: polygons, points with a radius_m, lines.",
 )
 @click.option(
@@ -100,7 +100,7 @@ def batch(
     memory_limit_mb: float,
     acknowledge_terms: bool,
     as_json: bool,
-    settings_file: str | None,
+    settings: Settings,
     **options: Any,
 ) -> None:
     """Plan many fields into one farm.
@@ -113,10 +113,6 @@ def batch(
     What a person edited in the farm's overview (farm.gpkg) is taken in first and kept.
     Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    settings = load_settings(settings_file, section_values(options))
     from geofield.farm.edits import put_edits
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
@@ -133,11 +129,7 @@ def batch(
             f"{places.name} holds points, and a point alone has no outline.",
             hint="Name the IMAGERY behind PLACES, or give parcels (polygons).",
         )
-    pictures, about = (
-        (None, {})
-        if imagery is None
-        else _imagery(imagery, settings, found, acknowledged=acknowledge_terms)
-    )
+    pictures, about = _imagery(imagery, settings, found, acknowledged=acknowledge_terms)
     job = Job(settings, pictures, None if obstacle_file is None else obstacle_file.absolute(),
               options.get("places_crs"))  # fmt: skip
     store = Store.of(out)
@@ -169,9 +161,11 @@ def batch(
 
 
 def _imagery(
-    what: str, settings: Settings, places: Places, *, acknowledged: bool
-) -> tuple[Imagery, dict[str, Any]]:
+    what: str | None, settings: Settings, places: Places, *, acknowledged: bool
+) -> tuple[Imagery | None, dict[str, Any]]:
     """Where pictures come from, and what the record says of it; terms are checked here, once."""
+    if what is None:
+        return None, {}
     from dataclasses import replace
 
     import numpy as np
@@ -208,23 +202,17 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
     from geofield.farm.pool import Pool, cores
 
     engine: Engine
-    if scheduler is not None:
-        if not _has_dask():
-            raise GeofieldError(
-                "A Dask cluster needs the extra: pip install geofield[batch]",
-                hint="Without it, --workers N uses this machine.",
-            )
+    if _has_dask():
         from geofield.farm.cluster import Cluster
 
-        engine = Cluster.at(scheduler, store)
+        engine = Cluster.at(scheduler, store) if scheduler else Cluster.here(workers or cores())
+    elif scheduler is None:
+        engine = Pool(workers or cores())
     else:
-        count = workers or cores()
-        if _has_dask():
-            from geofield.farm.cluster import Cluster
-
-            engine = Cluster.here(count)
-        else:
-            engine = Pool(count)
+        raise GeofieldError(
+            "A Dask cluster needs the extra: pip install geofield[batch]",
+            hint="Without it, --workers N uses this machine.",
+        )
     say(f"Workers    {engine.where}")
     return engine
 

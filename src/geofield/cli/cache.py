@@ -9,13 +9,11 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import FOLDER
 from geofield.cli.options import settings_option
+from geofield.settings import Settings
 
-_folder = click.option(
-    "--cache-dir",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of the tile caches.",
-)
+_folder = click.option("--cache-dir", type=FOLDER, help="Folder of the tile caches.")
 
 
 @click.group(
@@ -41,13 +39,12 @@ Example:
 @_folder
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON on stdout.")
 @settings_option
-def info(cache_dir: Path | None, as_json: bool, settings_file: str | None) -> None:
+def info(cache_dir: Path | None, as_json: bool, settings: Settings) -> None:
     """Say what is kept: sources, tiles, megabytes, dates."""
     from geofield.cli.imagery_tools import cache_dir_of
     from geofield.imagery.cache import cache_infos
-    from geofield.settings import load_settings
 
-    folder = cache_dir_of(load_settings(settings_file), cache_dir)
+    folder = cache_dir_of(settings, cache_dir)
     rows: list[dict[str, Any]] = [
         {
             "source": each.source,
@@ -85,27 +82,24 @@ Example:
 @_folder
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @settings_option
-def clear(source: str | None, cache_dir: Path | None, yes: bool, settings_file: str | None) -> None:
+def clear(source: str | None, cache_dir: Path | None, yes: bool, settings: Settings) -> None:
     """Delete the tiles of SOURCE, or of all sources."""
     from geofield.cli.imagery_tools import cache_dir_of
     from geofield.errors import ImageryError
     from geofield.imagery.cache import cache_infos, clear_cache
-    from geofield.settings import load_settings
 
-    folder = cache_dir_of(load_settings(settings_file), cache_dir)
+    folder = cache_dir_of(settings, cache_dir)
     names = [each.source for each in cache_infos(folder)]
-    if source is not None and not any(
-        source in (each.source, each.path.stem, each.path.name) for each in cache_infos(folder)
-    ):
-        raise ImageryError(
-            f"The tile cache holds nothing of {source!r}.",
-            hint=f"It holds: {', '.join(names) or 'nothing'}.",
-        )
     if source is None and names and not yes:
         click.confirm(
             f"Delete the tiles of {len(names)} sources in {folder}?", abort=True, err=True
         )
     gone = clear_cache(folder, source)
+    if source is not None and not gone:
+        raise ImageryError(
+            f"The tile cache holds nothing of {source!r}.",
+            hint=f"It holds: {', '.join(names) or 'nothing'}.",
+        )
     say(f"Deleted {len(gone)} file{'s' if len(gone) != 1 else ''} in {folder}.")
 
 

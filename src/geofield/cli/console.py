@@ -7,30 +7,24 @@ or, at the end, ``{"error": {"message": "...", "hint": "..."}}``. Other lines ar
 
 from __future__ import annotations
 
-import atexit
 import json
 import logging
-import math
 import os
-import signal
 import stat
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
+from geofield.cli.stops import stop_main
+
 #: Called with (done, total, what), and facts for programs by name.
 Progress = Callable[..., None]
 
 _PROGRAM_WATCHES = False
-#: When this command was asked to stop, seconds.
-_STOPS: list[float] = []
-#: Programs say a stop in two ways at once, as they may not know which one is heard.
-_SAME_STOP_S = 1.0
 _LOG = logging.getLogger("geofield.cli")
 _LOG.addHandler(logging.NullHandler())
 
@@ -40,10 +34,10 @@ def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, default=str))
 
 
-def say(message: str) -> None:
-    """A line for the person, on stderr."""
+def say(message: str, **style: Any) -> None:
+    """A line for the person, on stderr; `style` is click's, as in ``fg="yellow"``."""
     _LOG.info(message)
-    click.echo(message, err=True)
+    click.secho(message, err=True, **style)
 
 
 def say_note(message: str) -> None:
@@ -80,60 +74,6 @@ def progress_option() -> click.Option:
     )
 
 
-def stop_cleanly() -> None:
-    """Let SIGTERM end the work as Ctrl+C does: files half written are taken away first."""
-    if threading.current_thread() is threading.main_thread():
-        _STOPS.clear()
-        for kind in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(kind, _stop)
-        atexit.register(_stop_no_more)
-
-
-def _stop(*_: Any) -> None:
-    now_s = time.monotonic()
-    if _STOPS and now_s - _STOPS[-1] < _SAME_STOP_S:
-        return  # said twice; what it leaves is being taken away
-    _STOPS.append(now_s)
-    sys.unraisablehook = _stop_again
-    sys.excepthook = _say_no_stop
-    raise KeyboardInterrupt
-
-
-def _say_no_stop(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-    """A library's C code that is loaded while a stop comes prints it, then fails to load."""
-    if not issubclass(kind, KeyboardInterrupt):
-        sys.__excepthook__(kind, error, trace)
-
-
-def _stop_again(unheard: Any) -> None:
-    """A stop that came where Python passes over it, as in a destructor, comes once more."""
-    if not issubclass(unheard.exc_type, KeyboardInterrupt):
-        return
-    _STOPS.append(-math.inf)
-    again = threading.Timer(0.05, _interrupt)
-    again.daemon = True
-    again.start()
-
-
-def was_stopped() -> bool:
-    """Whether a stop came: a library that was calling back may have made another error of it."""
-    return bool(_STOPS)
-
-
-def _interrupt() -> None:
-    """Ctrl+C for the main thread itself, so that it also wakes from waiting for a server."""
-    if hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-    else:
-        signal.raise_signal(signal.SIGINT)
-
-
-def _stop_no_more() -> None:
-    """All is written and said, only Python itself is taken down: there is nothing to stop."""
-    for kind in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(kind, signal.SIG_IGN)
-
-
 def _choose_progress(context: click.Context, _: click.Parameter, value: str) -> None:
     global _PROGRAM_WATCHES  # noqa: PLW0603 - one process runs one command
     _PROGRAM_WATCHES = value == "json"
@@ -153,13 +93,13 @@ def _watch_stdin() -> None:
     def wait() -> None:
         while os.read(0, 4096):
             pass
-        _interrupt()
+        stop_main()
 
     threading.Thread(target=wait, name="stdin", daemon=True).start()
 
 
 def _tell(value: Mapping[str, Any]) -> None:
-    print(json.dumps(value, ensure_ascii=False, default=str), file=sys.stderr, flush=True)  # noqa: T201
+    click.echo(json.dumps(value, ensure_ascii=False, default=str), err=True)
 
 
 @contextmanager

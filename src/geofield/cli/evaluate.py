@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import FILE, OLD_FILE
 from geofield.errors import ObstacleError
-
-if TYPE_CHECKING:
-    from geofield.evaluation import Driving
 
 
 @click.command(
@@ -20,8 +18,8 @@ Example (on the project's own sample):
   geofield evaluate detected.gpkg truth.gpkg --distance 6 --draw hits.png --scene scene.tif
 """
 )
-@click.argument("detected", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.argument("truth", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("detected", type=OLD_FILE)
+@click.argument("truth", type=OLD_FILE)
 @click.option(
     "--distance",
     "distance_m",
@@ -39,17 +37,9 @@ Example (on the project's own sample):
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
 @click.option(
-    "--draw",
-    "picture",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="PNG to write: hits, misses and false detections.",
+    "--draw", "picture", type=FILE, help="PNG to write: hits, misses and false detections."
 )
-@click.option(
-    "--scene",
-    "scene_file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Picture to draw them on.",
-)
+@click.option("--scene", "scene_file", type=OLD_FILE, help="Picture to draw them on.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 def evaluate(
     detected: Path,
@@ -103,15 +93,11 @@ def evaluate(
         unit = " m" if name == "radius_bias" else ""
         label = name.replace("_", " ")
         say(f"  {label:12s} {getattr(score, name):6.3f}{unit}  ({low:.3f} to {high:.3f})")
-    if result.driving is not None:
-        say_driving(result.driving)
-
-
-def say_driving(lost: Driving) -> None:
-    """Print what a driver loses."""
-    say(
-        f"{lost.driven_through} of {lost.things} true obstacles are driven through, "
-        f"{lost.driven_through_m:.0f} of {lost.driven_m:.0f} m of track"
-    )
-    say(f"  ground lost      {lost.share_lost:6.1%}  ({lost.lost_m2:.0f} square metres)")
-    say(f"  expected unseen  {lost.expected_unseen_per_ha:6.2f} per hectare")
+    lost = result.driving
+    if lost is not None:
+        say(
+            f"{lost.driven_through} of {lost.things} true obstacles are driven through, "
+            f"{lost.driven_through_m:.0f} of {lost.driven_m:.0f} m of track"
+        )
+        say(f"  ground lost      {lost.share_lost:6.1%}  ({lost.lost_m2:.0f} square metres)")
+        say(f"  expected unseen  {lost.expected_unseen_per_ha:6.2f} per hectare")

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import FOLDER, PATH, claim_folder
 
 
 @click.command(
@@ -22,19 +23,11 @@ Examples:
 `geofield formats` lists the formats and what each can carry.
 """
 )
-@click.argument(
-    "plan_files", metavar="PLAN...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
+@click.argument("plan_files", metavar="PLAN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "-f", "--format", "formats", multiple=True, required=True, help="Format; may be repeated."
 )
-@click.option(
-    "--out",
-    "folder",
-    required=True,
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the products.",
-)
+@click.option("--out", "folder", required=True, type=FOLDER, help="Folder for the products.")
 @click.option("--stem", default="field", show_default=True, help="Name of single files.")
 @click.option("--crs", help="CRS of PLAN where the file does not say it, e.g. EPSG:32633.")
 @click.option("--customer", help="Customer's name, for terminals.")
@@ -75,7 +68,6 @@ def export(
     Columns "customer" and "farm" of the field say whose it is. All products come into place
     together or not at all; what a format cannot carry is said once.
     """
-    from geofield.cli.claiming import claim_folder
     from geofield.farm import is_farm, read_farm
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option

@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say
+from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option
+from geofield.wording import nearest
 
 
 @click.group(
@@ -29,7 +31,7 @@ Example:
 )
 @click.argument("folder", metavar="FARM")
 @click.argument("field_id", metavar="ID")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="GeoPackage.")
+@output_option("GeoPackage.", PATH)
 @click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
 def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     """Write the plan of field ID of FARM as a GeoPackage, for QGIS and `geofield review`."""
@@ -39,12 +41,8 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
 
     whole = read_farm(folder)
     if field_id not in whole:
-        import difflib
-
-        close = difflib.get_close_matches(field_id, whole.ids, n=1)
         raise FormatError(
-            f"{folder} has no plan of a field {field_id!r}."
-            + (f" Did you mean {close[0]!r}?" if close else ""),
+            f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
             hint="Its status table tells what became of each place.",
         )
     save_plan(whole[field_id], output, overwrite=overwrite)
@@ -58,7 +56,7 @@ Example:
   geofield farm put farm/farm.gpkg farm/
 """
 )
-@click.argument("plan_file", metavar="PLAN", type=click.Path(exists=True, path_type=Path))
+@click.argument("plan_file", metavar="PLAN", type=OLD_PATH)
 @click.argument("folder", metavar="FARM")
 def put(plan_file: Path, folder: str) -> None:
     """Put the reviewed PLAN of one field back into FARM, or all fields edited in its farm.gpkg.
@@ -66,7 +64,6 @@ def put(plan_file: Path, folder: str) -> None:
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
     what a person said.
     """
-    from geofield.cli.claiming import claim_folder
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
     from geofield.farm.overview import OVERVIEW

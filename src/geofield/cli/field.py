@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.files import FILE, FOLDER, claim_file
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import name_option, point_options, section_values, stage_options
+from geofield.cli.options import name_option, point_options, stage_options
 from geofield.cli.parcels import boundary_options, own_parcel
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.model import Field, Scene
+    from geofield.plan import Plan
     from geofield.settings import Settings
 
 
@@ -36,7 +38,7 @@ Examples (on the project's own sample):
 @click.option(
     "-o",
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     help="GeoPackage to write; an outline that a person drew in it is kept.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace the output where it exists.")
@@ -56,7 +58,7 @@ Examples (on the project's own sample):
 )
 @click.option(
     "--pictures",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Folder for the study's pictures: grey, binary, numbered regions, reconstruction.",
 )
 @click.option(
@@ -90,21 +92,18 @@ def field(
     boundary_layer: str | None,
     boundary_name: str | None,
     as_json: bool,
-    settings_file: str | None,
-    **options: Any,
+    settings: Settings,
 ) -> None:
     """Find the outline of the field around a point.
 
     IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline
     touches the window's edge, the window grows as far as the picture reaches.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    settings = load_settings(settings_file, section_values(options))
-    from geofield.cli.claiming import claim_file
     from geofield.cli.imagery_tools import as_picture
-    from geofield.pipeline import open_scene
+    from geofield.errors import OutputExistsError
+    from geofield.pipeline import open_scene, run_field
+    from geofield.plan import read_plan
+    from geofield.plan_files import save_plan
 
     if boundary is not None and (regions or list_regions or choose):
         raise click.UsageError(
@@ -112,8 +111,17 @@ def field(
         )
     if not list_regions and output is None:
         raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
+    previous = None
     if output is not None:
         claim_file(output)
+        if output.is_file():
+            if not overwrite:
+                raise OutputExistsError(
+                    f"{output} is there already.",
+                    hint="Choose another name, or --overwrite: an outline drawn by hand is then "
+                    "kept.",
+                )
+            previous = None if fresh else read_plan(output)
     with (
         progress_bar(quiet=as_json) as progress,
         as_picture(imagery, settings, lat=lat, lon=lon, progress=progress) as picture,
@@ -121,87 +129,42 @@ def field(
         if list_regions or regions or pictures is not None:
             scene = open_scene(picture, lat, lon, settings)
             _study(scene, lat, lon, regions, pictures, tell=list_regions, as_json=as_json)
-        if output is not None:
-            _extract(
-                picture,
-                lat,
-                lon,
-                settings,
-                output,
-                overwrite=overwrite,
-                fresh=fresh,
-                regions=regions,
-                choose=choose,
-                name=name,
-                tell=alternatives,
-                parcel=None
-                if boundary is None
-                else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
-                as_json=as_json,
-            )
-
-
-def _extract(
-    picture: str,
-    lat: float,
-    lon: float,
-    settings: Settings,
-    output: Path,
-    *,
-    overwrite: bool,
-    fresh: bool,
-    regions: tuple[int, ...],
-    choose: int | None,
-    name: str | None,
-    tell: bool,
-    parcel: Field | None,
-    as_json: bool,
-) -> None:
-    from geofield.pipeline import run_field
-    from geofield.plan import read_plan
-    from geofield.plan_files import save_plan
-
-    previous = read_plan(output) if output.is_file() and not fresh else None
-    if output.is_file() and not overwrite:
-        from geofield.errors import OutputExistsError
-
-        raise OutputExistsError(
-            f"{output} is there already.",
-            hint="Choose another name, or --overwrite: an outline drawn by hand is then kept.",
-        )
-    plan = run_field(
-        picture,
-        lat=lat,
-        lon=lon,
-        settings=settings,
-        previous=previous,
-        regions=regions,
-        boundary=parcel,
-        choose=choose,
-        name=name,
-    )
+        if output is None:
+            return
+        parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
+        plan = run_field(
+            picture, lat=lat, lon=lon, settings=settings, previous=previous, regions=regions,
+            boundary=parcel, choose=choose, name=name,
+        )  # fmt: skip
     save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
-    found = plan.field
     if as_json:
-        echo_json(
-            {
-                "file": str(output),
-                "field_id": found.field_id,
-                "name": found.name,
-                "method": found.method,
-                "area_ha": found.area_ha,
-                "perimeter_m": found.perimeter_m,
-                "vertices": len(found.polygon.exterior.coords) - 1,
-                "holes": len(found.polygon.interiors),
-                "crs": found.crs.to_string(),
-                "alternatives": [
-                    {"area_ha": area_ha, "certainty": certain}
-                    for area_ha, certain in _alternatives(found)
-                ],
-                "evidence": plan.to_dataset().provenance.evidence.get("field", {}),
-            }
-        )
-        return
+        echo_json(_figures(plan, output))
+    else:
+        _say(plan, output, alternatives=alternatives)
+
+
+def _figures(plan: Plan, output: Path) -> dict[str, Any]:
+    """What was found, plain JSON values."""
+    found = plan.field
+    return {
+        "file": str(output),
+        "field_id": found.field_id,
+        "name": found.name,
+        "method": found.method,
+        "area_ha": found.area_ha,
+        "perimeter_m": found.perimeter_m,
+        "vertices": len(found.polygon.exterior.coords) - 1,
+        "holes": len(found.polygon.interiors),
+        "crs": found.crs.to_string(),
+        "alternatives": [
+            {"area_ha": area_ha, "certainty": certain} for area_ha, certain in _alternatives(found)
+        ],
+        "evidence": plan.to_dataset().provenance.evidence.get("field", {}),
+    }
+
+
+def _say(plan: Plan, output: Path, *, alternatives: bool) -> None:
+    found = plan.field
     say(
         f"Field      {found.area_ha:.2f} ha, perimeter {found.perimeter_m:.0f} m, "
         f"{len(found.polygon.exterior.coords) - 1} corners ({found.method})"
@@ -210,9 +173,9 @@ def _extract(
         say(f"Trust      {found.quality.score:.0%}")
         for reason in found.quality.reasons:
             say(f"           {reason}")
-    if tell and not found.alternatives:
+    if alternatives and not found.alternatives:
         say("Others     none: only method auto offers alternatives")
-    for number, (area_ha, certain) in enumerate(_alternatives(found) if tell else (), 1):
+    for number, (area_ha, certain) in enumerate(_alternatives(found) if alternatives else (), 1):
         say(f"Outline {number}  {area_ha:.2f} ha, certainty {certain:.0%}")
     say(f"File       {output}")
     say_outdated(output)

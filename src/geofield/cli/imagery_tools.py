@@ -10,12 +10,10 @@ import os
 import sys
 import urllib.request
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import click
 
 from geofield.cli.console import Progress, say
 
@@ -23,6 +21,12 @@ if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Where
     from geofield.imagery.sources import Source, SourceEntry
     from geofield.settings import Settings
+
+#: Settings of a source that are fields of its entry.
+_OF_A_SOURCE = (
+    "kind", "min_zoom", "max_zoom", "tile_px", "subdomains", "layer", "key_parameter",
+    "rate_per_s", "date",
+)  # fmt: skip
 
 
 def default_cache_dir() -> Path:
@@ -50,22 +54,14 @@ def catalogue_of(settings: Settings) -> dict[str, SourceEntry]:
 
     own = {
         name: SourceEntry(
-            kind=each.kind,
             address=each.url,
             terms=Terms(
                 each.attribution, each.licence, each.may_cache, each.may_derive, each.terms_url
             ),
             title="your own",
-            min_zoom=each.min_zoom,
-            max_zoom=each.max_zoom,
-            tile_px=each.tile_px,
-            subdomains=each.subdomains,
-            layer=each.layer,
-            key_parameter=each.key_parameter,
             needs_key=each.key is not None or bool(each.key_parameter),
-            rate_per_s=each.rate_per_s,
-            date=each.date,
             headers=tuple((k, v.get_secret_value()) for k, v in each.headers.items()),
+            **{field: getattr(each, field) for field in _OF_A_SOURCE},
         )
         for name, each in settings.fetch.sources.items()
     }
@@ -111,36 +107,20 @@ def resolve(
     point: tuple[float, float] | None = None,
     layer: str = "",
     offline: bool = False,
-    options: FetchOptions | None = None,
+    options: FetchOptions,
 ) -> Source:
     """The source that the user names."""
     from geofield.imagery.client import Client
-    from geofield.imagery.reach import Reach
     from geofield.imagery.sources import find_source
 
     catalogue = catalogue_of(settings)
     keys = keys_of(settings, catalogue)
-    client = None
-    if not offline:
-        client = Client(
-            secrets=keys.values(),
-            proxy=options.proxy if options else None,
-            no_proxy=options.no_proxy if options else (),
-            reach=Reach(settings.fetch.allow),
-        )
-    try:
+    online = nullcontext() if offline else closing(Client(options, secrets=keys.values()))
+    with online as client:
         return find_source(
-            what,
-            catalogue=catalogue,
-            keys=keys,
-            client=client,
-            layer=layer,
-            point=point,
+            what, catalogue=catalogue, keys=keys, client=client, layer=layer, point=point,
             allow=settings.fetch.allow,
-        )
-    finally:
-        if client is not None:
-            client.close()
+        )  # fmt: skip
 
 
 @contextmanager
@@ -195,11 +175,8 @@ def describe(done: Acquired) -> None:
             met = ", ".join(f"{count} x {what}" for what, count in report.troubles.most_common())
             say(f"           faults met and survived: {met}")
         if report.absent:
-            click.secho(
-                f"           {report.absent} could not be had and are no-data in the picture",
-                fg="yellow",
-                err=True,
-            )
+            absent = f"{report.absent} could not be had and are no-data in the picture"
+            say(f"           {absent}", fg="yellow")
     terms = "; ".join(part for part in (done.source.attribution, done.source.licence) if part)
     say(f"Source     {done.source.name}" + (f" ({terms})" if terms else ""))
     if done.source.date:

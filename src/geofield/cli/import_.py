@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import PATH, claim_file, output_option
 
 
 @click.command(
@@ -18,16 +19,8 @@ Examples:
   geofield import TASKDATA/ -o field.gpkg && geofield tracks field.gpkg --spacing 3 -o field.gpkg
 """,
 )
-@click.argument(
-    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="GeoPackage to write.",
-)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@output_option("GeoPackage to write.")
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @click.option("--name", help="The field's name.")
 @click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
@@ -48,7 +41,6 @@ def import_(
     names (boundary, trees), their columns, and what lies in what decide. What was taken as what
     is said on stderr.
     """
-    from geofield.cli.claiming import claim_file
     from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged

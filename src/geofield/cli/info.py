@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json
+from geofield.cli.files import PATH
 
 
 @click.command(
@@ -17,7 +18,7 @@ Examples (on the project's own sample):
   geofield info out/field.gpkg --json
 """
 )
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.option("--crs", help="CRS of a file that does not say its own, e.g. EPSG:32633.")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON on stdout.")
 def info(file: Path, crs: str | None, as_json: bool) -> None:
@@ -70,17 +71,14 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
         facts["obstacles"] = {str(key): int(count) for key, count in statuses.items()}
     provenance = dataset.provenance
     source = provenance.source
-    facts["origin"] = {
-        key: value
-        for key, value in (
-            ("software", provenance.software),
-            ("imagery", source.name),
-            ("date", source.date),
-            ("licence", source.licence),
-            ("attribution", source.attribution),
-        )
-        if value
-    } or "not recorded"
+    origin = {
+        "software": provenance.software,
+        "imagery": source.name,
+        "date": source.date,
+        "licence": source.licence,
+        "attribution": source.attribution,
+    }
+    facts["origin"] = {key: text for key, text in origin.items() if text} or "not recorded"
     return facts
 
 

@@ -25,11 +25,13 @@ def two_interrupts() -> Iterator[Control]:
         return
 
     def first(number: int, frame: Any) -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, before)
         control.stop.set()
         say_note("What is begun is finished; again Ctrl+C stops at once.")
 
-    before = signal.signal(signal.SIGINT, first)
+    # Asked first: the handler can be called before a value that is handed back has its name.
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, first)
     try:
         yield control
     finally:

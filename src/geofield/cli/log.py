@@ -14,6 +14,8 @@ from pathlib import Path
 
 import click
 
+from geofield.cli.files import FILE
+
 #: Values in an address that are named like keys, and a name with its password before the server.
 _SECRET = re.compile(
     r"(?i)([?&;][^=&\s]*(?:key|token|secret|password|auth|sig)[^=&\s]*=)[^&\s]+"
@@ -29,7 +31,7 @@ def log_options() -> list[click.Parameter]:
     return [
         click.Option(
             ["--log", "log_file"],
-            type=click.Path(dir_okay=False, path_type=Path),
+            type=FILE,
             expose_value=False,
             is_eager=True,
             callback=_to_file,

@@ -15,9 +15,11 @@ from typing import Any, NoReturn
 import click
 
 from geofield import __version__
-from geofield.cli.console import progress_option, say_error, say_note, stop_cleanly, was_stopped
+from geofield.cli.console import progress_option, say_error, say_note
 from geofield.cli.log import end_log, log_options
+from geofield.cli.stops import stop_cleanly, stop_no_more, was_stopped
 from geofield.errors import GeofieldError, GeofieldWarning
+from geofield.wording import nearest
 
 #: Name, "module:function" and the one line of help, in the order of the work.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -71,10 +73,7 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As in click, with a suggestion for a mistyped name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            import difflib
-
-            close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = f" Did you mean {close[0]!r}?" if close else " See `geofield --help`."
+            hint = nearest(args[0], COMMANDS) or " See `geofield --help`."
             raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -108,6 +107,7 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
 
 
 def _end_stopped() -> NoReturn:
+    stop_no_more()
     click.echo("Stopped; nothing half-written is left.", err=True)
     sys.exit(1)
 
@@ -150,4 +150,5 @@ def main(args: list[str] | None = None) -> None:
                 raise
             _end_stopped()
         finally:
+            stop_no_more()
             end_log()

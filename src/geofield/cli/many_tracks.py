@@ -29,22 +29,14 @@ _LISTED = 50
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be written.
+    """What is to be written."""
 
-    Attributes
-    ----------
-    output : Path
-        A GeoPackage or a folder.
-    each : bool
-        A GeoPackage for each field.
-    overwrite : bool
-    quiet : bool
-        No bar, and figures of all fields.
-    """
-
+    #: A GeoPackage or a folder.
     output: Path
+    #: A GeoPackage for each field.
     each: bool
     overwrite: bool
+    #: No bar, and figures of all fields.
     quiet: bool
 
 
@@ -67,9 +59,7 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     return places
 
 
-def of_many(
-    places: Places, job: Job, wanted: Wanted
-) -> tuple[list[dict[str, Any]], dict[str, str]]:
+def of_many(places: Places, job: Job, wanted: Wanted) -> Told:
     """Plan all parcels and write them; the figures of each, and why some failed, by name."""
     if wanted.each:
         return _each(places, job, wanted)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import OLD_FILE, claim_file, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import section_values, stage_options
+from geofield.cli.options import stage_options
 from geofield.cli.refresh import say_outdated
+
+if TYPE_CHECKING:
+    from geofield.settings import Settings
 
 
 @click.command(
@@ -22,16 +26,8 @@ Examples (on the project's own sample):
 """,
 )
 @click.argument("imagery", type=click.Path(path_type=str))
-@click.argument(
-    "plan_file", metavar="FIELD.gpkg", type=click.Path(exists=True, dir_okay=False, path_type=Path)
-)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="GeoPackage to write; may be the one that was read.",
-)
+@click.argument("plan_file", metavar="FIELD.gpkg", type=OLD_FILE)
+@output_option("GeoPackage to write; may be the one that was read.")
 @click.option("--overwrite", is_flag=True, help="Replace another file than the one that was read.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @stage_options("obstacles")
@@ -41,8 +37,7 @@ def obstacles(
     output: Path,
     overwrite: bool,
     as_json: bool,
-    settings_file: str | None,
-    **options: Any,
+    settings: Settings,
 ) -> None:
     """Find the obstacles in a field.
 
@@ -50,11 +45,6 @@ def obstacles(
     rejected or drew in FIELD.gpkg stay as they are; the tracks are removed, for they no
     longer fit: run `geofield tracks` next.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    settings = load_settings(settings_file, section_values(options))
-    from geofield.cli.claiming import claim_file
     from geofield.pipeline import run_obstacles, scene_of_plan
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan

@@ -6,22 +6,29 @@ section into click options with the same types, defaults and help.
 
 from __future__ import annotations
 
-import difflib
+import functools
 import math
 import types
 import typing
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import click
 from pydantic.fields import FieldInfo
 
-from geofield.settings import LonLat, Settings, Stage, option_named
+from geofield.settings import LonLat, Settings, Stage, load_settings, option_named
+from geofield.wording import nearest
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 SEPARATOR = "__"
+
+acknowledge_option = click.option(
+    "--acknowledge-terms",
+    is_flag=True,
+    help="You have permission to derive geodata, though the source's terms forbid it.",
+)
+name_option = click.option("--name", help="The field's name; its place when not given.")
 
 
 class Degrees(click.FloatRange):
@@ -48,8 +55,7 @@ class NearestChoice(click.Choice[str]):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            close = difflib.get_close_matches(str(value).lower(), self.choices, n=1, cutoff=0.5)
-            near = f" Did you mean {close[0]!r}?" if close else ""
+            near = nearest(str(value).lower(), self.choices, cutoff=0.5)
             raise click.BadParameter(error.message + near, ctx, param) from None
 
 
@@ -63,48 +69,36 @@ def point_options(command: Command) -> Command:
     )(command)
 
 
-def acknowledge_option(command: Command) -> Command:
-    """Add ``--acknowledge-terms``."""
-    return click.option(
-        "--acknowledge-terms",
-        is_flag=True,
-        help="You have permission to derive geodata, though the source's terms forbid it.",
-    )(command)
+def settings_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--settings FILE``; the command takes `settings`, with what its options say of them.
 
+    They are loaded before the command imports what is large: a typo is told at once.
+    """
 
-def name_option(command: Command) -> Command:
-    """Add ``--name``."""
-    return click.option("--name", help="The field's name; its place when not given.")(command)
+    @functools.wraps(command)
+    def with_settings(*, settings_file: str | None, **values: Any) -> Any:
+        settings = load_settings(settings_file, section_values(values))
+        own = {name: value for name, value in values.items() if SEPARATOR not in name}
+        return command(settings=settings, **own)
 
-
-def plan_argument(command: Command) -> Command:
-    """Add ``PLAN.gpkg``, a file that exists."""
-    return click.argument(
-        "plan_file",
-        metavar="PLAN.gpkg",
-        type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    )(command)
-
-
-def settings_option(command: Command) -> Command:
-    """Add ``--settings FILE``."""
     return click.option(
         "--settings",
         "settings_file",
         type=click.Path(exists=True, dir_okay=False),
         help="TOML file with a table per stage; geofield.toml here is read by itself.",
-    )(command)
+    )(with_settings)
 
 
-def stage_options(*sections: Stage, imagery: bool = True) -> Callable[[Command], Command]:
+def stage_options(
+    *sections: Stage, imagery: bool = True
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add ``--settings FILE``, ``--allow`` where pictures are read, and all settings of stages.
 
-    ``tracks.spacing_m`` becomes ``--spacing``; its value arrives as ``tracks__spacing_m`` and
-    is None when not given, so that file and environment keep their say.
-    :func:`section_values` collects them.
+    ``tracks.spacing_m`` becomes ``--spacing``, parameter ``tracks__spacing_m``; it is None when not
+    given, so that file and environment keep their say.
     """
 
-    def add(command: Command) -> Command:
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
         for section in reversed(("fetch", *sections) if imagery else sections):
             model: Any = Settings.model_fields[section].annotation
             for name, field in reversed(model.model_fields.items()):
@@ -117,7 +111,7 @@ def stage_options(*sections: Stage, imagery: bool = True) -> Callable[[Command],
 
 
 def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The values of :func:`stage_options`, by section; those not given are left out."""
+    """The values of settings' options, by section; those not given are left out."""
     sections: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
         section, separator, name = key.partition(SEPARATOR)

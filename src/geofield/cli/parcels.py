@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from geofield.cli.files import OLD_PATH
 from geofield.errors import FieldError, FormatError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def boundary_options(command: Command) -> Command:
         click.option("--boundary-layer", help="Layer of --boundary, where it has several."),
         click.option(
             "--boundary",
-            type=click.Path(exists=True, path_type=Path),
+            type=OLD_PATH,
             help="Your own parcels (any vector file, any CRS): the one with the point is taken.",
         ),
     ):
@@ -31,8 +32,12 @@ def boundary_options(command: Command) -> Command:
     return command
 
 
-def own_parcel(path: Path, layer: str | None, name: str | None, lat: float, lon: float) -> Field:
-    """The user's own parcel from any vector file."""
+def own_parcel(
+    path: Path | None, layer: str | None, name: str | None, lat: float, lon: float
+) -> Field | None:
+    """The user's own parcel from any vector file; None without one."""
+    if path is None:
+        return None
     from geofield.field import field_from_boundary
     from geofield.formats.foreign import read_vector
 

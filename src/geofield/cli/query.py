@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.errors import FormatError
+from geofield.wording import nearest
 
 
 @click.command(
@@ -66,12 +67,9 @@ def _own(name: str, known: list[str]) -> str:
     path = Path(name)
     if path.suffix in (".rq", ".sparql") and path.is_file():
         return path.read_text(encoding="utf-8")
-    import difflib
-
-    near = difflib.get_close_matches(name, known, n=1)
     raise FormatError(
         f"There is no query {name!r}, and no file of SPARQL of that name.",
-        hint=f"Did you mean {near[0]!r}?" if near else f"Queries: {', '.join(known)}.",
+        hint=nearest(name, known).strip() or f"Queries: {', '.join(known)}.",
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
-from geofield.cli.options import plan_argument
+from geofield.cli.files import claim_folder, plan_argument
 
 
 @click.command(
@@ -26,7 +26,6 @@ def refresh(plan_file: Path, as_json: bool) -> None:
     After a stage, a review or an edit in QGIS they show the plan as it was before. The
     GeoPackage itself and the picture stay as they are.
     """
-    from geofield.cli.claiming import claim_folder
     from geofield.renewal import outdated, renew
 
     claim_folder(plan_file.parent)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from geofield.cli.console import say
+from geofield.cli.files import OLD_FILE, OLD_PATH
 from geofield.cli.refresh import say_outdated
+from geofield.cli.stops import stop_heard
 
 if TYPE_CHECKING:
     from geofield.review.shelf import Shelf
@@ -25,16 +27,8 @@ Examples:
 The page lists its keys when you press "?". Ctrl-C, or the page itself, ends the session.
 """
 )
-@click.argument(
-    "plan_file",
-    metavar="PLAN",
-    type=click.Path(exists=True, path_type=Path),
-)
-@click.option(
-    "--picture",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Picture to show; the one beside PLAN by default.",
-)
+@click.argument("plan_file", metavar="PLAN", type=OLD_PATH)
+@click.option("--picture", type=OLD_FILE, help="Picture to show; the one beside PLAN by default.")
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
@@ -80,6 +74,7 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
         while serving.is_alive():  # waiting without end would hear no Ctrl-C on Windows
             serving.join(0.5)
     except KeyboardInterrupt:
+        stop_heard()
         say("Ended.")
     finally:
         server.server_close()

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.files import FOLDER, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
     acknowledge_option,
     name_option,
     point_options,
-    section_values,
     stage_options,
 )
 from geofield.cli.parcels import boundary_options, own_parcel
@@ -22,6 +23,7 @@ from geofield.cli.refresh import say_outdated
 if TYPE_CHECKING:
     from geofield.model import Tracks
     from geofield.plan import Plan
+    from geofield.settings import Settings
 
 
 @click.command(
@@ -40,7 +42,7 @@ Examples (on the project's own sample):
 @click.option(
     "--out",
     required=True,
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Folder for the products; made when it does not exist.",
 )
 @click.option(
@@ -77,8 +79,7 @@ def run(
     boundary_layer: str | None,
     boundary_name: str | None,
     as_json: bool,
-    settings_file: str | None,
-    **options: Any,
+    settings: Settings,
 ) -> None:
     """From a picture and a point in a field to outline, obstacles and tracks.
 
@@ -86,75 +87,40 @@ def run(
     Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
     Shapefiles, RDF, a map picture and report.json.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    settings = load_settings(settings_file, section_values(options))
-    from geofield.cli.claiming import claim_folder
     from geofield.cli.imagery_tools import as_picture
+    from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
+    from geofield.plan import read_plan
+    from geofield.staging import PREFIX
 
     claim_folder(out)
-    _refuse_occupied(out, overwrite=overwrite)
-    previous = None if fresh else _previous(out)
-    timings: dict[str, float] = {}
-    with (
-        progress_bar(quiet=as_json) as progress,
-        as_picture(
-            imagery,
-            settings,
-            lat=lat,
-            lon=lon,
-            acknowledged=acknowledge_terms,
-            progress=progress,
-        ) as picture,
-    ):
-        plan = plan_field(
-            picture,
-            lat=lat,
-            lon=lon,
-            settings=settings,
-            previous=previous,
-            boundary=None
-            if boundary is None
-            else own_parcel(boundary, boundary_layer, boundary_name, lat, lon),
-            progress=progress,
-            timings_s=timings,
-            name=name,
-        )
-        files = plan.write(
-            out,
-            overwrite=overwrite,
-            timings_s=timings,
-            inputs=[imagery, *([boundary] if boundary else [])],
-        )
-    if as_json:
-        import json
-
-        echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
-    else:
-        summarise(plan, files, timings)
-        say_outdated(out / "field.gpkg")
-
-
-def _refuse_occupied(out: Path, *, overwrite: bool) -> None:
-    """Say at once, not after the work, that there are products already."""
-    from geofield.errors import OutputExistsError
-    from geofield.leftovers import PREFIX
-
     if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
+        # Said at once, not after the work.
         raise OutputExistsError(
             f"{out} is not empty.",
             hint="Choose another --out, or --overwrite: reviewed obstacles are then kept.",
         )
-
-
-def _previous(out: Path) -> Plan | None:
-    """The plan of an earlier run in the folder, for what a person edited in it."""
-    from geofield.plan import read_plan
-
-    file = out / "field.gpkg"
-    return read_plan(file) if file.is_file() else None
+    earlier = out / "field.gpkg"
+    previous = read_plan(earlier) if earlier.is_file() and not fresh else None
+    timings: dict[str, float] = {}
+    with (
+        progress_bar(quiet=as_json) as progress,
+        as_picture(
+            imagery, settings, lat=lat, lon=lon, acknowledged=acknowledge_terms, progress=progress
+        ) as picture,
+    ):
+        parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
+        plan = plan_field(
+            picture, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,
+            progress=progress, timings_s=timings, name=name,
+        )  # fmt: skip
+        inputs = [each for each in (imagery, boundary) if each is not None]
+        files = plan.write(out, overwrite=overwrite, timings_s=timings, inputs=inputs)
+    if as_json:
+        echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
+    else:
+        summarise(plan, files, timings)
+        say_outdated(out / "field.gpkg")
 
 
 def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
@@ -162,7 +128,7 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
     field = plan.field
     say(f"Field      {field.area_ha:.2f} ha, perimeter {field.perimeter_m:.0f} m ({field.method})")
     for doubt in plan.doubts:
-        click.secho(f"           check this outline: {doubt}", fg="yellow", err=True)
+        say(f"           check this outline: {doubt}", fg="yellow")
     if plan.obstacles is not None:
         counts = plan.obstacles["status"].value_counts().sort_index()
         parts = ", ".join(f"{count} {status}" for status, count in counts.items())
@@ -203,9 +169,8 @@ def _say_turns(turns: Any) -> None:
     unfit = int((turns["fits"] == "no").sum())
     say(f"Turns      {len(turns)}")
     if unfit:
-        click.secho(
+        say(
             f"           {unfit} of them do not fit: the machine cannot drive them there (red on "
             "the map; a smaller turning radius, a margin or a headland helps)",
             fg="yellow",
-            err=True,
         )

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.files import FOLDER, claim_folder
 from geofield.simulate import CLIMATES, SimulatedField
 
 
@@ -74,48 +75,26 @@ Examples:
     type=click.FloatRange(-180, 180),
     help="Longitude of the pictures' centre.",
 )
-@click.option(
-    "--out",
-    required=True,
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder to write.",
-)
+@click.option("--out", required=True, type=FOLDER, help="Folder to write.")
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier run wrote there.")
 @click.option("--json", "as_json", is_flag=True, help="List what was written as JSON on stdout.")
 def simulate(
     fields: int,
     seed: int,
     size_px: int,
-    resolution_m: float,
-    obstacles: int | None,
-    climate: str | None,
-    equal_brightness: bool,
-    nir: bool,
-    lat: float,
-    lon: float,
     out: Path,
     overwrite: bool,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Make synthetic fields: field_1.tif, its truth field_1.gpkg, ..., and seeds.csv.
 
     The truth has the layers field and obstacles, as `geofield evaluate` reads them.
     """
-    from geofield.cli.claiming import claim_folder
     from geofield.simulate import SimulationSettings, simulate_fields
     from geofield.staging import staged_folder
 
-    settings = SimulationSettings(
-        width_px=size_px,
-        height_px=size_px,
-        resolution_m=resolution_m,
-        obstacles=obstacles,
-        climate=climate,  # type: ignore[arg-type]
-        equal_brightness=equal_brightness,
-        nir=nir,
-        lat=lat,
-        lon=lon,
-    )
+    settings = SimulationSettings(width_px=size_px, height_px=size_px, **asked)
     claim_folder(out)
     rows: list[dict[str, Any]] = []
     with staged_folder(out, overwrite=overwrite) as folder, progress_bar(quiet=as_json) as progress:

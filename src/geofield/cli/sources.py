@@ -8,6 +8,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.options import settings_option
+from geofield.settings import Settings
 
 
 @click.command(
@@ -31,15 +32,13 @@ Its key goes into the environment as GEOFIELD_KEY_COUNTY.
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the sources as JSON on stdout.")
 @settings_option
-def sources(as_json: bool, settings_file: str | None) -> None:
+def sources(as_json: bool, settings: Settings) -> None:
     """List the imagery sources known by name: terms, attribution, zooms.
 
     The imagery of others comes on terms: keep to them, and name the source in what you make.
     """
     from geofield.cli.imagery_tools import catalogue_of, keys_of
-    from geofield.settings import load_settings
 
-    settings = load_settings(settings_file)
     catalogue = catalogue_of(settings)
     keys = keys_of(settings, catalogue)
     rows = [_row(name, entry, has_key=name in keys) for name, entry in sorted(catalogue.items())]

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar
-from geofield.cli.options import Degrees, acknowledge_option, section_values, stage_options
+from geofield.cli.files import FOLDER, OLD_FILE, claim_file, output_option
+from geofield.cli.options import Degrees, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
+    from geofield.settings import Settings
 
 
 class ZoomType(click.ParamType[Any]):
@@ -46,7 +48,7 @@ Examples (the first one on the project's own sample):
 @click.option("--lon", type=Degrees(180), help="Longitude of the centre.")
 @click.option(
     "--area",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=OLD_FILE,
     help="Vector file whose extent is fetched, instead of a square around a point.",
 )
 @click.option(
@@ -82,19 +84,9 @@ Examples (the first one on the project's own sample):
 )
 @click.option("--offline", is_flag=True, help="Work from the tile cache alone.")
 @click.option("--no-cache", is_flag=True, help="Neither read nor keep tiles.")
-@click.option(
-    "--cache-dir",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of the tile caches.",
-)
+@click.option("--cache-dir", type=FOLDER, help="Folder of the tile caches.")
 @acknowledge_option
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="The GeoTIFF (COG) to write.",
-)
+@output_option("The GeoTIFF (COG) to write.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was made as JSON on stdout.")
 @stage_options()
@@ -112,7 +104,7 @@ def tiles(
     acknowledge_terms: bool,
     overwrite: bool,
     as_json: bool,
-    settings_file: str | None,
+    settings: Settings,
     **place: Any,
 ) -> None:
     """Get the picture of a place as a georeferenced GeoTIFF, from any source.
@@ -125,12 +117,6 @@ def tiles(
     is exact. Tiles are kept in a cache where the source's terms allow it: an interrupted
     download goes on where it stopped.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    allow = section_values({"fetch__allow": place.pop("fetch__allow")})
-    settings = load_settings(settings_file, allow)
-    from geofield.cli.claiming import claim_file
     from geofield.cli.imagery_tools import (
         cache_dir_of,
         describe,

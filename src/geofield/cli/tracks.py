@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import OLD_PATH, PATH, claim_file, claim_folder, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import name_option, section_values, stage_options
+from geofield.cli.options import name_option, stage_options
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
     from geofield.farm.work import Job
     from geofield.plan import Plan
+    from geofield.settings import Settings
 
 
 @click.command(
@@ -30,20 +32,17 @@ Examples (the first two on the project's own sample):
   geofield tracks parcels.shp --spacing 3 --each -o plans/
 """,
 )
-@click.argument("file", metavar="FILE", type=click.Path(exists=True, path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: "
+@click.argument("file", metavar="FILE", type=OLD_PATH)
+@output_option(
+    "GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: "
     "a farm, as of `geofield batch`.",
+    PATH,
 )
 @click.option("--each", is_flag=True, help="A GeoPackage for each of several fields, in a folder.")
 @click.option(
     "--obstacles",
     "obstacle_file",
-    type=click.Path(exists=True, path_type=Path),
+    type=OLD_PATH,
     help="File of what to avoid: polygons, points with a radius_m, lines.",
 )
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
@@ -60,8 +59,7 @@ def tracks(
     name: str | None,
     overwrite: bool,
     as_json: bool,
-    settings_file: str | None,
-    **options: Any,
+    settings: Settings,
 ) -> None:
     """Plan the tracks of one or many fields.
 
@@ -70,11 +68,6 @@ def tracks(
     each of which is a field. Their columns come along, and those named like settings (spacing_m,
     heading_deg, ...) hold for their field.
     """
-    # Before the large imports: a typo is told at once.
-    from geofield.settings import load_settings
-
-    settings = load_settings(settings_file, section_values(options))
-    from geofield.cli.claiming import claim_file, claim_folder
     from geofield.cli.many_tracks import Wanted, file_name, line_of, of_many, parcels_in
     from geofield.farm.work import Job
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say
-from geofield.cli.options import plan_argument
+from geofield.cli.files import plan_argument
 
 
 @click.command(
@@ -25,7 +25,7 @@ def undo(plan_file: Path) -> None:
     It lies beside PLAN.gpkg as PLAN.gpkg.bak; the two change places, so that a second undo
     takes the first one back. Other products stay as they are: `geofield refresh` renews them.
     """
-    from geofield.generations import earlier_of, undo
+    from geofield.staging.generations import earlier_of, undo
 
     undo(plan_file)
     from geofield.cli.refresh import say_outdated

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.files import PATH
 
 
 @click.command(
@@ -17,9 +18,7 @@ Examples:
   geofield validate export/isoxml/TASKDATA/TASKDATA.XML --json
 """
 )
-@click.argument(
-    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON on stdout.")
 @click.pass_context
 def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> None:

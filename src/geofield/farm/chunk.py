@@ -31,38 +31,22 @@ _LIMIT_HINT = "Look at it alone with `geofield run`, or give it more: --{}-limit
 
 @dataclass(frozen=True)
 class Orders:
-    """What every worker of a run is told.
-
-    Attributes
-    ----------
-    store : Store
-    job : Job
-    own : pa.Schema or None
-        The user's own columns, by the places file.
-    limits : Limits
-    reviewed : frozenset of str
-        Ids of fields that a person put back.
-    version : str
-        Of geofield where the run was started.
-    """
+    """What every worker of a run is told."""
 
     store: Store
     job: Job
+    #: The user's own columns, by the places file.
     own: pa.Schema | None = None
     limits: Limits = field(default_factory=Limits)
+    #: Ids of fields that a person put back.
     reviewed: frozenset[str] = frozenset()
+    #: Of geofield where the run was started.
     version: str = __version__
 
 
 @dataclass(frozen=True)
 class Task:
-    """One chunk of places.
-
-    Attributes
-    ----------
-    chunk : int
-    places : sequence of Place
-    """
+    """One chunk of places."""
 
     chunk: int
     places: Sequence[Place]

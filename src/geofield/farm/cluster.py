@@ -20,6 +20,7 @@ from geofield.farm.chunk import Done, Orders, Task, plan_chunk
 from geofield.farm.engine import ONE_THREAD, Control, Patience, one_thread
 from geofield.farm.marks import WORK
 from geofield.farm.store import Store
+from geofield.staging import unstopped
 
 #: Chunks per worker thread in the scheduler: one is worked on, one is there when it is done.
 _AHEAD = 2
@@ -29,13 +30,8 @@ _CONNECT_S = 15
 class Cluster:
     """A Dask cluster.
 
-    Parameters
-    ----------
-    client : distributed.Client
-    own : list
-        What is closed with the engine: nothing of a cluster that was given.
-    work : callable
-        What workers do with a chunk, for measuring the scheduler alone.
+    `own` is closed with the engine: nothing of a cluster that was given; `after` is called when all
+    of it is. `work` is what workers do with a chunk, for measuring the scheduler alone.
     """
 
     def __init__(
@@ -43,9 +39,11 @@ class Cluster:
         client: Any,
         own: list[Any] | None = None,
         work: Callable[[Task, Orders], Done] | None = None,
+        after: Callable[[], None] | None = None,
     ) -> None:
         self._client = client
         self._own = own or []
+        self._after = after or (lambda: None)
         self._work = work or _work
 
     @classmethod
@@ -61,17 +59,28 @@ class Cluster:
         dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ONE_THREAD)})
         # Nor do its workers look a hundred times a second where their one thread is.
         dask.config.set({"distributed.worker.profile.enabled": False})
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            env=ONE_THREAD,
-            memory_limit=0,
-            dashboard_address="127.0.0.1:0",
-            silence_logs=50,
-        )
-        client = Client(cluster, set_as_default=False)
-        return cls(client, [client, cluster], work)
+        made = None
+        try:
+            # Dask cannot end what is half made, and takes a second to make it.
+            with unstopped():
+                # Before the cluster is there, which gives back the messages while it still ends.
+                give_back = _held_messages()
+                cluster = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    env=ONE_THREAD,
+                    memory_limit=0,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=50,
+                )
+                client = Client(cluster, set_as_default=False)
+                made = cls(client, [client, cluster], work, give_back)
+        except BaseException:
+            if made is not None:
+                made.close()
+            raise
+        return made
 
     @classmethod
     def at(cls, address: str, store: Store) -> Cluster:
@@ -86,16 +95,16 @@ class Cluster:
         """
         from distributed import Client
 
-        # What goes wrong is told in our own words.
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        give_back = _held_messages()
         try:
             client = Client(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
+            give_back()
             raise NetworkError(
                 f"The scheduler {address} does not answer ({type(error).__name__}).",
                 hint="Start one with `dask scheduler`, and name its address: tcp://HOST:8786.",
             ) from None
-        cluster = cls(client, [client])
+        cluster = cls(client, [client], after=give_back)
         try:
             cluster.check(store)
         except BaseException:
@@ -202,9 +211,30 @@ class Cluster:
                 nanny.auto_restart = False
                 with contextlib.suppress(OSError, AttributeError, TypeError):
                     os.kill(nanny.pid, signal.SIGKILL)
+        ended = True
         for each in self._own:
-            with contextlib.suppress(TimeoutError, OSError):
+            try:
                 each.close(timeout=10)
+            except (TimeoutError, OSError):
+                ended = False  # it goes on ending, and talks of it
+        if ended:
+            self._after()
+
+
+def _held_messages() -> Callable[[], None]:
+    """Hold Dask's own messages: ends on purpose are no news, accidents are told by us.
+
+    Returns what gives them back.
+    """
+    levels = [(each, each.level) for each in logging.getLogger("distributed").handlers]
+    for handler, _ in levels:
+        handler.setLevel(logging.CRITICAL)
+
+    def give_back() -> None:
+        for handler, level in levels:
+            handler.setLevel(level)
+
+    return give_back
 
 
 def _facts(store: Store, probe: str) -> tuple[str, bool]:

@@ -11,7 +11,6 @@ import hashlib
 import json
 import sqlite3
 import tempfile
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +23,7 @@ from geofield import schema
 from geofield.errors import FormatError, GeofieldError
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.formats import origin
+from geofield.formats.gpkg_read import opened
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.plan_files import save_plan
@@ -62,18 +62,6 @@ def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[st
 def take_edits(farm: Farm, overview: Path) -> list[Plan]:
     """The plans of the fields that a person edited in the overview, their tracks planned again.
 
-    Parameters
-    ----------
-    farm : Farm
-        As it is in its folder.
-    overview : Path
-        ``farm.gpkg``.
-
-    Returns
-    -------
-    list of Plan
-        Of edited fields only.
-
     Raises
     ------
     FormatError
@@ -104,7 +92,7 @@ def is_overview(path: Path) -> bool:
 
 
 def _record(overview: Path) -> dict[str, Any]:
-    with closing(sqlite3.connect(f"{overview.absolute().as_uri()}?mode=ro", uri=True)) as file:
+    with opened(overview) as file:
         row = file.execute(
             "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
         ).fetchone()
@@ -149,7 +137,7 @@ def _edited(
     before = ours[ours[FIELD_ID] == field_id].geometry.iloc[0]
     after = fields[fields[FIELD_ID] == field_id].geometry.iloc[0]
     field = plan.field if pd.isna(row["name"]) else replace(plan.field, name=str(row["name"]))
-    if not _same(before, after):
+    if not np.array_equal(shapely.get_coordinates(before), shapely.get_coordinates(after)):
         field = replace(
             field, polygon=_polygon(row.geometry, field_id), method="drawn", quality=None
         )
@@ -163,13 +151,6 @@ def _edited(
         return run_tracks(replace(plan, field=field, obstacles=standing), settings=settings)
     except GeofieldError as error:
         raise FormatError(f"Field {field_id}, as edited: {error}", hint=error.hint) from error
-
-
-def _same(one: shapely.Geometry, other: shapely.Geometry) -> bool:
-    return bool(shapely.equals_exact(one, other, tolerance=0.0)) or (
-        shapely.get_num_coordinates(one) == shapely.get_num_coordinates(other)
-        and np.array_equal(shapely.get_coordinates(one), shapely.get_coordinates(other))
-    )
 
 
 def _polygon(shape: Any, field_id: str) -> shapely.Polygon:

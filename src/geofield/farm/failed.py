@@ -18,12 +18,9 @@ _STATUS = ["field_id", "status", "error", "hint"]
 
 
 def write_failed(store: Store, places: Places) -> list[str]:
-    """Write the failed places with their columns, and why they failed.
+    """Write the failed places with their columns, and why they failed; the name of the file.
 
-    Returns
-    -------
-    list of str
-        The file; none where every place has a plan.
+    There is none where every place has a plan.
     """
     import pyarrow as pa
     import pyarrow.compute as pc

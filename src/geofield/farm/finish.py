@@ -15,15 +15,8 @@ from geofield.staging import staged_folder
 def finish(store: Store, places: Places, *, anew: bool = True, overview: bool = True) -> list[str]:
     """Write what is made from the whole farm; the names of the files.
 
-    Parameters
-    ----------
-    store : Store
-    places : Places
-        That were asked for.
-    anew : bool
-        Whether the farm has changed since these files were written; else only missing ones are.
-    overview : bool
-        Write ``farm.gpkg`` and ``farm.qgz``, where the farm lies on a disk.
+    `anew` says whether the farm has changed since they were written: else only missing ones are.
+    `overview` asks for ``farm.gpkg`` and ``farm.qgz``, where the farm lies on a disk.
     """
     there = store.names("")
     # A run that was killed here, or before it came here, left them as they were.

@@ -25,7 +25,7 @@ import shapely
 from geofield import __version__, schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError
-from geofield.farm.layers import EXACT, GEOMETRY, LAYERS, PLAN, Tables
+from geofield.farm.layers import EXACT, GEOMETRY, KEPT, Tables
 from geofield.farm.store import Store
 
 if TYPE_CHECKING:
@@ -43,27 +43,17 @@ _CHUNK = re.compile(r"chunk=(\d+)")
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What `farm.json` says.
+    """What `farm.json` says."""
 
-    Attributes
-    ----------
-    digest : str
-        Of all that decides the result: settings, places, imagery, software.
-    settings : mapping
-        Plain JSON values.
-    places : mapping
-        File, number and digest of the places.
-    imagery : mapping
-        What the pictures are, with their terms; empty without imagery.
-    chunk_fields : int
-        Places per chunk.
-    chunks : int
-    """
-
+    #: Of all that decides the result: settings, places, imagery, software.
     digest: str = ""
+    #: Plain JSON values.
     settings: Mapping[str, Any] | None = None
+    #: File, number and digest of the places.
     places: Mapping[str, Any] | None = None
+    #: What the pictures are, with their terms; empty without imagery.
     imagery: Mapping[str, Any] | None = None
+    #: Places per chunk.
     chunk_fields: int = 250
     chunks: int = 0
 
@@ -94,14 +84,9 @@ class Record:
                     f"{store.shown} was written by a later version of geofield.",
                     hint="Update geofield.",
                 )
-            return cls(
-                str(content["digest"]),
-                content["settings"],
-                content["places"],
-                content["imagery"],
-                int(content["chunk_fields"]),
-                int(content["chunks"]),
-            )
+            plain = (content[name] for name in ("settings", "places", "imagery"))
+            numbers = (int(content[name]) for name in ("chunk_fields", "chunks"))
+            return cls(str(content["digest"]), *plain, *numbers)
         except (KeyError, TypeError, ValueError) as error:
             raise FormatError(f"{store.shown}/{RECORD} is damaged: {error!r}.") from None
 
@@ -123,7 +108,7 @@ def committed(store: Store) -> list[int]:
 
 def write_chunk(store: Store, chunk: int, tables: Tables, status: pa.Table) -> None:
     """Write the layers of a chunk, and last its status, which makes it count."""
-    for layer in (*(each.name for each in LAYERS), PLAN):
+    for layer in KEPT:
         if layer in tables:
             store.put(file_of(layer, chunk), parquet_bytes(layer, tables[layer]))
     store.put(file_of(STATUS, chunk), parquet_bytes(STATUS, status))
@@ -131,7 +116,7 @@ def write_chunk(store: Store, chunk: int, tables: Tables, status: pa.Table) -> N
 
 def sweep_chunk(store: Store, chunk: int) -> None:
     """Remove what a worker that was killed had begun to write of a chunk."""
-    for layer in (*(each.name for each in LAYERS), PLAN, STATUS):
+    for layer in (*KEPT, STATUS):
         store.sweep(file_of(layer, chunk).rpartition("/")[0])
 
 

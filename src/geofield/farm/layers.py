@@ -43,24 +43,17 @@ PLAN = "plan"
 ALWAYS = ("field", "obstacles", "tracks", "segments", "gaps", PLAN)
 #: The layers of a farm, in the schema's order; track points follow from the segments.
 LAYERS = tuple(each for each in schema.LAYERS if each.name != schema.TRACK_POINTS.name)
+#: All that is kept of plans in a farm.
+KEPT = (*(each.name for each in LAYERS), PLAN)
 
 Tables = dict[str, "pa.Table"]
 
 
 def tables_of(plans: Iterable[Plan], own: pa.Schema | None = None) -> Tables:
-    """The tables of some plans.
+    """The tables of some plans, by layer name, with `plan`.
 
-    Parameters
-    ----------
-    plans : iterable of Plan
-        Each with a `field_id` of its own.
-    own : pa.Schema, optional
-        Names and types of the user's own columns of the field; found out when not given.
-
-    Returns
-    -------
-    dict of str to pa.Table
-        By layer name, with `plan`; optional layers only where they have rows.
+    Optional layers are there only where they have rows. Each plan has a `field_id` of its own.
+    `own` gives names and types of the user's own columns of the field; they are found out without.
     """
     plans = list(plans)
     rows = [plan.rows() for plan in plans]
@@ -225,13 +218,7 @@ def epsg_of(crs: CRS) -> int | None:
 
 
 def plan_of(tables: Mapping[str, pa.Table]) -> Plan:
-    """The plan of one field.
-
-    Parameters
-    ----------
-    tables : mapping
-        The rows of that field, by layer name, with `plan`.
-    """
+    """The plan of one field, from its rows by layer name, with `plan`."""
     if PLAN not in tables or tables[PLAN].num_rows != 1:
         raise FormatError("The farm's record of this field is missing or double.")
     record = tables[PLAN].to_pylist()[0]

@@ -24,16 +24,10 @@ OVER_LIMIT = 70
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one field may take.
-
-    Attributes
-    ----------
-    time_s : float or None
-    memory_mb : float or None
-        Of the worker's whole process.
-    """
+    """What one field may take."""
 
     time_s: float | None = None
+    #: Of the worker's whole process.
     memory_mb: float | None = None
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from geofield.farm.store import Store
-from geofield.folders import cannot_write
+from geofield.staging import cannot_write
 
 WORK = ".work"
 #: There while files that are made from the whole farm are older than it.
@@ -25,24 +25,15 @@ _BEGIN, _END, _EXCUSED, _TIME, _MEMORY = "b", "e", "x", "t", "m"
 
 @dataclass
 class Marks:
-    """The marks of one chunk.
-
-    Attributes
-    ----------
-    store : Store
-    chunk : int
-    deaths : Counter
-        How often each place ended its worker since it last went well.
-    over : dict of int to (str, float)
-        Places that went over a limit: ``t`` and seconds, or ``m`` and megabytes.
-    again : bool
-        Whether a worker has ended at the chunk before.
-    """
+    """The marks of one chunk."""
 
     store: Store
     chunk: int
+    #: How often each place ended its worker since it last went well.
     deaths: Counter[int] = field(default_factory=Counter)
+    #: Places that went over a limit: ``t`` and seconds, or ``m`` and megabytes.
     over: dict[int, tuple[str, float]] = field(default_factory=dict)
+    #: Whether a worker has ended at the chunk before.
     again: bool = False
     _lines: list[str] = field(default_factory=list)
     _handle: int | None = None

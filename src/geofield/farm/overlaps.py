@@ -18,10 +18,7 @@ _AT_A_TIME = 100_000
 def overlaps(places: Places) -> dict[int, str]:
     """What is to be told of parcels that overlap others, by position.
 
-    Parameters
-    ----------
-    places : Places
-        More than a hundred thousand are compared in parts.
+    More than a hundred thousand are compared in parts.
     """
     if places.outlines is None:
         return {}

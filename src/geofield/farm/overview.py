@@ -58,19 +58,7 @@ _DETAILS = tuple(
 
 
 def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path]:
-    """Write ``farm.gpkg`` and ``farm.qgz``.
-
-    Parameters
-    ----------
-    farm : Farm
-    folder : Path
-    name : str
-        Title of the project.
-
-    Returns
-    -------
-    list of Path
-    """
+    """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project."""
     with staged_folder(folder, overwrite=True) as staging:
         written = write_gpkg(dataset_of(farm, name), staging, stem=STEM, options={})
     return [folder / path.name for path in written]

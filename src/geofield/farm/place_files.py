@@ -24,39 +24,24 @@ _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
 
 @dataclass(frozen=True, slots=True)
 class RawPlaces:
-    """A file of places as it is.
+    """A file of places as it is."""
 
-    Attributes
-    ----------
-    name : str
-        For people.
-    table : pa.Table
-        All columns but the geometry.
-    geometry : pa.Array or None
-        Well-known binary.
-    geometry_name : str
-    crs : Any
-        Of the geometry, as the file says; None where it does not.
-    notes : tuple of str
-    """
-
+    #: For people.
     name: str
+    #: All columns but the geometry.
     table: pa.Table
+    #: Well-known binary.
     geometry: pa.Array | None = None
     geometry_name: str = ""
+    #: Of the geometry, as the file says; None where it does not.
     crs: Any = None
     notes: tuple[str, ...] = ()
 
 
 def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawPlaces:
-    """A file of places.
+    """A file of places; `layer` is needed where it has several.
 
-    Parameters
-    ----------
-    path : Path
-    layer : str, optional
-    texts : sequence of str
-        Columns that are text whatever they look like: 007 is no 7.
+    `texts` are columns that are text whatever they look like: 007 is no 7.
 
     Raises
     ------

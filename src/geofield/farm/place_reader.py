@@ -22,6 +22,7 @@ from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
+from geofield.wording import nearest
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -45,20 +46,10 @@ def read_places(
 ) -> Places:
     """Read places: points (columns lat and lon, or geometry) or parcels.
 
-    Parameters
-    ----------
-    path : path
-        CSV, Parquet, or any vector file that GDAL reads.
-    settings : Settings, optional
-        What columns named like settings are judged with.
-    layer : str, optional
-        Of a file with several.
-    crs : str, optional
-        Of coordinates that do not say theirs.
-    id_column, name_column, lat_column, lon_column : str, optional
-        Usual names are found when not given.
-    unnamed : str, optional
-        What places without a name are called, with their row; by their id when not given.
+    From CSV, Parquet, or any vector file that GDAL reads, of which `layer` is one of several and
+    `crs` is that of coordinates that do not say theirs. Columns with usual names are found; those
+    named like settings are judged with `settings`. Places without a name are called `unnamed`, with
+    their row, or by their id.
 
     Raises
     ------
@@ -74,9 +65,8 @@ def read_places(
     if not raw.table.num_rows:
         raise FormatError(f"{path} is empty: it holds no places.", hint="Give one row per field.")
     raw = _without_ours(raw)
-    find = _Columns(raw)
-    id_name, name_name = find(id_column, ID_COLUMNS), find(name_column, NAME_COLUMNS)
-    lat_name, lon_name = find(lat_column, _LAT), find(lon_column, _LON)
+    id_name, name_name = _found(raw, id_column, ID_COLUMNS), _found(raw, name_column, NAME_COLUMNS)
+    lat_name, lon_name = _found(raw, lat_column, _LAT), _found(raw, lon_column, _LON)
     notes: list[str] = list(raw.notes)
     kept = np.arange(raw.table.num_rows)
     outlines, part = None, np.zeros(raw.table.num_rows, dtype=np.int64)
@@ -100,9 +90,7 @@ def read_places(
     own = raw.table.select([name for name in rest if name not in per_place]).take(kept)
     said = raw.table.select(per_place).take(kept)
     check_settings(raw.name, said, settings)
-    ids, names = _names(raw, id_name, name_name, kept, part, lat, lon)
-    if unnamed is not None:
-        names = _called(names, ids, raw, name_name, kept, unnamed)
+    ids, names = _names(raw, id_name, name_name, unnamed, kept, part, lat, lon)
     return Places(
         str(path), ids, names, lat, lon, kept + 1, outlines, source,
         own.rename_columns([_unlike_ours(name) for name in own.column_names]),
@@ -122,43 +110,18 @@ def _without_ours(raw: RawPlaces) -> RawPlaces:
     )
 
 
-def _called(
-    names: pa.Array, ids: pa.Array, raw: RawPlaces, name_name: str | None, kept: Any, stem: str
-) -> pa.Array:
-    """Names of places, those without one by the file and their row."""
-    import pyarrow as pa
-
-    given = [None] * len(ids)
-    if name_name is not None:
-        given = _texts(raw.table[name_name]).take(kept).to_pylist()
-    one = raw.table.num_rows == 1
-    called = [
-        name if had else (stem if one else f"{stem}_{row + 1}")
-        for name, had, row in zip(names.to_pylist(), given, kept.tolist(), strict=True)
-    ]
-    return pa.array(called, pa.string())
-
-
-class _Columns:
-    """Finds columns: the one that was named, or one with a usual name."""
-
-    def __init__(self, raw: RawPlaces) -> None:
-        self._raw = raw
-        self._by_name = {name.lower(): name for name in reversed(raw.table.column_names)}
-
-    def __call__(self, asked: str | None, usual: Sequence[str]) -> str | None:
-        if asked is None:
-            return next((self._by_name[name] for name in usual if name in self._by_name), None)
-        if asked not in self._raw.table.column_names:
-            import difflib
-
-            close = difflib.get_close_matches(asked, self._raw.table.column_names, n=1)
-            raise FormatError(
-                f"{self._raw.name} has no column {asked!r}."
-                + (f" Did you mean {close[0]!r}?" if close else ""),
-                hint=f"It has {', '.join(self._raw.table.column_names)}.",
-            )
-        return asked
+def _found(raw: RawPlaces, asked: str | None, usual: Sequence[str]) -> str | None:
+    """The column that was asked for, or one with a usual name."""
+    names = raw.table.column_names
+    if asked is None:
+        by_name = {name.lower(): name for name in reversed(names)}
+        return next((by_name[name] for name in usual if name in by_name), None)
+    if asked not in names:
+        raise FormatError(
+            f"{raw.name} has no column {asked!r}.{nearest(asked, names)}",
+            hint=f"It has {', '.join(names)}.",
+        )
+    return asked
 
 
 def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
@@ -278,10 +241,10 @@ def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
 
 
 def _names(
-    raw: RawPlaces, id_name: str | None, name_name: str | None, kept: Any, part: Any,
-    lat: Any, lon: Any,
+    raw: RawPlaces, id_name: str | None, name_name: str | None, unnamed: str | None,
+    kept: Any, part: Any, lat: Any, lon: Any,
 ) -> tuple[pa.Array, pa.Array]:  # fmt: skip
-    """Ids and names of all places.
+    """Ids and names of all places; those without a name go by `unnamed` and their row, or their id.
 
     Raises
     ------
@@ -316,9 +279,12 @@ def _names(
             ids[at] = f"{one}.{part[at]}" if part[at] else one
         else:
             ids[at] = unlike(_place_id(lat[at], lon[at], int(kept[at]) + 1), taken, "-", key=str)
-    return pa.array(ids, pa.string()), pa.array(
-        [name or one for name, one in zip(names, ids, strict=True)], pa.string()
-    )
+    others: Sequence[str | None] = ids
+    if unnamed is not None:
+        one = raw.table.num_rows == 1
+        others = [unnamed if one else f"{unnamed}_{row + 1}" for row in kept.tolist()]
+    called = [name or other for name, other in zip(names, others, strict=True)]
+    return pa.array(ids, pa.string()), pa.array(called, pa.string())
 
 
 def _texts(column: Any) -> Any:

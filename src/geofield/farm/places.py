@@ -22,76 +22,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """One field to be planned.
+    """One field to be planned."""
 
-    Attributes
-    ----------
-    row : int
-        In the file, from 1.
-    field_id, name : str
-    lat, lon : float
-        Degrees, WGS 84; not a number where the row has no position.
-    outline : bytes or None
-        The parcel, well-known binary in `crs`.
-    crs : str
-        WKT or code; empty for points.
-    own : tuple of (str, value)
-        The user's own columns.
-    settings : mapping
-        Those that hold for this field alone, by name.
-    notes : tuple of str
-    """
-
+    #: In the file, from 1.
     row: int
     field_id: str
     name: str
+    #: lat, lon: degrees, WGS 84; not a number where the row has no position.
     lat: float
     lon: float
+    #: The parcel, well-known binary in `crs`.
     outline: bytes | None = None
+    #: WKT or code; empty for points.
     crs: str = ""
+    #: The user's own columns.
     own: tuple[tuple[str, Any], ...] = ()
+    #: Those that hold for this field alone, by name.
     settings: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """The places of a file, in its order.
-
-    Attributes
-    ----------
-    path : str
-    ids, names : pa.Array of str
-    lat, lon : float arrays
-    rows : int array
-        In the file, from 1: a parcel of several parts is several places.
-    outlines : pa.Array of binary or None
-    crs : CRS
-        Of the outlines.
-    own : pa.Table
-        The user's own columns.
-    settings : pa.Table
-        The columns that are settings.
-    notes : tuple of str
-        What the person should know of the file.
-    remarks : mapping of int to str
-        What is to be told of single places, by position.
-    ids_given : bool
-        Whether the file has a column of ids.
-    """
+    """The places of a file, in its order."""
 
     path: str
     ids: pa.Array
     names: pa.Array
     lat: NDArray[np.float64]
     lon: NDArray[np.float64]
+    #: In the file, from 1: a parcel of several parts is several places.
     rows: NDArray[np.int64]
     outlines: pa.Array | None
+    #: Of the outlines.
     crs: CRS
+    #: The user's own columns.
     own: pa.Table
+    #: The columns that are settings.
     settings: pa.Table
+    #: What the person should know of the file.
     notes: tuple[str, ...] = ()
+    #: What is to be told of single places, by position.
     remarks: Mapping[int, str] = field(default_factory=dict)
+    #: Whether the file has a column of ids.
     ids_given: bool = False
 
     def __len__(self) -> int:

@@ -11,7 +11,7 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import IO, Any
 
 from geofield.errors import GeofieldError
@@ -31,13 +31,7 @@ def cores() -> int:
 
 
 class Pool:
-    """Processes of this machine.
-
-    Parameters
-    ----------
-    workers : int
-        How many; one for each core is best.
-    """
+    """Processes of this machine; one for each core is best."""
 
     def __init__(self, workers: int) -> None:
         self._count = workers
@@ -117,7 +111,6 @@ class _Worker:
     errors: IO[bytes]
     task: Task | None = None
     ready: bool = False
-    _stdin: Any = field(default=None)
 
     @classmethod
     def start(cls, orders: Orders, events: queue.Queue[tuple[_Worker, Any]]) -> _Worker:

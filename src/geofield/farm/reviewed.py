@@ -10,17 +10,16 @@ from urllib.parse import quote, unquote
 from geofield.errors import FormatError
 from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
 from geofield.farm.folder import file_of as file_in
-from geofield.farm.layers import LAYERS, PLAN, tables_of
+from geofield.farm.layers import KEPT, tables_of
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
-from geofield.generations import copy_whole
 from geofield.plan import Plan, read_plan
+from geofield.staging.generations import copy_whole
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 _SUFFIX = ".gpkg"
-LAYER_NAMES = tuple(each.name for each in LAYERS)
 #: Of a status row that a person's plan took the place of.
 _SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
 
@@ -50,14 +49,9 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
 
 
 def put_back(plan_file: Path, folder: str | Path) -> str:
-    """Put a reviewed plan back into a farm, in the place of the one that is there.
+    """Put a reviewed plan back into a farm, in the place of the one that is there; the field's id.
 
     The plan itself is kept in the farm, so that no later run changes what a person said.
-
-    Returns
-    -------
-    str
-        The field's id.
 
     Raises
     ------
@@ -94,19 +88,17 @@ def _file_bytes(path: Path) -> bytes:
 
 def _replace(store: Store, chunk: int, plan: Plan, status: pa.Table) -> None:
     """Write a chunk again with one plan in the place of another."""
-    parts = {name: read_part(store, name, chunk) for name in (*LAYER_NAMES, PLAN)}
-    tables = {name: table for name, table in parts.items() if table is not None}
-    ids = status["field_id"].to_pylist()
-    fresh = tables_of([plan])
-    merged = {}
-    for name in (*LAYER_NAMES, PLAN):
-        if name in tables or name in fresh:
-            merged[name] = _spliced(tables.get(name), fresh.get(name), plan.field.field_id, ids)
+    mine, ids, fresh = plan.field.field_id, status["field_id"].to_pylist(), tables_of([plan])
+    tables = {name: read_part(store, name, chunk) for name in KEPT}
+    merged = {
+        name: _spliced(tables[name], fresh.get(name), mine, ids)
+        for name in KEPT
+        if name in fresh or tables[name] is not None
+    }
+    said = outcome_words(plan) | _SAID
     rows = [
-        Outcome(**row | outcome_words(plan) | _SAID) if row["field_id"] == plan.field.field_id
-        else Outcome(**row)
-        for row in outcomes_of(status)
-    ]  # fmt: skip
+        Outcome(**row | said if row["field_id"] == mine else row) for row in outcomes_of(status)
+    ]
     # Rows of layers that are no longer there must not stay.
     store.remove(file_in(STATUS, chunk))
     write_chunk(store, chunk, merged, status_table(rows))

@@ -6,12 +6,12 @@ import json
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from geofield.crs import parse_crs
 from geofield.errors import CRSError
+from geofield.formats.gpkg_read import opened
 
 _HINT = "One file has one CRS: ogr2ogr -t_srs EPSG:4326 {} FILE, for each part by itself."
 
@@ -19,13 +19,7 @@ _HINT = "One file has one CRS: ogr2ogr -t_srs EPSG:4326 {} FILE, for each part b
 def refuse_other_rows(path: Path, layer: str | None, crs: Any) -> None:
     """Refuse a file of which rows say by themselves that they are in another CRS.
 
-    Parameters
-    ----------
-    path : Path
-    layer : str, optional
-        Of a GeoPackage.
-    crs : Any
-        That the file says.
+    `layer` is one of a GeoPackage; `crs` is what the file says.
 
     Raises
     ------
@@ -76,7 +70,7 @@ def _geopackage(path: Path, layer: str | None) -> tuple[int, str] | None:
     """The first row whose geometry names another system than its table."""
     tables = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
     try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
+        with opened(path) as file:
             for table, column, own in file.execute(tables).fetchall():
                 if layer not in (None, table):
                     continue

@@ -31,20 +31,13 @@ _CHUNKS = 64
 
 @dataclass
 class Count:
-    """How far a run is.
+    """How far a run is."""
 
-    Attributes
-    ----------
-    total : int
-        Places of the farm.
-    statuses : Counter
-        How many places have which status.
-    before : int
-        Places that were done when the run began.
-    """
-
+    #: Places of the farm.
     total: int
+    #: How many places have which status.
     statuses: Counter[str] = field(default_factory=Counter)
+    #: Places that were done when the run began.
     before: int = 0
     _begun: float = field(default_factory=time.monotonic)
 
@@ -93,25 +86,11 @@ def run_farm(
 ) -> Count:
     """Plan all places that have no status yet.
 
-    Parameters
-    ----------
-    places : Places
-    job : Job
-    store : Store
-        New, empty, or a farm of the same places and settings.
-    engine : callable
-        Gives the engine; asked only when there is something to do.
-    limits : Limits, optional
-        Of one field.
-    fresh : bool
-        Plan all anew where the farm is of other places or settings; what a person reviewed stays.
-    retry : bool
-        Plan chunks again in which places failed or were lost.
-    imagery : mapping, optional
-        The pictures and their terms, for the record.
-    control : Control, optional
-    tell : callable
-        Called with the count when a chunk is done.
+    The store is new, empty, or a farm of the same places and settings. `engine` is asked for the
+    one who works only when there is something to do; `tell` is called with the count when a chunk
+    is done; `imagery` (the pictures and their terms) is for the record. With `fresh` all is planned
+    anew where the farm is of other places or settings, what a person reviewed stays; with `retry`
+    chunks again in which places failed or were lost.
 
     Raises
     ------

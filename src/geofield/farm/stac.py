@@ -31,26 +31,19 @@ _UNKNOWN = {"start_datetime": "1900-01-01T00:00:00Z", "end_datetime": "9999-12-3
 def write_stac(store: Store, *, name: str = "farm") -> list[str]:
     """Write ``collection.json`` and ``stac/chunk-0007.json``; the names of the files.
 
-    Parameters
-    ----------
-    store : Store
-        A farm.
-    name : str
-        Id of the collection.
+    `name` is the id of the collection.
     """
-    written, items = [], []
+    written: dict[str, dict[str, Any]] = {}
     present = {layer: set(store.names(layer)) for layer, _ in _layers()}
     for chunk in committed(store):
         item = _item(store, chunk, name, present)
-        if item is None:
-            continue
-        file = f"{ITEMS}/chunk-{chunk:04d}.json"
-        store.put(file, _json(item))
-        written.append(file)
-        items.append(item)
-    if not items:
+        if item is not None:
+            file = f"{ITEMS}/chunk-{chunk:04d}.json"
+            store.put(file, _json(item))
+            written[file] = item
+    if not written:
         return []
-    store.put(COLLECTION, _json(_collection(items, written, name)))
+    store.put(COLLECTION, _json(_collection(written, name)))
     return [COLLECTION, *written]
 
 
@@ -85,11 +78,7 @@ def _item(
             "geofield:status": {row["values"]: row["counts"] for row in counts},
             "geofield:imagery": _terms(store, chunk),
         },
-        "links": [
-            {"rel": "root", "href": f"../{COLLECTION}", "type": "application/json"},
-            {"rel": "parent", "href": f"../{COLLECTION}", "type": "application/json"},
-            {"rel": "collection", "href": f"../{COLLECTION}", "type": "application/json"},
-        ],
+        "links": [_link(rel, f"../{COLLECTION}") for rel in ("root", "parent", "collection")],
         "assets": {
             name: {
                 "href": f"../{file_of(name, chunk)}",
@@ -120,15 +109,13 @@ def _terms(store: Store, chunk: int) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def _collection(items: Sequence[dict[str, Any]], files: Sequence[str], name: str) -> dict[str, Any]:
+def _collection(by_file: Mapping[str, dict[str, Any]], name: str) -> dict[str, Any]:
+    items = by_file.values()
     boxes = [item["bbox"] for item in items]
     west, south = (min(box[side] for box in boxes) for side in (0, 1))
     east, north = (max(box[side] for box in boxes) for side in (2, 3))
-    dated = [
-        i["properties"]
-        for i in items
-        if i["properties"]["start_datetime"] != _UNKNOWN["start_datetime"]
-    ]
+    known = (item["properties"] for item in items)
+    dated = [one for one in known if one["start_datetime"] != _UNKNOWN["start_datetime"]]
     begin = min((each["start_datetime"] for each in dated), default=None)
     end = max((each["end_datetime"] for each in dated), default=None)
     terms = [term for item in items for term in item["properties"]["geofield:imagery"]]
@@ -150,11 +137,8 @@ def _collection(items: Sequence[dict[str, Any]], files: Sequence[str], name: str
             "temporal": {"interval": [[begin, end]]},
         },
         "links": [
-            {"rel": "root", "href": f"./{COLLECTION}", "type": "application/json"},
-            *(
-                {"rel": "item", "href": f"./{file}", "type": "application/geo+json"}
-                for file in files
-            ),
+            _link("root", f"./{COLLECTION}"),
+            *(_link("item", f"./{file}", "application/geo+json") for file in by_file),
         ],
         "assets": {
             "record": {
@@ -165,6 +149,10 @@ def _collection(items: Sequence[dict[str, Any]], files: Sequence[str], name: str
             }
         },
     }
+
+
+def _link(rel: str, href: str, kind: str = "application/json") -> dict[str, str]:
+    return {"rel": rel, "href": href, "type": kind}
 
 
 def _licence(licences: Sequence[str]) -> str:

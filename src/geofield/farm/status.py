@@ -17,43 +17,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a place.
-
-    Attributes
-    ----------
-    field_id, name : str
-    place : int
-        Row in the places file, from 1.
-    lat, lon : float
-        Degrees, WGS 84.
-    status : str
-        ``done``; ``doubtful`` (planned, but a person should look at the outline); ``failed``;
-        ``lost`` (it ended its worker, twice).
-    error, hint : str
-        Why it failed, and what helps.
-    notes : str
-        What the stages had to tell.
-    certainty : float or None
-        Of the outline.
-    doubts : str
-        What speaks against the outline.
-    reviewed : bool
-        Whether it is as a person left it.
-    seconds : float
-    worker : str
-    """
+    """What became of a place."""
 
     field_id: str
     name: str = ""
+    #: Row in the places file, from 1.
     place: int = 0
+    #: lat, lon: degrees, WGS 84.
     lat: float = float("nan")
     lon: float = float("nan")
+    #: ``done``; ``doubtful`` (planned, but a person should look at the outline); ``failed``;
+    #: ``lost`` (it ended its worker, twice).
     status: str = "done"
+    #: error, hint: why it failed, and what helps.
     error: str = ""
     hint: str = ""
+    #: What the stages had to tell.
     notes: str = ""
+    #: Of the outline.
     certainty: float | None = None
+    #: What speaks against the outline.
     doubts: str = ""
+    #: Whether it is as a person left it.
     reviewed: bool = False
     seconds: float = 0.0
     worker: str = ""
@@ -80,23 +65,20 @@ def status_table(outcomes: Sequence[Outcome]) -> pa.Table:
     """The rows as Arrow, a point for each place."""
     import pyarrow as pa
 
-    texts = ("field_id", "name", "status", "error", "hint", "notes", "doubts", "worker")
-    columns: dict[str, Any] = {
-        name: pa.array([getattr(one, name) or None for one in outcomes], pa.string())
-        for name in texts
-    }
-    for name in ("lat", "lon", "certainty", "seconds"):
+    number, text = pa.float64(), pa.string()
+    kinds = {
+        "field_id": text, "name": text, "status": text, "error": text, "hint": text, "notes": text,
+        "certainty": number, "doubts": text, "reviewed": pa.bool_(), "place": pa.int64(),
+        "lat": number, "lon": number, "seconds": number, "worker": text,
+    }  # fmt: skip
+    columns = {}
+    for name, kind in kinds.items():
         values = [getattr(one, name) for one in outcomes]
-        columns[name] = pa.array(values, pa.float64(), from_pandas=True)
-    columns["place"] = pa.array([one.place for one in outcomes], pa.int64())
-    columns["reviewed"] = pa.array([one.reviewed for one in outcomes], pa.bool_())
-    order = (
-        "field_id", "name", "status", "error", "hint", "notes", "certainty", "doubts",
-        "reviewed", "place", "lat", "lon", "seconds", "worker",
-    )  # fmt: skip
+        values = [value or None for value in values] if kind == text else values
+        columns[name] = pa.array(values, kind, from_pandas=True)
     places = np.array([[one.lon, one.lat] for one in outcomes]).reshape(-1, 2)
     columns["geometry"] = pa.array(shapely.to_wkb(shapely.points(places)), pa.binary())
-    return pa.table({name: columns[name] for name in (*order, "geometry")})
+    return pa.table(columns)
 
 
 def outcomes_of(table: pa.Table) -> list[dict[str, Any]]:

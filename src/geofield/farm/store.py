@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.errors import FormatError
-from geofield.folders import cannot_write
+from geofield.staging import cannot_write
 
 #: What a file is called while it is written, behind a name of chance.
 _HALF = ".tmp"
@@ -22,14 +22,9 @@ _HALF = ".tmp"
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of files with names such as ``tracks/chunk=0007/part-0.parquet``.
+    """A folder of files with names such as ``tracks/chunk=0007/part-0.parquet``."""
 
-    Attributes
-    ----------
-    place : str
-        Path, or an address of an object store (``s3://bucket/farm``).
-    """
-
+    #: Path, or an address of an object store (``s3://bucket/farm``).
     place: str
 
     @classmethod

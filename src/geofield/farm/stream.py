@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -95,20 +96,11 @@ def _here(places: Iterator[Place], job: Job) -> Iterator[tuple[Plan | None, str]
 
 def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Plan | None, str]]:
     """On a cluster, never more than a few places per worker in the scheduler."""
-    from distributed import wait
+    from distributed import as_completed
 
     ahead = max(_AHEAD, _AHEAD * sum(client.nthreads().values()))
-    running: set[Any] = set()
-    more = True
-    while more or running:
-        while more and len(running) < ahead:
-            place = next(places, None)
-            more = place is not None
-            if place is not None:
-                running.add(client.submit(_one, place, job, pure=False))
-        if running:
-            with client.as_current():
-                done = wait(list(running), return_when="FIRST_COMPLETED").done
-            running -= done
-            for future in done:
-                yield future.result()
+    begun = (client.submit(_one, place, job, pure=False) for place in places)
+    ready = as_completed(islice(begun, ahead), loop=client.loop)
+    for future in ready:
+        yield future.result()
+        ready.update(islice(begun, 1))

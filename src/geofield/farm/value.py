@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from geofield import schema
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import folder as place
-from geofield.farm.layers import FIELD_ID, LAYERS, PLAN, Tables, frame_of, plan_of, tables_of
+from geofield.farm.layers import FIELD_ID, KEPT, LAYERS, PLAN, Tables, frame_of, plan_of, tables_of
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.model.card import card, field_drawn, words
@@ -109,9 +109,7 @@ class Farm:
         return plan_of(mine)
 
     def _part(self, chunk: int) -> Tables:
-        found = {
-            name: self._source.part(name, chunk) for name in (*(each.name for each in LAYERS), PLAN)
-        }
+        found = {name: self._source.part(name, chunk) for name in KEPT}
         return {name: table for name, table in found.items() if table is not None}
 
     def _plans(self, chunk: int) -> Iterator[Plan]:
@@ -233,10 +231,10 @@ class Farm:
                     f"{folder} is not empty.", hint="Choose another folder, or allow overwriting."
                 )
             clear(store)
-        sizes = [(chunk, self._part(chunk)) for chunk in self._source.chunks]
-        store.put(place.RECORD, place.Record(chunks=len(sizes)).to_json())
-        for number, (chunk, tables) in enumerate(sizes):
-            status = self._source.part(place.STATUS, chunk)
+        chunks = self._source.chunks
+        parts = [(self._part(one), self._source.part(place.STATUS, one)) for one in chunks]
+        store.put(place.RECORD, place.Record(chunks=len(parts)).to_json())
+        for number, (tables, status) in enumerate(parts):
             place.write_chunk(store, number, tables, status)
         return Path(folder)
 
@@ -252,15 +250,11 @@ class Farm:
     def _figures(self) -> dict[str, str]:
         import pyarrow.compute as pc
 
-        area_ha = length_m = 0.0
-        for chunk in self._source.chunks:
-            for name, column in ((schema.FIELD.name, "area_ha"), (schema.TRACKS.name, "length_m")):
-                table = self._source.part(name, chunk, [column])
-                total = 0.0 if table is None else pc.sum(table[column]).as_py() or 0.0
-                if name == schema.FIELD.name:
-                    area_ha += total
-                else:
-                    length_m += total
+        def total(layer: schema.Layer, column: str) -> float:
+            parts = (self._source.part(layer.name, one, [column]) for one in self._source.chunks)
+            return sum(pc.sum(part[column]).as_py() or 0.0 for part in parts if part is not None)
+
+        area_ha, length_m = total(schema.FIELD, "area_ha"), total(schema.TRACKS, "length_m")
         figures = {"area": f"{area_ha:.2f} ha", "tracks": f"{length_m / 1000:.2f} km"}
         counts = self.status["status"].value_counts()
         figures["status"] = ", ".join(
@@ -330,7 +324,7 @@ def _runs(table: pa.Table) -> dict[str, tuple[int, int]]:
 
 def clear(store: Store) -> None:
     """Take away a farm's chunks, the marks that they count first; what a person made stays."""
-    for name in (place.STATUS, PLAN, *(each.name for each in LAYERS)):
+    for name in (place.STATUS, *KEPT):
         store.remove(name)
 
 

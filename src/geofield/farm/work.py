@@ -35,19 +35,12 @@ _AROUND_M = 20.0
 
 @dataclass(frozen=True)
 class Imagery:
-    """Where pictures come from; a value that any worker can use.
+    """Where pictures come from; a value that any worker can use."""
 
-    Attributes
-    ----------
-    path : str
-        The user's own picture, or set of pictures; empty for a source.
-    source : Source or None
-    options : FetchOptions or None
-        Of the source.
-    """
-
+    #: The user's own picture, or set of pictures; empty for a source.
     path: str = ""
     source: Source | None = None
+    #: Of the source.
     options: FetchOptions | None = None
 
     @contextmanager
@@ -68,34 +61,19 @@ class Imagery:
 
 @dataclass(frozen=True)
 class Job:
-    """What holds for all places.
-
-    Attributes
-    ----------
-    settings : Settings
-    imagery : Imagery or None
-        None for parcels that are planned as they are.
-    obstacles : Path or None
-        A file of what to avoid.
-    obstacles_crs : str or None
-        Of that file, where it does not say its CRS.
-    """
+    """What holds for all places."""
 
     settings: Settings
+    #: None for parcels that are planned as they are.
     imagery: Imagery | None = None
+    #: A file of what to avoid.
     obstacles: Path | None = None
+    #: Of that file, where it does not say its CRS.
     obstacles_crs: str | None = None
 
 
 def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
-    """The plan of one place.
-
-    Parameters
-    ----------
-    place : Place
-    job : Job
-    previous : Plan, optional
-        As a person left it: their outline and obstacles are kept.
+    """The plan of one place; of a `previous` one, as a person left it, outline and obstacles stay.
 
     Raises
     ------

@@ -1,0 +1,117 @@
+"""Stops: Ctrl+C and SIGTERM end the work, and what is half written is taken away first.
+
+A stop is a `KeyboardInterrupt` in the main thread. It can come where a library passes over it: in
+a destructor, while C code is loaded, behind a bare ``except``. It is raised again until it is on
+its way, so that none is lost.
+"""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+#: Programs say a stop in two ways at once, as they may not know which one is heard.
+_SAME_STOP_S = 1.0
+_AGAIN_S = 0.1
+#: So many errors are looked through for a stop that lies behind them.
+_DEEPEST = 100
+_KINDS = (signal.SIGINT, signal.SIGTERM)
+#: Asks what became of a stop: Ctrl+C may have another handler meanwhile.
+_ASKS = signal.SIGTERM
+#: When this command was asked to stop, seconds; without those that were heard.
+_STOPS: list[float] = []
+#: Whether the next of these signals only asks.
+_ASKED: list[bool] = []
+
+
+class _Stop(KeyboardInterrupt):
+    """A stop; not the bare class.
+
+    Where that one leaves text given to `exec`, as in every dataclass that is loaded, `python -m`
+    ends by the signal instead of the exit code, though it was caught since.
+    """
+
+
+def stop_cleanly() -> None:
+    """Let SIGTERM end the work as Ctrl+C does."""
+    if threading.current_thread() is threading.main_thread():
+        _STOPS.clear()
+        for kind in _KINDS:
+            signal.signal(kind, _stop)
+
+
+def stop_heard() -> None:
+    """Whoever caught a stop goes on to the end of the work: the next one is a new one."""
+    _STOPS.clear()
+
+
+def stop_no_more() -> None:
+    """All is written and said, only Python itself is taken down: there is nothing to stop."""
+    for kind in _KINDS:
+        signal.signal(kind, signal.SIG_IGN)
+
+
+def was_stopped() -> bool:
+    """Whether a stop came: a library that was calling back may have made another error of it."""
+    return bool(_STOPS)
+
+
+def stop_main(kind: signal.Signals = signal.SIGINT) -> None:
+    """Ctrl+C for the main thread, from another one: it also wakes from waiting for a server."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, kind)
+    else:
+        signal.raise_signal(kind)
+
+
+def _stop(kind: int, _: Any) -> None:
+    now_s = time.monotonic()
+    if _ASKED and kind == _ASKS:
+        _ASKED.clear()
+        if not _STOPS or _on_its_way():
+            return
+    elif _STOPS and now_s - _STOPS[-1] < _SAME_STOP_S:
+        return  # said twice; what it leaves is being taken away
+    else:
+        if not _STOPS:
+            # `threading` has locks, one of which may be held where this came.
+            _thread.start_new_thread(_ask, ())
+        _STOPS.append(now_s)
+    sys.unraisablehook = _say_no_unheard
+    sys.excepthook = _say_no_stop
+    raise _Stop
+
+
+def _ask() -> None:
+    """Ask what became of the stop, until somebody heard it."""
+    time.sleep(_AGAIN_S)
+    while _STOPS:
+        _ASKED.append(True)
+        stop_main(_ASKS)
+        time.sleep(_AGAIN_S)
+
+
+def _on_its_way() -> bool:
+    """Whether what the main thread does now is to clean up behind a stop."""
+    error = sys.exc_info()[1]
+    for _ in range(_DEEPEST):  # libraries that set contexts can make a ring of them
+        if error is None or isinstance(error, _Stop):
+            break
+        error = error.__context__
+    return isinstance(error, _Stop)
+
+
+def _say_no_stop(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    """A library's C code that is loaded while a stop comes prints it, then fails to load."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+
+
+def _say_no_unheard(unheard: Any) -> None:
+    """What a destructor does not hear is no news: it comes again."""
+    if not issubclass(unheard.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unheard)
