@@ -25,6 +25,7 @@ from affine import Affine
 from crown_pictures import SIMULATED, simulated, site_of, trees_of
 from crown_samples import INPUTS, OUTPUTS, Pictures, calm
 from crown_targets import CELL_PX
+from learned_with import LEARNED, learned_with
 from pyproj import CRS
 from rasterio.features import rasterize
 from scipy import ndimage
@@ -39,7 +40,7 @@ from geofield.model.scene import GREY_WEIGHTS, Scene
 from geofield.obstacles.default import detect_by_default
 from geofield.obstacles.picture import WORKING_RESOLUTION_M
 
-FACTS = Path(__file__).resolve().parent.parent / "src/geofield/learned/crowns.json"
+FACTS = LEARNED / "crowns.json"
 BANDS = {"nir": ("red", "green", "blue", "nir"), "rgb": ("red", "green", "blue"), "grey": ("grey",)}
 HIT_PX = 10.0
 OPEN_PX, OPEN_TREES = 96, 5
@@ -195,6 +196,7 @@ def main() -> None:
         "doubt_m": 0.0,
         "left_out": {},
         "left_out_sites": sorted(set(sites.tolist())),
+        "learned_with": learned_with([LEARNED / "crowns.onnx"]),
         "learned_on": "Urban Tree Detection Data (J. Ventura et al., CC BY 4.0; imagery USDA "
         "NAIP) without the sites left out; simulated fields; painted things",
     }

@@ -1,13 +1,19 @@
-"""The network that sees crowns, as it is trained: a small U-Net at half resolution."""
+"""The network that sees crowns, as it is trained: a small U-Net at half resolution.
+
+At each depth it adds what an encoder knows that has seen the pictures of ImageNet.
+"""
 
 from __future__ import annotations
 
 import torch
 from crown_samples import INPUTS, OUTPUTS
+from pretrained import Encoder
 from torch import Tensor, nn
 from torch.nn import functional
 
 WIDTHS = (24, 48, 64, 64)
+#: The blocks of the encoder whose features are added, at a half to a sixteenth of the resolution.
+HANDED_ON = (0, 2, 4, 7)
 
 
 def step(inputs: int, outputs: int, size: int = 3, stride: int = 1) -> nn.Sequential:
@@ -47,7 +53,15 @@ class CrownNetwork(nn.Module):
         self.up2, self.join2 = step(c, b, 1), step(b, b)
         self.up1, self.join1 = step(b, a, 1), step(a, 32)
         self.head = nn.Conv2d(32, len(OUTPUTS), 1)
+        self.encoder = Encoder(HANDED_ON)
+        self.known = nn.ModuleList(
+            nn.Conv2d(taken, given, 1, bias=False)
+            for taken, given in zip(self.encoder.channels, WIDTHS, strict=True)
+        )
         with torch.no_grad():
+            # Nothing is added at first: weights of a network without encoder can be gone on from.
+            for one in self.known.parameters():
+                one.zero_()
             # Centres are rare: begin where the focal loss is calm.
             self.head.bias.zero_()
             self.head.bias[0] = -4.0
@@ -55,10 +69,11 @@ class CrownNetwork(nn.Module):
             self.head.bias[5] = -4.0
 
     def forward(self, x: Tensor) -> Tensor:
-        one = self.level1(self.stem(x))
-        two = self.level2(self.down1(one))
-        three = self.level3(self.down2(two))
-        four = self.level4(self.down3(three))
+        seen = [known(f) for known, f in zip(self.known, self.encoder(x[:, :3]), strict=True)]
+        one = self.level1(self.stem(x) + seen[0])
+        two = self.level2(self.down1(one) + seen[1])
+        three = self.level3(self.down2(two) + seen[2])
+        four = self.level4(self.down3(three) + seen[3])
         y = self.join3(three + twice(self.up3(four)))
         y = self.join2(two + twice(self.up2(y)))
         y = self.join1(one + twice(self.up1(y)))

@@ -25,8 +25,10 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from learned_with import LEARNED, learned_with
 from outline_cases import (
     FOLDS,
+    TABLES,
     Case,
     fold_of,
     middle_of_error,
@@ -51,14 +53,14 @@ from geofield.field.ranking import (
 )
 from geofield.field.search import Candidate, search_field
 
-TABLE = Path(__file__).resolve().parent.parent / "src/geofield/learned/outline_ranking.json"
+TABLE = LEARNED / "outline_ranking.json"
 #: Pull towards zero, of curves and of what certainty is worth.
-RIDGE, CALM = 1e-2, 1.0
+RIDGE, CALM = 5e-2, 1.0
 #: What is learned is believed so much more, as outlines that are much alike are many, and would
 #: outweigh a single better one.
 SURER = 2.0
 #: How much likelier an outline is believed to be for its overlap; less than half is nothing.
-SHARPNESS, WORST = 20.0, 0.5
+SHARPNESS, WORST = 8.0, 0.5
 #: The same among outlines of one ground, and the pull towards zero there; from which overlap such
 #: a ground teaches anything, and from which it counts whole.
 EXACT_SHARPNESS, EXACT_RIDGE, EXACT_FROM, EXACT_WHOLE = 50.0, 1e-3, 0.5, 0.8
@@ -273,8 +275,10 @@ def table_of(known: Sequence[Searched]) -> tuple[dict, list[Chosen]]:
         }
         for n, name in enumerate(names)
     ]
+    tables = [table for _, table, _ in TABLES]
     table = {
         "learned_by": "tools/train_ranking.py",
+        "learned_with": learned_with([LEARNED / "outline.onnx", *tables]),
         "bend_end": [BEND, END],
         "calibration": calibration,
         "figures": rows,

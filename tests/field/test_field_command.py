@@ -70,6 +70,18 @@ def test_extract_list_choose_and_own_boundary(sample, capsys):
     assert plan.field.area_ha == pytest.approx(truth.field.area_ha, rel=1e-3)
 
 
+def test_an_existing_output_is_refused_before_the_work(sample, tmp_path, capsys):
+    truth, folder = sample
+    file = tmp_path / "x.gpkg"
+    file.write_bytes(b"mine")
+    code = run("field", folder / "scene.tif", *point(truth), "--list", "-o", file)
+    told = capsys.readouterr()
+    assert code != 0
+    assert "is there already" in told.err
+    assert not told.out
+    assert file.read_bytes() == b"mine"
+
+
 def test_wrong_use_is_code_2(sample, capsys):
     truth, folder = sample
     scene = folder / "scene.tif"

@@ -9,7 +9,6 @@ import pytest
 import shapely
 
 from geofield.errors import FieldError
-from geofield.field import ranking
 from geofield.field.border import measure
 from geofield.field.cuts import divided
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
@@ -56,7 +55,7 @@ def table(monkeypatch, tmp_path, change):
     known = json.loads((folder / "outline_ranking.json").read_text("utf-8"))
     change(known)
     (tmp_path / "outline_ranking.json").write_text(json.dumps(known), "utf-8")
-    monkeypatch.setattr(ranking, "files", lambda package: tmp_path)
+    monkeypatch.setattr("geofield.learned.model_facts.files", lambda package: tmp_path)
     trained.cache_clear()
     try:
         return trained()

@@ -1,19 +1,27 @@
 """Networks of the package: loaded once, named channels, any thread, other processes."""
 
 import itertools
-import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from hashlib import sha256
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from geofield.errors import GeofieldError
 from geofield.field.network import points_maps, seen
-from geofield.learned import network
-from geofield.obstacles.crowns import answers, centres
+from geofield.learned import facts, network
+from geofield.obstacles.crowns import (
+    CELL_PX,
+    OVERLAP_PX,
+    REACH_CELLS,
+    SPREAD_CELLS,
+    answers,
+    centres,
+)
 
 
 @pytest.fixture(scope="module")
@@ -132,12 +140,47 @@ def test_an_unknown_network_is_told():
 
 
 def test_the_model_files_stay_small_and_honest():
-    folder = files("geofield.learned")
-    facts = json.loads((folder / "crowns.json").read_text())
-    assert len((folder / "crowns.onnx").read_bytes()) < 1.5e6
+    known = facts("crowns")
+    assert len((files("geofield.learned") / "crowns.onnx").read_bytes()) < 1.5e6
     for kind in ("nir", "rgb", "grey"):
-        curve = facts["calibration"][kind]
+        curve = known["calibration"][kind]
         assert np.all(np.diff(curve["answer"]) > 0)
         assert np.all(np.diff(curve["probability"]) >= 0)
         # On sites that the curve itself was not fitted to.
-        assert facts["left_out"][kind]["calibration_error"] <= 0.04
+        assert known["left_out"][kind]["calibration_error"] <= 0.04
+
+
+@pytest.mark.parametrize(
+    ("name", "files_here"), [("outline", 4), ("outline_ranking", 5), ("crowns", 1)]
+)
+def test_a_model_was_learned_from_what_lies_here(name, files_here):
+    """A table that grew, or another network before this one, asks for learning again."""
+    known = facts(name)["learned_with"]["sha256"]
+    root = Path(__file__).parents[2]
+    here = [*root.glob("benchmarks/field_labels*.csv"), *root.glob("src/geofield/learned/*.onnx")]
+    learned = {file.name: sha256(file.read_bytes()).hexdigest() for file in here}
+    told = {file: digest for file, digest in known.items() if file in learned}
+    assert len(told) == files_here
+    assert told == {file: learned[file] for file in told}
+
+
+def test_windows_overlap_by_what_the_network_sees(crowns):
+    """Cells answer by what lies around them; their votes then reach and spread a little farther."""
+    reach_px = int(OVERLAP_PX - CELL_PX * (REACH_CELLS + 4 * SPREAD_CELLS + 2))
+    side, middle = 512, 256
+    rng = np.random.default_rng(0)
+    near, far = rng.normal(size=(2, len(crowns.inputs), side, side)).astype(np.float32)
+    away = np.abs(np.arange(side) + 0.5 - middle) > reach_px
+    cells = slice((middle - CELL_PX) // CELL_PX, (middle + CELL_PX) // CELL_PX)
+
+    def middle_cells(columns, rows):
+        other = near.copy()
+        other[:, rows], other[:, :, columns] = far[:, rows], far[:, :, columns]
+        return crowns(other[None])[0][:, cells, cells]
+
+    nothing, something = (
+        np.zeros(side, bool),
+        np.abs(np.arange(side) + 0.5 - middle) > reach_px // 2,
+    )
+    assert np.array_equal(middle_cells(away, away), middle_cells(nothing, nothing))
+    assert not np.array_equal(middle_cells(something, nothing), middle_cells(nothing, nothing))

@@ -24,8 +24,10 @@ from geofield.model.segmentation import Segmentation
 
 Points = Sequence[tuple[float, float]]
 
-#: So many different outlines are offered; those that overlap more than this are alike.
-ALTERNATIVES, _ALIKE = 3, 0.85
+#: So many different outlines are offered, which overlap less than this.
+ALTERNATIVES, _DIFFERENT = 3, 0.88
+#: Outlines that overlap more than this speak for each other's ground.
+_ALIKE = 0.85
 #: A border weaker than this, in units of what the field has inside, is none.
 _WEAK = 1.6
 #: Borders close inside are told from this strength on, as a share of the outline's own; a
@@ -98,12 +100,12 @@ def likely_outlines(found: Sequence[Candidate], search: FieldSearch) -> list[Lik
         trained(search.part).certainty(what, evidence) for what in ("field", "ground", "border")
     )
     chosen = [Likely(found[best], certain, ground, border)]
-    free = overlap[best] < _ALIKE
+    free = overlap[best] < _DIFFERENT
     rest = float(belief[free].sum())
     while len(chosen) < ALTERNATIVES and belief[free].sum() > 0.0:
         own = np.where(free, overlap @ (belief * free), -1.0)
         at = int(np.argmax(own))
-        alike = free & (overlap[at] >= _ALIKE)
+        alike = free & (overlap[at] >= _DIFFERENT)
         share = (1.0 - certain) * float(belief[alike].sum()) / rest
         chosen.append(
             Likely(found[at], min(share, certain), min(share, ground), min(share, border))

@@ -18,6 +18,7 @@ from shapely import Polygon
 from geofield.field.median import median
 from geofield.field.straight import on_frame, ring
 from geofield.field.surface import Surface
+from geofield.raster import bilinear
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -91,15 +92,9 @@ def _look(
     surface: Surface, places: FloatArray, outward: FloatArray, away_px: list[float]
 ) -> NDArray[np.float32]:
     """The layers at distances outward of places, (distances, places, layers)."""
-    import cv2
-
     away = np.array(away_px)[:, None]
-    x, y = (
-        (place + away * out - 0.5).astype(np.float32)
-        for place, out in zip(places.T, outward.T, strict=True)
-    )
-    seen = cv2.remap(surface.layers, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(seen, np.float32).reshape(len(away_px), len(places), -1)
+    x, y = (place + away * out for place, out in zip(places.T, outward.T, strict=True))
+    return bilinear(surface.layers, x, y)
 
 
 def _along(

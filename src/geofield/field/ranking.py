@@ -10,12 +10,9 @@ sites that the network, whose answer is among the figures, had not seen.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
-from typing import Any
 
 import numpy as np
 import shapely
@@ -24,6 +21,7 @@ from scipy.special import expit, logit
 from shapely import Polygon
 
 from geofield.errors import FieldError
+from geofield.learned import facts
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -39,6 +37,8 @@ WEIGHED = 200
 SAME_GROUND = 0.92
 #: Outlines whose exactness differs less are as exact.
 _NEARLY = 0.1
+#: Of a figure, in its table: for which ground is meant, and for where exactly it ends.
+_CURVES = ("slopes", "edges")
 
 
 def agreement(
@@ -145,21 +145,17 @@ def trained(part: int | None = None) -> Ranking:
 
     Raises
     ------
-    FieldError
-        When its table cannot be read.
+    GeofieldError
+        When there is no table; a FieldError where it is of another version.
     """
-    text = (files("geofield.learned") / "outline_ranking.json").read_text("utf-8")
-    table: dict[str, Any] = json.loads(text)
+    table = facts("outline_ranking")
     try:
         rows = table["figures"]
         mean, spread = (np.array([row[key] for row in rows]) for key in ("mean", "spread"))
         names = tuple(row["name"] for row in rows)
         # Of each figure, the slopes of all parts: (parts, 3, names).
-        slope, edge = (
-            each.mean(axis=0) if part is None else each[part]
-            for key in ("slopes", "edges")
-            for each in [np.moveaxis(np.array([row[key] for row in rows]), 0, -1)]
-        )
+        parts = [np.moveaxis(np.array([row[key] for row in rows]), 0, -1) for key in _CURVES]
+        slope, edge = (one.mean(axis=0) if part is None else one[part] for one in parts)
         calibration = table["calibration"]["all" if part is None else str(part)]
         return Ranking(names, mean, spread, slope, edge, calibration)
     except (KeyError, IndexError) as error:

@@ -17,6 +17,7 @@ from shapely.affinity import scale
 from geofield.field.evidence import channels, whiten
 from geofield.field.straight import on_frame, ring
 from geofield.model import Scene
+from geofield.raster import bilinear
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
@@ -146,10 +147,8 @@ def _moved(
     steps, half = round(reach_px / _FINE_PX), round(_ACROSS_PX / _FINE_PX)
     away = np.arange(-steps - half, steps + half + 1) * _FINE_PX
     places = a + share[:, None] * (b - a)
-    at = (places + away[:, None, None] * across - 0.5).astype(np.float32)
-    seen = cv2.remap(
-        layers, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    ).reshape(len(away), count, -1)
+    at = places + away[:, None, None] * across
+    seen = bilinear(layers, at[..., 0], at[..., 1])
     # Averaged along the side, smoothed across it: the step is largest at its middle.
     smooth = [
         cv2.GaussianBlur(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from dataclasses import dataclass, field
 from functools import cache
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import GeofieldError
+from geofield.learned.model_facts import facts
 
 FloatImage = NDArray[np.float32]
 
@@ -99,11 +99,10 @@ def network(name: str) -> Network:
     GeofieldError
         If there is none of that name, or its file is damaged.
     """
-    folder = files("geofield.learned")
+    known = facts(name)
     try:
-        facts = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        model = (folder / f"{name}.onnx").read_bytes()
-        inputs, outputs = tuple(facts.pop("inputs")), tuple(facts.pop("outputs"))
-    except (OSError, ValueError, KeyError) as error:
-        raise GeofieldError(f"The network {name!r} of this installation cannot be read.") from error
-    return Network(name, inputs, outputs, facts, model)
+        model = (files("geofield.learned") / f"{name}.onnx").read_bytes()
+        inputs, outputs = tuple(known.pop("inputs")), tuple(known.pop("outputs"))
+    except (OSError, KeyError) as error:
+        raise GeofieldError(f"The model {name!r} of this installation cannot be read.") from error
+    return Network(name, inputs, outputs, known, model)

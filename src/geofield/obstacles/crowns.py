@@ -22,7 +22,7 @@ NETWORK = "crowns"
 CELL_PX = 2
 ALIGN_PX = 16
 """The network halves the picture four times."""
-OVERLAP_PX = 112
+OVERLAP_PX = 144
 """No answer depends on a pixel farther away than this."""
 LEAST = 0.01
 """Cells that answer less do not vote."""

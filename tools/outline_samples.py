@@ -1,0 +1,208 @@
+"""Pictures that outlines are learned from: turned, scaled, in another light, as other files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from outline_cases import Case
+from scipy import ndimage
+
+from geofield.field.network import ANSWER_PX, SIDE_PX, normalised, points_maps
+
+FloatArray = NDArray[np.float32]
+#: Shares of pictures without near infrared and without colour.
+NO_NIR, GREY = 0.33, 0.2
+
+
+@dataclass
+class Picture:
+    """A picture with a field in it.
+
+    Attributes
+    ----------
+    mark, site : str
+    bands : uint8 array (4, rows, columns)
+        Red, green, blue, near infrared.
+    masks : list of uint8 array (rows, columns)
+        The field as drawn, 255 inside; the second is the other outline of a doubtful one.
+    seed_px : (float, float)
+    """
+
+    mark: str
+    site: str
+    bands: NDArray[np.uint8]
+    masks: list[NDArray[np.uint8]]
+    seed_px: tuple[float, float]
+
+
+def picture_of(case: Case, side_px: int | None = None) -> Picture:
+    """A case in a size that is trained on."""
+    bands = np.asarray(case.scene.bands, np.uint8)
+    scale = 1.0 if side_px is None else side_px / max(bands.shape)
+    if side_px is not None:
+        size = (side_px, side_px)
+        bands = np.stack([cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in bands])
+    masks = []
+    for outline in (case.truth, case.doubtful):
+        if outline is not None:
+            mask = np.zeros(bands.shape[1:], np.uint8)
+            for part in shapely.get_parts(outline):
+                points = shapely.get_coordinates(part.exterior) * scale
+                # OpenCV counts from pixel centres, in sixteenths.
+                cv2.fillPoly(mask, [np.rint((points - 0.5) * 16).astype(np.int32)], 255, shift=4)
+            masks.append(mask)
+    return Picture(case.mark, case.site, bands, masks, (case.x_px * scale, case.y_px * scale))
+
+
+def turned(
+    picture: Picture, rng: np.random.Generator
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]:
+    """Bands (rows, columns, 4), mask and valid pixels of a picture turned, mirrored, scaled."""
+    bands = np.ascontiguousarray(np.moveaxis(picture.bands, 0, -1))
+    at = 1 if len(picture.masks) > 1 and rng.random() < 0.25 else 0
+    mask = picture.masks[at]
+    rows, columns = mask.shape
+    whole = rng.random()
+    scale = SIDE_PX / max(rows, columns)
+    if whole > 0.3:
+        scale *= math.exp(rng.uniform(math.log(0.62), math.log(2.0)))
+    angle = 90.0 * int(rng.integers(4))
+    if rng.random() < 0.5:
+        angle += rng.normal(0, 18)
+    theta = math.radians(angle)
+    matrix = scale * np.array(
+        [[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]]
+    )
+    if rng.random() < 0.5:
+        matrix = matrix @ np.diag([-1.0, 1.0])
+    if rng.random() < 0.3:
+        matrix = matrix @ np.diag(np.exp(rng.normal(0, 0.1, 2)))
+    # A place in the field comes somewhere into the picture.
+    if scale * max(rows, columns) > 1.02 * SIDE_PX:
+        y, x = np.nonzero(mask)
+        k = int(rng.integers(len(y)))
+        pin = np.array([x[k], y[k]], float)
+        target = rng.uniform(0.2, 0.8, 2) * SIDE_PX
+        # The picture still covers most of the window.
+        middle = np.array([columns, rows]) / 2
+        room = max(0.0, (scale * max(rows, columns) - SIDE_PX) / 2) / scale
+        offset = np.linalg.inv(matrix) @ (np.array([SIDE_PX, SIDE_PX]) / 2 - target) + pin - middle
+        offset = np.clip(offset, -room, room)
+        shift = np.array([SIDE_PX, SIDE_PX]) / 2 - matrix @ (middle + offset)
+    else:
+        slack = (SIDE_PX - scale * max(rows, columns)) / 2
+        shift = np.array([SIDE_PX, SIDE_PX]) / 2 - matrix @ (np.array([columns, rows]) / 2)
+        shift = shift + rng.uniform(-1, 1, 2) * max(slack, 0)
+    full = np.column_stack([matrix, shift])
+    size = (SIDE_PX, SIDE_PX)
+    warped, cut = (
+        cv2.warpAffine(each, full, size, flags=cv2.INTER_LINEAR) for each in (bands, mask)
+    )
+    valid = cv2.warpAffine(np.full((rows, columns), 255, np.uint8), full, size)
+    return warped.astype(np.uint8), cut.astype(np.uint8), valid.astype(np.uint8)
+
+
+def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
+    """Another camera, light, haze and file, (rows, columns, 4)."""
+    levels: Any = np.repeat(np.arange(256, dtype=np.float32)[:, None], 4, axis=1)
+    if rng.random() < 0.8:
+        levels = 255 * (levels / 255) ** np.float32(math.exp(rng.normal(0, 0.22)))
+        levels *= np.exp(rng.normal(0, 0.07, 4)).astype(np.float32)
+    if rng.random() < 0.3:
+        # Grounds of colours that no picture here has: what counts is where they change.
+        levels *= np.exp(rng.normal(0, 0.25, 4)).astype(np.float32)
+    if rng.random() < 0.15:
+        bands = bands[..., [*rng.permutation(3), 3]]
+    if rng.random() < 0.35:
+        haze = np.float32(rng.uniform(0.1, 0.55))
+        colour = np.float32(rng.uniform(120, 235)) + rng.normal(0, 12, 4).astype(np.float32)
+        levels = levels * (1 - haze) + haze * colour
+    if rng.random() < 0.35:
+        levels = (levels - 110) * np.float32(rng.uniform(0.45, 1.4)) + 110
+    f: Any = cv2.LUT(bands, levels.astype(np.float32).reshape(1, 256, 4))
+    if rng.random() < 0.3:
+        f = cv2.GaussianBlur(f, (0, 0), rng.uniform(0.5, 1.3))
+    if rng.random() < 0.25:
+        # Uneven light.
+        few = rng.normal(1, 0.1, (3, 3)).astype(np.float32)
+        low = cv2.resize(few, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_LINEAR)
+        f *= low[..., None]
+    if rng.random() < 0.35:
+        noise: Any = np.empty(f.shape, np.float32)
+        cv2.randn(noise, (0, 0, 0, 0), (float(rng.uniform(0.5, 4)),) * 4)  # type: ignore[call-overload]
+        f += noise
+    if rng.random() < 0.4:
+        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 92))]
+        u = cv2.convertScaleAbs(np.maximum(f, 0))
+        rgb = cv2.imdecode(cv2.imencode(".jpg", u[..., :3], quality)[1], cv2.IMREAD_COLOR)
+        nir = cv2.imdecode(cv2.imencode(".jpg", u[..., 3], quality)[1], cv2.IMREAD_GRAYSCALE)
+        f = np.dstack([np.asarray(rgb), np.asarray(nir)]).astype(np.float32)
+    return np.clip(f, 0, 255)
+
+
+def place(mask: NDArray[np.bool_], rng: np.random.Generator) -> tuple[float, float] | None:
+    """A place in a mask, mostly not beside its border."""
+    if not mask.any():
+        return None
+    depth = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)[
+        1:-1, 1:-1
+    ]
+    y, x = np.nonzero(depth >= min(5.0, 0.5 * float(depth.max())))
+    k = int(rng.integers(len(y)))
+    return x[k] + 0.5, y[k] + 0.5
+
+
+def sample(
+    picture: Picture, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, list, list]:
+    """Bands, points, target and what counts (both of `ANSWER_PX`); points that do and do not."""
+    while True:
+        bands, mask, valid = turned(picture, rng)
+        inside = mask > 127
+        if inside.sum() >= 500 and (valid > 127).mean() > 0.35:
+            break
+    values = disturbed(bands, rng)
+    dice = rng.random()
+    has_nir = dice >= NO_NIR + GREY
+    if dice < GREY:
+        luma = values[..., :3] @ np.array([0.298, 0.587, 0.114], np.float32)
+        values[..., 0] = values[..., 1] = values[..., 2] = luma
+    seed = place(inside, rng)
+    assert seed is not None
+    ok = valid > 127
+    stack = np.moveaxis(values, -1, 0)
+    x = normalised(stack[:3], stack[3] if has_nir else None, ok)
+    points = points_maps([seed], [])
+    target: Any = cv2.resize(
+        (inside & ok).astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA
+    )
+    counts: Any = cv2.resize(ok.astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA)
+    return x, points, target, counts, [seed], []
+
+
+def correction(
+    odds: FloatArray, target: FloatArray, rng: np.random.Generator
+) -> tuple[bool, tuple[float, float]] | None:
+    """Whether it belongs, and the middle of the largest wrong piece, full resolution."""
+    wrong = (odds > 0) != (target > 0.5)
+    labels, count = ndimage.label(wrong)
+    if not count:
+        return None
+    depth = cv2.distanceTransform(np.pad(wrong, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    sizes = np.bincount(labels.ravel())[1:]
+    largest = 1 + int(np.argmax(sizes))
+    own = np.where(labels == largest, depth, 0)
+    if own.max() < 1.5:
+        return None
+    y, x = np.unravel_index(
+        int(np.argmax(own + rng.random(own.shape) * 0.3 * own.max())), own.shape
+    )
+    if labels[y, x] != largest:
+        y, x = np.unravel_index(int(np.argmax(own)), own.shape)
+    return bool(target[y, x] > 0.5), (4.0 * x + 2.0, 4.0 * y + 2.0)
