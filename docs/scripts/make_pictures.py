@@ -23,6 +23,7 @@ from PIL import Image
 from shapely import Point, Polygon
 
 import geofield as gf
+from geofield.simulate import SimulationSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
@@ -41,11 +42,14 @@ def demo_map() -> None:
 
 
 def wrong_outline() -> None:
-    """The second sample field, with a piece of another one."""
-    sample = SAMPLE.with_name("field_2.tif")
+    """A simulated field, with a piece of another one."""
+    hard = SimulationSettings(
+        width_px=320, height_px=320, obstacles=60, equal_brightness=True, nir=False
+    )
+    made = next(gf.simulate_fields(1, 143, hard))
     settings = gf.load_settings(overrides={"tracks": {"spacing_m": 6.0}})
     with tempfile.TemporaryDirectory() as folder:
-        plan = gf.plan_field(sample, lat=35.07543, lon=33.53115, settings=settings)
+        plan = gf.plan_field(made.scene, lat=35.07585, lon=33.53149, settings=settings)
         plan.write(Path(folder) / "out", formats=["gpkg"])
         _keep(Path(folder) / "out" / "map.png", "wrong_outline.jpg", width_px=900)
 
