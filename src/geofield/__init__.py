@@ -31,33 +31,6 @@ if TYPE_CHECKING:
     from geofield.simulate import simulate_field, simulate_fields
     from geofield.tracks import plan_route, plan_tracks
 
-_HOME = {
-    "Farm": "farm",
-    "Field": "model",
-    "GeofieldError": "errors",
-    "GeofieldWarning": "errors",
-    "Grid": "grid",
-    "Plan": "plan",
-    "Scene": "model",
-    "Settings": "settings",
-    "Tracks": "model",
-    "detect_obstacles": "obstacles",
-    "evaluate": "evaluation",
-    "extract_field": "field",
-    "load_settings": "settings",
-    "plan_field": "pipeline",
-    "plan_fields": "farm",
-    "plan_route": "tracks",
-    "plan_tracks": "tracks",
-    "prepare_field": "field",
-    "read_farm": "farm",
-    "read_plan": "plan",
-    "read_scene": "imagery",
-    "simulate_field": "simulate",
-    "simulate_fields": "simulate",
-    "write_scene": "imagery",
-}
-
 __all__ = [
     "Farm",
     "Field",
@@ -86,7 +59,24 @@ __all__ = [
     "write_scene",
 ]
 
-__getattr__ = late_names(__name__, _HOME)
+__getattr__ = late_names(
+    __name__,
+    {
+        "errors": "GeofieldError GeofieldWarning",
+        "evaluation": "evaluate",
+        "farm": "Farm plan_fields read_farm",
+        "field": "extract_field prepare_field",
+        "grid": "Grid",
+        "imagery": "read_scene write_scene",
+        "model": "Field Scene Tracks",
+        "obstacles": "detect_obstacles",
+        "pipeline": "plan_field",
+        "plan": "Plan read_plan",
+        "settings": "Settings load_settings",
+        "simulate": "simulate_field simulate_fields",
+        "tracks": "plan_route plan_tracks",
+    },
+)
 
 
 def __dir__() -> list[str]:

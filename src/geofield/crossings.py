@@ -26,19 +26,10 @@ _PAIRS = 500_000
 def mended(
     polygon: BaseGeometry, method: Literal["linework", "structure"] = "linework"
 ) -> BaseGeometry:
-    """A valid geometry of an outline that crosses or touches itself.
+    """A valid geometry of an outline that crosses or touches itself, in any CRS.
 
-    Parameters
-    ----------
-    polygon : shapely.Polygon or MultiPolygon
-        In any CRS.
-    method : str
-        Of `shapely.make_valid`.
-
-    Returns
-    -------
-    BaseGeometry
-        Perhaps of several parts, and of lines where areas collapsed.
+    Perhaps of several parts, and of lines where areas collapsed; `method` is that of
+    `shapely.make_valid`.
 
     Raises
     ------

@@ -61,14 +61,9 @@ def _named(text: str) -> CRS:
 
 
 def utm_crs(lon: float, lat: float) -> CRS:
-    """The WGS 84 UTM zone of a place; the polar stereographic CRS beyond 84 N and 80 S.
+    """The WGS 84 UTM zone of a place in degrees; the polar stereographic CRS beyond 84 N and 80 S.
 
     The zone grid has the standard exceptions for south-west Norway (32V) and Svalbard.
-
-    Parameters
-    ----------
-    lon, lat : float
-        Degrees, WGS 84.
     """
     if not (math.isfinite(lon) and math.isfinite(lat) and abs(lat) <= 90 and abs(lon) <= 360):
         raise CRSError(
@@ -104,15 +99,10 @@ def is_metric(crs: CRS) -> bool:
 
 
 def metric_crs(lon: float, lat: float, own: CRS | None = None) -> CRS:
-    """The CRS in which lengths at a place are measured.
+    """The CRS in which lengths at a place (degrees, WGS 84) are measured.
 
-    Parameters
-    ----------
-    lon, lat : float
-        Degrees, WGS 84.
-    own : CRS, optional
-        The CRS of the data. Where it is a UTM zone already (for instance NAD83 or ETRS89)
-        it is kept, so that outlines stay exactly on the picture's pixels.
+    Where `own`, the CRS of the data, is a UTM zone already (for instance NAD83 or ETRS89) it is
+    kept, so that outlines stay exactly on the picture's pixels.
     """
     if own is not None and is_utm(own):
         return own
@@ -144,11 +134,7 @@ def transformer(source: CRS, target: CRS) -> Transformer:
 def reproject(geometry: Any, source: CRS, target: CRS) -> Any:
     """A geometry, or an array of them, vertex by vertex from one CRS to another, without heights.
 
-    Parameters
-    ----------
-    geometry : shapely geometry or array of them
-        x (easting, longitude) before y, as everywhere in geofield.
-    source, target : CRS
+    x (easting, longitude) comes before y, as everywhere in geofield.
     """
     if source is target or source == target:
         return geometry
@@ -179,17 +165,10 @@ def northing_first(crs: CRS) -> bool:
 
 
 def grid_north_deg(crs: CRS, x: float, y: float) -> float:
-    """The true heading of grid north at a place: degrees clockwise from true north.
+    """The true heading of grid north at a place in a projected CRS, degrees clockwise.
 
-    A heading measured in the grid becomes a true heading by adding this angle (the
-    meridian convergence; up to about 2 degrees within a UTM zone at mid latitudes).
-
-    Parameters
-    ----------
-    crs : CRS
-        A projected CRS.
-    x, y : float
-        The place, in that CRS.
+    A heading measured in the grid becomes a true heading by adding this angle (the meridian
+    convergence; up to about 2 degrees within a UTM zone at mid latitudes).
     """
     lon, lat = transformer(crs, LONLAT).transform([x, x], [y - 50.0, y + 50.0])
     azimuth, _, _ = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
@@ -197,22 +176,11 @@ def grid_north_deg(crs: CRS, x: float, y: float) -> float:
 
 
 def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
-    """How many units of a metric CRS one true metre on the ground is, at places.
+    """How many units of a projected CRS in metres one true metre on the ground is, at places in it.
 
-    The side of the square with a square metre's area, from geodesics of a hundred metres,
-    so that the datum counts as well; good to 1e-10. Over a field the scale of its middle is enough:
-    half a kilometre from there it differs by less than 5 millionths.
-
-    Parameters
-    ----------
-    crs : CRS
-        A projected CRS in metres.
-    x, y : float or array
-        Places, in that CRS.
-
-    Returns
-    -------
-    float or float64 array
+    The side of the square with a square metre's area, from geodesics of a hundred metres, so that
+    the datum counts as well; good to 1e-10. Over a field the scale of its middle is enough: half a
+    kilometre from there it differs by less than 5 millionths.
     """
     at_x, at_y = np.asarray(x, np.float64), np.asarray(y, np.float64)
     lon, lat = transformer(crs, LONLAT).transform(
@@ -224,11 +192,19 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
             f"Coordinates are outside the area of {authority_name(crs)}.",
             hint="Check the CRS: the data may be in another one.",
         )
+    scale = 2.0 * _ARM_M / side_of_cross_m(lon, lat)
+    return float(scale) if scale.ndim == 0 else scale
+
+
+def side_of_cross_m(lon: Any, lat: Any) -> Any:
+    """The side of the square with the area that two geodesics span, metres.
+
+    The ends of the first are in the first two rows, those of the second, across it, in the others.
+    """
     azimuth_x, _, along_x = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
     azimuth_y, _, along_y = _GEOD.inv(lon[2], lat[2], lon[3], lat[3])
     sine = np.sin(np.radians(np.subtract(azimuth_y, azimuth_x)))
-    scale = 2.0 * _ARM_M / np.sqrt(np.abs(np.multiply(along_x, along_y) * sine))
-    return float(scale) if scale.ndim == 0 else scale
+    return np.sqrt(np.abs(np.multiply(along_x, along_y) * sine))
 
 
 def ground_scale_of(shapes: Any, crs: CRS) -> Any:
@@ -239,18 +215,18 @@ def ground_scale_of(shapes: Any, crs: CRS) -> Any:
 
 def ground_areas_m2(shapes: Any, crs: CRS) -> NDArray[np.float64]:
     """True areas of geometries in a metric CRS, square metres on the ground."""
-    found = np.asarray(shapes, dtype=object)
-    areas = np.asarray(shapely.area(found))
-    # What has no area (a missing or empty geometry) has no middle either.
-    some = areas > 0.0
-    areas[some] /= ground_scale_of(found[some], crs) ** 2
-    return areas
+    return _on_the_ground(shapely.area, shapes, crs, 2)
 
 
 def ground_lengths_m(shapes: Any, crs: CRS) -> NDArray[np.float64]:
     """True lengths of lines, and of the borders of polygons, metres on the ground."""
+    return _on_the_ground(shapely.length, shapes, crs, 1)
+
+
+def _on_the_ground(measure: Any, shapes: Any, crs: CRS, power: int) -> NDArray[np.float64]:
     found = np.asarray(shapes, dtype=object)
-    lengths = np.asarray(shapely.length(found))
-    some = lengths > 0.0
-    lengths[some] /= ground_scale_of(found[some], crs)
-    return lengths
+    sizes = np.asarray(measure(found))
+    # What has no size (a missing or empty geometry) has no middle either.
+    some = sizes > 0.0
+    sizes[some] /= ground_scale_of(found[some], crs) ** power
+    return sizes

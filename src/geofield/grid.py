@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
-from pyproj import CRS, Geod
+from pyproj import CRS
 
 from geofield.crs import (
     LONLAT,
@@ -23,6 +23,7 @@ from geofield.crs import (
     authority_name,
     metric_crs,
     parse_crs,
+    side_of_cross_m,
     transformer,
 )
 from geofield.errors import CRSError, GridError
@@ -33,7 +34,6 @@ TILE_SIZE_PX = 256
 MAX_ZOOM = 22
 
 FloatArray = NDArray[np.float64]
-_GEOD = Geod(ellps="WGS84")
 
 
 @dataclass(frozen=True, repr=False)
@@ -228,10 +228,7 @@ class Grid:
         lon, lat = self.to_lonlat(
             np.stack([x - 0.5, x + 0.5, x, x]), np.stack([y, y, y - 0.5, y + 0.5])
         )
-        azimuth_x, _, length_x = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
-        azimuth_y, _, length_y = _GEOD.inv(lon[2], lat[2], lon[3], lat[3])
-        sine = np.sin(np.radians(np.subtract(azimuth_y, azimuth_x)))
-        return _like(np.sqrt(np.multiply(length_x, length_y) * np.abs(sine)))
+        return _like(side_of_cross_m(lon, lat))
 
     def corners_lonlat(self) -> list[tuple[float, float]]:
         """The four corners, clockwise from the top-left, as (lon, lat) in degrees."""
@@ -245,34 +242,6 @@ def _like(value: FloatArray) -> Any:
     return value.item() if np.ndim(value) == 0 else value
 
 
-# -- the study's equations: cross-checks and quick sums, not the georeference ----------------
-
-
-def degrees_per_pixel(zoom: int) -> float:
-    """Equation (1): degrees of longitude per pixel at a zoom."""
-    return 360.0 / (TILE_SIZE_PX * 2.0**zoom)
-
-
 def web_mercator_resolution(zoom: int) -> float:
-    """Equation (2): EPSG:3857 metres per pixel, true metres at the equator only."""
+    """The study's equation (2): EPSG:3857 metres per pixel, true metres at the equator only."""
     return 2.0 * math.pi * EARTH_RADIUS_M / (TILE_SIZE_PX * 2.0**zoom)
-
-
-def approximate_lonlat(
-    x_px: ArrayLike,
-    y_px: ArrayLike,
-    *,
-    centre_px: tuple[float, float],
-    centre_lonlat: tuple[float, float],
-    zoom: int,
-) -> tuple[Any, Any]:
-    """Equations (5) and (6), with the printed swap of x and y mended.
-
-    The small-picture approximation of inverse Web Mercator, kept as a cross-check.
-    """
-    lon_c, lat_c = centre_lonlat
-    scale = degrees_per_pixel(zoom)
-    x, y = np.asarray(x_px, float), np.asarray(y_px, float)
-    lat = lat_c + scale * (centre_px[1] - y) * math.cos(math.radians(lat_c))
-    lon = lon_c - scale * (centre_px[0] - x)
-    return _like(lon), _like(lat)

@@ -148,25 +148,10 @@ def run_field(
 ) -> Plan:
     """Stage 2: find the outline, unless a person drew it.
 
-    Parameters
-    ----------
-    picture : Scene or path
-        Of a path, a wider window is read when the outline touches the window's edge.
-    lat, lon : float
-        A point in the field, degrees, WGS 84.
-    settings : Settings
-    previous : Plan, optional
-        An earlier plan of the same field.
-    regions : sequence of int
-        Numbered regions of the study's method that a person chose.
-    boundary : Field, optional
-        The user's own outline; nothing is extracted then.
-    window : Scene, optional
-        The picture around the point, where it was read from the path already.
-    choose : int, optional
-        Take this one of the field's alternatives, by a person's word.
-    name : str, optional
-        Of the field.
+    What is not told here is as for :func:`plan_field`. Of a path, a wider window is read when the
+    outline touches the window's edge; `window` is the picture around the point, where it was read
+    already. By a person's word come `regions`, numbered by the study's method, and `choose`, one
+    of the field's alternatives.
     """
     if isinstance(picture, Scene):
         scene = picture

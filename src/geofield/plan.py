@@ -285,7 +285,7 @@ class Plan:
         Axes
             In the plan's metric CRS; the colours are those of the map and of QGIS.
         """
-        from geofield.plotting import plot_dataset
+        from geofield.mapping.plot import plot_dataset
 
         return plot_dataset(self.to_dataset(), self.scene, ax)
 

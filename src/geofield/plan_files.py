@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.errors import FormatError
-from geofield.generations import keep_earlier
 from geofield.staging import staged_folder
+from geofield.staging.generations import keep_earlier
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -24,17 +24,9 @@ def save_plan(
 ) -> None:
     """Write a plan as one GeoPackage.
 
-    Parameters
-    ----------
-    plan : Plan
-    output : Path
-        May be `read_from`: a stage that adds to a file replaces it in one step.
-    read_from : Path, optional
-        The GeoPackage that the plan was read from.
-    picture : Path, optional
-        That the project shows; the one that belongs to `read_from` when not given.
-    overwrite : bool
-        Replace a file other than `read_from`.
+    `output` may be `read_from`, the GeoPackage that the plan was read from: a stage that adds to a
+    file replaces it in one step. `overwrite` allows to replace another. The project shows the
+    `picture`, by default that which belongs to `read_from`.
     """
     from geofield.formats import write_dataset
     from geofield.formats.gpkg_read import scene_beside

@@ -19,10 +19,10 @@ from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
-from geofield.generations import keep_earlier
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.staging import staged_folder
+from geofield.staging.generations import keep_earlier
 
 PLAN_FILE = "field.gpkg"
 SCENE_FILE = "scene.tif"
@@ -42,30 +42,11 @@ def write_products(
     inputs: Sequence[str | Path] = (),
     changes: Sequence[str] = (),
 ) -> list[Path]:
-    """Write a dataset and its picture into a folder.
+    """Write a dataset and its picture into a folder; the files in the order written.
 
-    Parameters
-    ----------
-    dataset : Dataset
-    scene : Scene or None
-        Written as `scene.tif` and drawn below the map.
-    folder : Path
-    formats : sequence of str
-        Names of registered formats.
-    overwrite : bool
-        Replace products that are there already.
-    options : mapping of format name to mapping, optional
-    timings_s : mapping, optional
-        Seconds per stage, for the report.
-    inputs : sequence of path
-        Files that were read and must never be replaced.
-    changes : sequence of str
-        What the run changed of an earlier plan, for the report.
-
-    Returns
-    -------
-    list of Path
-        In the order written.
+    The scene becomes ``scene.tif`` and is drawn below the map. `timings_s` (seconds per stage) and
+    `changes` (of an earlier plan) are for the report; `options` are by format; `inputs` were read
+    and are never replaced.
     """
     asked = [name for name in formats if not format_named(name).automatic]
     with (

@@ -117,9 +117,13 @@ def _between(
 
 
 def bilinear(image: Image, x_px: NDArray[np.floating], y_px: NDArray[np.floating]) -> Image:
-    """Sample a picture between its pixels, positions beyond its border at the border."""
+    """Sample a picture between its pixels, positions beyond its border at the border.
+
+    A picture may have layers (rows, cols, layers); they are the last axis of what is given then.
+    """
+    shape = x_px.shape + image.shape[2:]
     if x_px.size == 0:
-        return np.zeros(x_px.shape, dtype=np.float32)
+        return np.zeros(shape, dtype=np.float32)
     # OpenCV takes maps of limited height: the positions go in long rows. It counts from the
     # centre of the top-left pixel.
     width = min(x_px.size, _REMAP_WIDTH)
@@ -127,7 +131,8 @@ def bilinear(image: Image, x_px: NDArray[np.floating], y_px: NDArray[np.floating
     maps[0, : x_px.size], maps[1, : x_px.size] = x_px.ravel() - 0.5, y_px.ravel() - 0.5
     columns, rows = maps.reshape(2, -1, width)
     values = cv2.remap(image, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(values, dtype=np.float32).ravel()[: x_px.size].reshape(x_px.shape)
+    flat = np.asarray(values, dtype=np.float32).reshape(-1, *image.shape[2:])
+    return flat[: x_px.size].reshape(shape)
 
 
 def smoothed(image: Image, sigma_px: float, truncate: float = 3.0) -> Image:

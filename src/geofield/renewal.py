@@ -20,10 +20,7 @@ _STUDY_MARK = b"www.DLC.org/Obstacle#"
 def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     """The products of a plan that lie in its folder, by format.
 
-    Parameters
-    ----------
-    plan_file : Path
-        The GeoPackage; products that carry its name, or that all plans name alike.
+    They carry its name, or one that all plans give alike.
     """
     found = {}
     for each in FORMATS.values():
@@ -47,13 +44,7 @@ def outdated(plan_file: Path) -> list[str]:
 
 
 def renew(plan_file: Path) -> list[Path]:
-    """Write all products that lie beside a plan anew, all or nothing.
-
-    Returns
-    -------
-    list of Path
-        What was written.
-    """
+    """Write all products that lie beside a plan anew, all or nothing; what was written."""
     present = products_beside(plan_file)
     dataset = replace(read_dataset(plan_file), scene_path=scene_beside(plan_file))
     said = dataset.provenance.settings.get("export", {})

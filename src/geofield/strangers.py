@@ -65,12 +65,7 @@ def check_vector(path: Path | str) -> None:
 def check_prolog(head: bytes, name: str) -> None:
     """Refuse XML that defines entities or names an external document type.
 
-    Parameters
-    ----------
-    head : bytes
-        The beginning of the document, as far as its root element at least.
-    name : str
-        Of the file, for messages.
+    `head` reaches as far as the root element at least; `name` is for messages.
 
     Raises
     ------
@@ -107,12 +102,6 @@ def check_prolog(head: bytes, name: str) -> None:
 
 def parse_xml(body: bytes, name: str) -> ET.Element:
     """The root of a document that defines no entities and is nested like an honest one.
-
-    Parameters
-    ----------
-    body : bytes
-    name : str
-        Of the file, for messages.
 
     Raises
     ------

@@ -24,13 +24,7 @@ UNFIT = "#ff1744"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How an obstacle is drawn.
-
-    Attributes
-    ----------
-    color : str
-    dash : tuple of int or None
-    """
+    """How an obstacle is drawn."""
 
     color: str
     dash: tuple[int, int] | None = None

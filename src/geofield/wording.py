@@ -1,8 +1,12 @@
-"""Hints in the words of who reads them: options for the command line, names for Python."""
+"""Hints in the words of who reads them: options for the command line, names for Python.
+
+And the nearest name for one that was mistyped.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 _OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
 #: What an option is called in Python, where that is not its own name with underscores.
@@ -17,6 +21,14 @@ _NAMES = {
     "boundary-name": "name=",
     "json": "the value itself",
 }
+
+
+def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
+    """A sentence with the nearest of some names, behind a space; nothing where none is near."""
+    import difflib
+
+    close = difflib.get_close_matches(given, list(names), n=1, cutoff=cutoff)
+    return f" Did you mean {close[0]!r}?" if close else ""
 
 
 def learn(names: dict[str, str]) -> None:

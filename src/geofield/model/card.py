@@ -20,22 +20,14 @@ _MOST_LINES = 400
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """One kind of thing on a small map.
+    """One kind of thing on a small map."""
 
-    Attributes
-    ----------
-    shapes : sequence of geometry
-        In a metric CRS, all of a map in the same one.
-    color : str
-    width : float
-        Of the lines, CSS pixels.
-    fill : str
-        CSS colour of areas; none by default.
-    """
-
+    #: In a metric CRS, all of a map in the same one.
     shapes: Sequence[Any]
     color: str
+    #: Of the lines, CSS pixels.
     width: float = 1.0
+    #: CSS colour of areas; none by default.
     fill: str = "none"
 
 

@@ -15,23 +15,15 @@ from geofield.model.written import Written
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What the stages recorded.
+    """What the stages recorded."""
 
-    Attributes
-    ----------
-    point : (float, float) or None
-        Latitude and longitude that the field was looked for at, degrees.
-    outline : str or None
-        Fingerprint of the outline as stage 2 left it: another one means a person drew.
-    detection : mapping
-        How obstacles were found, plain JSON values.
-    written : Written or None
-        The obstacles as the last stage left them; None where nobody recorded them.
-    """
-
+    #: Latitude and longitude that the field was looked for at, degrees.
     point: tuple[float, float] | None = None
+    #: Fingerprint of the outline as stage 2 left it: another one means a person drew.
     outline: str | None = None
+    #: How obstacles were found, plain JSON values.
     detection: Mapping[str, Any] = field(default_factory=dict)
+    #: The obstacles as the last stage left them; None where nobody recorded them.
     written: Written | None = None
 
     def to_json(self, of: Field, tracks: Mapping[str, Any] | None) -> dict[str, Any]:

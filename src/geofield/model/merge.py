@@ -19,22 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What a detection changed in the table of obstacles.
+    """What a detection changed in the table of obstacles."""
 
-    Attributes
-    ----------
-    kept : int
-        Rows that are a person's word.
-    found_again, new, gone : int
-        Other rows that were there before and are found again; that were not; that no longer are.
-    stay_deleted : int
-        Detections left out because a person took the obstacle away.
-    """
-
+    #: Rows that are a person's word.
     kept: int = 0
+    #: found_again, new, gone: other rows that were there before and are found again; that were not;
+    #: that no longer are.
     found_again: int = 0
     new: int = 0
     gone: int = 0
+    #: Detections left out because a person took the obstacle away.
     stay_deleted: int = 0
 
     def in_words(self) -> str:
@@ -55,20 +49,13 @@ def merge(
 
     Rows that are a person's word stay as they are; a detection of the same object gives way to
     them. What a person took away is not found again. Other detections keep the number and the
-    user's own columns that they had before where they are found again; new ones get fresh
-    numbers.
+    user's own columns that they had before where they are found again; new ones get fresh numbers.
 
-    Parameters
-    ----------
-    detected : GeoDataFrame
-        Layer `obstacles`.
-    previous : GeoDataFrame
-        In the same CRS, as :func:`reconcile` returned it.
-    written : Written
-        Its record.
+    `previous` is in the same CRS, and `written` its record, both as :func:`reconcile` returned
+    them.
     """
-    record = written.table()
-    kept = record["kept"].loc[previous["obstacle_no"].to_numpy(dtype="int64")].to_numpy(bool)
+    record = written.by_number
+    kept = np.array([record[number].kept for number in previous["obstacle_no"]], dtype=bool)
     word, earlier = previous[kept], previous[~kept].reset_index(drop=True)
     known = matches(detected.geometry, word.geometry) >= 0
     fresh = detected[~known].reset_index(drop=True)

@@ -33,21 +33,13 @@ _CIRCLE_TOLERANCE = (0.02, 0.002)
 
 @dataclass(frozen=True, slots=True)
 class ObstacleShapes:
-    """What tracks are clipped against: true circles and polygons.
+    """What tracks are clipped against: true circles and polygons."""
 
-    Attributes
-    ----------
-    circles : float array (n, 3)
-        Centre x, centre y, radius, all in units of the metric CRS, as polygons are.
-    circle_no : int array (n,)
-        The obstacle numbers of the circles.
-    polygons : object array (m,)
-        Shapely polygons.
-    polygon_no : int array (m,)
-    """
-
+    #: Shape (n, 3): centre x, centre y, radius, all in units of the metric CRS, as polygons are.
     circles: FloatArray
+    #: Shape (n,): the obstacle numbers of the circles.
     circle_no: NDArray[np.int64]
+    #: Shape (m,): shapely polygons.
     polygons: NDArray[np.object_]
     polygon_no: NDArray[np.int64]
 
@@ -57,13 +49,7 @@ def circle_polygons(
 ) -> NDArray[np.object_]:
     """Polygons that stand for circles, 64 vertices each, all on the circle.
 
-    Parameters
-    ----------
-    x, y : array (n,)
-        Centres in the metric CRS.
-    radius_m : array (n,)
-        Metres on the ground.
-    crs : CRS
+    Centres are in the metric CRS, radii metres on the ground.
     """
     points = shapely.points(np.asarray(x, float), np.asarray(y, float))
     radius = np.asarray(radius_m, float) * ground_scale(crs, x, y)
@@ -84,17 +70,8 @@ def from_circles_px(
 ) -> gpd.GeoDataFrame:
     """Detected circles in a picture as obstacles of kind `tree`, numbered from 1.
 
-    Parameters
-    ----------
-    x_px, y_px, radius_px : array (n,)
-        Pixels, origin at the corner of the top-left pixel.
-    grid : Grid
-    buffer_m : float
-        Safety margin, metres.
-    confidence : array (n,), optional
-        0 to 1.
-    crs : CRS, optional
-        The metric CRS; the grid's own when not given.
+    Pixels count from the corner of the top-left pixel; `buffer_m` is the safety margin,
+    `confidence` 0 to 1. The metric CRS is the grid's own when none is given.
     """
     x_px, y_px = np.asarray(x_px, float), np.asarray(y_px, float)
     radius_px = np.asarray(radius_px, float)
@@ -144,8 +121,7 @@ def from_polygons(
     centre = shapely.centroid(shapes)
     x, y = shapely.get_x(centre), shapely.get_y(centre)
     lon, lat = transformer(crs, LONLAT).transform(x, y)
-    missing = np.full(count, np.nan)
-    x_px, y_px = grid.from_crs(x, y, crs) if grid is not None else (missing, missing)
+    x_px, y_px = grid.from_crs(x, y, crs) if grid is not None else (None, None)
     grown = shapes
     if buffer_m:
         grown = shapely.buffer(shapes, buffer_m * ground_scale_of(shapes, crs), quad_segs=8)
@@ -168,14 +144,9 @@ def from_polygons(
 
 
 def active(obstacles: gpd.GeoDataFrame, *, careful: bool = False) -> gpd.GeoDataFrame:
-    """The rows that are driven around: neither rejected nor merely possible.
+    """The rows that are driven around: neither rejected nor merely possible (these if `careful`).
 
-    Parameters
-    ----------
-    obstacles : GeoDataFrame
-        Any table; without a column `status` all rows are.
-    careful : bool
-        Drive around possible ones, too.
+    Of a table without a column `status` all rows are.
     """
     if "status" not in obstacles.columns:
         return obstacles

@@ -29,12 +29,6 @@ def place_id(polygon: Polygon, crs: CRS) -> str:
     Latitude and longitude are multiples of 1 degree, else of 0.5, 0.2, 0.1, 0.05 and so on. Of
     several positions that are equally round, the one with the roundest latitude counts, then the
     one with the roundest longitude. Holes belong to the field here.
-
-    Parameters
-    ----------
-    polygon : shapely.Polygon
-    crs : CRS
-        Of the polygon.
     """
     whole = Polygon(polygon.exterior)
     shapely.prepare(whole)

@@ -9,6 +9,7 @@ detection with it.
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.errors import FormatWarning, ObstacleError
 from geofield.grid import Grid
 from geofield.model.obstacles import (
+    FloatArray,
     circle_polygons,
     floats,
     from_polygons,
@@ -31,9 +33,9 @@ from geofield.model.obstacles import (
 from geofield.model.written import (
     PlainShape,
     Written,
+    WrittenRow,
     fitted_circles,
     matches,
-    plain,
     same_shapes,
     shapes_of_plain,
 )
@@ -75,7 +77,7 @@ def reconcile(
     Returns
     -------
     GeoDataFrame
-        Every row with number, kind, status and shape.
+        Every row with number, status and shape.
     Written
         Its record, with what the person took away.
 
@@ -84,38 +86,74 @@ def reconcile(
     ObstacleError
         When a radius or safety margin is negative or infinite.
     """
-    present = ~(obstacles.geometry.isna() | obstacles.geometry.is_empty).to_numpy(bool)
-    table = obstacles[present].reset_index(drop=True)
-    table = table.set_geometry(_plain_polygons(table.geometry.to_numpy()), crs=table.crs)
-    record = (from_earlier_version(table) if written is None else written).table()
-    known = _known(table, record)
-    table = _with_words(table, record, known)
-    _refuse_sizes(table)
-    table, changed, elsewhere = _brought_up_to_date(table, record, known, grid)
-    drawn = _drawn(table, known)
-    kept = table["status"].isin(schema.REVIEWED).to_numpy(bool) | changed
-    kept[known] |= record["kept"].loc[_numbers(table[known])].to_numpy(bool)
+    table = _with_shapes(obstacles)
+    rows = _Rows.of(table)
+    record = (from_earlier_version(table) if written is None else written).by_number
+    known, before = _known(rows, record)
+    _spell(rows, known, before)
+    _refuse_sizes(rows)
+    changed, elsewhere = _bring_up_to_date(rows, known, before, grid)
+    drawn = _drawn(rows, known)
+    status = rows.at["status"]
+    kept = np.isin(status, schema.REVIEWED) | changed
+    kept[known] |= np.array([row.kept for row in before], bool)
     if written is not None:
         # A number that nobody gave: a row that a person brought along.
-        brought = ~known & ~drawn
+        brought = ~drawn
+        brought[known] = False
         kept |= brought
-        table.loc[brought & (table["status"] == "detected").to_numpy(bool), "status"] = "added"
-    table = table.assign(_kept=kept)
+        status[brought & (status == "detected")] = "added"
+    _place(rows, grid)
+    stand = np.flatnonzero(~drawn)
+    stand = stand[np.argsort(rows.at["obstacle_no"][stand], kind="stable")]
+    result, kept = rows.table(stand), kept[stand]
     if drawn.any():
-        stands = table[~drawn]
-        added = _added(table[drawn], next_number(stands), grid).assign(_kept=True)
-        parts = [part for part in (stands, added) if len(part)]
-        table = pd.concat(parts) if parts else added
-    table = schema.conform(schema.OBSTACLES, table, extras=True)
-    kept = table.pop("_kept").to_numpy(bool)
-    table = _with_positions(table, grid)
+        said = table[drawn].assign(kind=rows.at["kind"][drawn], status=status[drawn])
+        said = said.set_geometry(rows.shapes[drawn], crs=table.crs)
+        added = _added(said, next_number(result), grid)
+        parts = [part for part in (result, added) if len(part)]
+        result = schema.conform(schema.OBSTACLES, pd.concat(parts) if parts else added, extras=True)
+        kept = np.append(kept, np.ones(len(added), bool))
     former = [] if written is None else list(written.removed)
     if written is not None:
-        left = set(_numbers(table))
+        left = set(result["obstacle_no"].tolist())
         elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
-    gone = matches(shapes_of_plain(elsewhere), table.geometry) < 0
+    gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
     former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
-    return table, Written.of(table, kept, former)
+    return result, Written.of(result, kept, former)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The columns of a table as arrays, in which single values are cheap to change."""
+
+    frame: gpd.GeoDataFrame
+    crs: CRS
+    at: dict[str, Any]
+    shapes: NDArray[np.object_]
+
+    @classmethod
+    def of(cls, frame: gpd.GeoDataFrame) -> _Rows:
+        columns: dict[str, Any] = {}
+        for each in schema.OBSTACLES.columns:
+            is_number = each.type in ("int", "float")
+            values = floats(frame, each.name) if is_number else frame[each.name].tolist()
+            columns[each.name] = np.array(values, float if is_number else object)
+        return cls(frame, CRS(frame.crs), columns, _plain_polygons(frame.geometry.array))
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def name_of(self, row: int) -> str:
+        return f"Obstacle {self.frame['obstacle_no'].iloc[row]}"
+
+    def table(self, rows: NDArray[np.int64]) -> gpd.GeoDataFrame:
+        """Some rows, which all have a number, as a table."""
+        columns = {name: values[rows] for name, values in self.at.items()}
+        columns["obstacle_no"] = columns["obstacle_no"].astype(np.int64)
+        names = schema.own_columns(schema.OBSTACLES, self.frame)
+        own = {name: self.frame[name].array[rows] for name in names}
+        return schema.table(schema.OBSTACLES, columns, self.shapes[rows], self.frame.crs, own)
 
 
 def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:
@@ -146,6 +184,18 @@ def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:
     return Written.of(table.set_geometry(shapes, crs=table.crs), np.zeros(len(table), bool))
 
 
+def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The rows that have a shape, their numbers as numbers."""
+    shapes = np.asarray(obstacles.geometry.array, dtype=object)
+    missing = shapely.is_missing(shapes) | shapely.is_empty(shapes)
+    table = obstacles[~missing] if missing.any() else obstacles
+    kinds = table.dtypes
+    names = [each.name for each in schema.OBSTACLES.columns if each.type in ("int", "float")]
+    if all(name in kinds and kinds[name].kind in "if" for name in names):
+        return table
+    return schema.conform(schema.OBSTACLES, table, extras=True)
+
+
 def _plain_polygons(geometry: Any) -> NDArray[np.object_]:
     """Two-dimensional, outer rings counter-clockwise; what has one part is that part."""
     shapes = np.array(shapely.force_2d(np.asarray(geometry, dtype=object)), dtype=object)
@@ -154,107 +204,98 @@ def _plain_polygons(geometry: Any) -> NDArray[np.object_]:
     return np.asarray(shapely.orient_polygons(shapes), dtype=object)
 
 
-def _known(table: gpd.GeoDataFrame, record: pd.DataFrame) -> NDArray[np.bool_]:
-    """The rows that the record is of: of two with one number, the one that is unchanged."""
-    number = table["obstacle_no"]
-    known = np.array(number.isin(record.index), dtype=bool)
-    if number[known].duplicated().any():
-        rows = np.flatnonzero(known)
-        shapes = record["geometry"].loc[_numbers(table[known])].to_numpy()
-        differs = ~same_shapes(table.geometry.to_numpy()[rows], shapes)
-        rows = rows[np.argsort(differs, kind="stable")]
-        second = number.iloc[rows].duplicated().to_numpy(bool)
-        known[rows[second]] = False
-    return known
+def _known(
+    rows: _Rows, record: dict[int, WrittenRow]
+) -> tuple[NDArray[np.int64], list[WrittenRow]]:
+    """The rows that the record is of, and what it says of each.
+
+    Of two rows with one number it is of the one that is unchanged.
+    """
+    numbers = rows.at["obstacle_no"]
+    known = np.flatnonzero([number in record for number in numbers.tolist()])
+    if len(np.unique(numbers[known])) < len(known):
+        shapes = shapes_of_plain([record[int(number)].shape for number in numbers[known]])
+        known = known[np.argsort(~same_shapes(rows.shapes[known], shapes), kind="stable")]
+        known = known[np.unique(numbers[known], return_index=True)[1]]
+    return known, [record[int(number)] for number in numbers[known]]
 
 
-def _with_words(
-    table: gpd.GeoDataFrame, record: pd.DataFrame, known: NDArray[np.bool_]
-) -> gpd.GeoDataFrame:
-    """The table with `status` and `kind` as the schema spells them, empty ones as written."""
-    table = table.copy()
+def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> None:
+    """Write `status` and `kind` as the schema spells them, empty ones as they were written."""
     for name, allowed in (("status", schema.STATUSES), ("kind", schema.KINDS)):
-        words = table[name].astype("string").str.strip().str.lower()
-        strange = words.notna() & ~words.isin(allowed) & (words != "")
-        for row in np.flatnonzero(strange):
-            warnings.warn(
-                f"Obstacle {table['obstacle_no'].iloc[row]}: {name} {table[name].iloc[row]!r} is "
-                f"none of {', '.join(allowed)} and is not used.",
-                FormatWarning,
-                stacklevel=3,
-            )
-        words = words.where(words.isin(allowed))
-        result = words.astype(object).where(words.notna(), None)
-        if known.any():
-            written = record[name].loc[_numbers(table[known])].to_numpy()
-            result[known] = np.where(words[known].notna(), result[known], written)
-        table[name] = result
-    return table
+        values = rows.at[name]
+        for row, value in enumerate(values.tolist()):
+            word = None if pd.isna(value) else str(value).strip().lower()
+            if word and word not in allowed:
+                warnings.warn(
+                    f"{rows.name_of(row)}: {name} {value!r} is none of {', '.join(allowed)} and "
+                    "is not used.",
+                    FormatWarning,
+                    stacklevel=3,
+                )
+            values[row] = word if word in allowed else None
+        for row, old in zip(known.tolist(), before, strict=True):
+            if values[row] is None:
+                values[row] = getattr(old, name)
 
 
-def _refuse_sizes(table: gpd.GeoDataFrame) -> None:
+def _refuse_sizes(rows: _Rows) -> None:
     for name in ("radius_m", "buffer_m"):
-        values = floats(table, name)
-        for row in np.flatnonzero(np.isinf(values) | (values < 0)):
+        values = rows.at[name]
+        for row in np.flatnonzero(np.isinf(values) | (values < 0)).tolist():
             raise ObstacleError(
-                f"Obstacle {table['obstacle_no'].iloc[row]}: {name} is {values[row]:g}.",
+                f"{rows.name_of(row)}: {name} is {values[row]:g}.",
                 hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
             )
 
 
-def _brought_up_to_date(
-    table: gpd.GeoDataFrame, record: pd.DataFrame, known: NDArray[np.bool_], grid: Grid | None
-) -> tuple[gpd.GeoDataFrame, NDArray[np.bool_], list[PlainShape]]:
-    """Shape, sizes and status of the known rows as a person's changes make them.
+def _bring_up_to_date(
+    rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow], grid: Grid | None
+) -> tuple[NDArray[np.bool_], list[PlainShape]]:
+    """Make shape, sizes and status of the known rows what a person's changes say.
 
-    Returns the table, which rows were changed, and the former shapes of detections that were
-    drawn anew.
+    Returns which rows were changed, and the former shapes of detections that were drawn anew.
     """
-    changed = np.zeros(len(table), dtype=bool)
+    changed = np.zeros(len(rows), dtype=bool)
+    if not len(known):
+        return changed, []
     former: list[PlainShape] = []
     anew: list[int] = []
-    rows = np.flatnonzero(known)
-    before = record.loc[_numbers(table.iloc[rows])]
-    geometry = np.asarray(table.geometry.to_numpy(), dtype=object).copy()
-    radius, margin = floats(table, "radius_m").copy(), floats(table, "buffer_m").copy()
-    margin[rows] = np.where(np.isnan(margin[rows]), before["buffer_m"], margin[rows])
-    status = table["status"].to_numpy(dtype=object).copy()
-    chosen = status[rows] != before["status"].to_numpy()
-    reshaped = ~same_shapes(geometry[rows], before["geometry"].to_numpy())
-    resized = _differ(radius[rows], before["radius_m"]) | _differ(margin[rows], before["buffer_m"])
-    renamed = table["kind"].to_numpy()[rows] != before["kind"].to_numpy()
-    changed[rows] = reshaped | resized | renamed | chosen
+    shapes = shapes_of_plain([row.shape for row in before])
+    was_radius, was_margin = (
+        np.array([getattr(row, name) for row in before], float) for name in ("radius_m", "buffer_m")
+    )
+    margin = rows.at["buffer_m"][known]
+    rows.at["buffer_m"][known] = margin = np.where(np.isnan(margin), was_margin, margin)
+    chosen = rows.at["status"][known] != np.array([row.status for row in before], object)
+    reshaped = ~same_shapes(rows.shapes[known], shapes)
+    resized = _differ(rows.at["radius_m"][known], was_radius) | _differ(margin, was_margin)
+    renamed = rows.at["kind"][known] != np.array([row.kind for row in before], object)
+    changed[known] = reshaped | resized | renamed | chosen
     for at in np.flatnonzero(reshaped | resized | renamed):
-        row, old = rows[at], before.iloc[at]
-        found = old["status"] in ("detected", "possible")
+        row = known[at]
+        found = before[at].status in ("detected", "possible")
         if reshaped[at] or resized[at]:
-            geometry[row], radius[row] = _shape_now(
-                geometry[row],
-                radius[row],
-                margin[row],
-                old,
-                CRS(table.crs),
-                reshaped=bool(reshaped[at]),
-                resized=bool(resized[at]),
-            )
+            rows.shapes[row], rows.at["radius_m"][row] = _shape_now(
+                rows.shapes[row], rows.at["radius_m"][row], margin[at], shapes[at], was_margin[at],
+                rows.crs, reshaped=bool(reshaped[at]), resized=bool(resized[at]),
+            )  # fmt: skip
             anew.append(row)
         if found and reshaped[at]:
-            former += plain([old["geometry"]])
+            former.append(before[at].shape)
         if found and not chosen[at]:
-            status[row] = "confirmed"
-    table = table.assign(status=status, radius_m=radius, buffer_m=margin)
+            rows.at["status"][row] = "confirmed"
     if anew:
         size: Any = np.nan
         if grid is not None:
-            x, y = shapely.get_coordinates(shapely.centroid(geometry[anew])).T
-            size = np.asarray(grid.resolution_at(*grid.from_crs(x, y, table.crs)))
-        table.loc[anew, "radius_px"] = radius[anew] / size
-    return table.set_geometry(geometry, crs=table.crs), changed, former
+            x, y = shapely.get_coordinates(shapely.centroid(rows.shapes[anew])).T
+            size = np.asarray(grid.resolution_at(*grid.from_crs(x, y, rows.crs)))
+        rows.at["radius_px"][anew] = rows.at["radius_m"][anew] / size
+    return changed, former
 
 
-def _differ(one: Any, other: Any) -> NDArray[np.bool_]:
+def _differ(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
     """Whether lengths differ; two missing ones do not."""
-    one, other = np.asarray(one, float), np.asarray(other, float)
     same = (np.abs(one - other) <= _TYPED_M) | (np.isnan(one) & np.isnan(other))
     return np.asarray(~same, dtype=bool)
 
@@ -263,14 +304,15 @@ def _shape_now(
     shape: shapely.Polygon,
     radius_m: float,
     buffer_m: float,
-    old: pd.Series[Any],
+    was: shapely.Polygon,
+    was_buffer_m: float,
     crs: CRS,
     *,
     reshaped: bool,
     resized: bool,
 ) -> tuple[shapely.Polygon, float]:
     """Shape and radius of a row that a person changed."""
-    centre, was = shapely.centroid(shape), old["geometry"]
+    centre = shapely.centroid(shape)
     scale = float(ground_scale_of(shape, crs))
     if reshaped:
         start = shapely.centroid(was)
@@ -288,23 +330,26 @@ def _shape_now(
         if not radius_m + buffer_m > 0:
             raise ObstacleError("An obstacle has no size.", hint="Give it a radius_m above 0.")
         return circle_polygons(centre.x, centre.y, radius_m + buffer_m, crs)[0], radius_m
-    grown = shapely.buffer(shape, (buffer_m - old["buffer_m"]) * scale, quad_segs=8)
+    grown = shapely.buffer(shape, (buffer_m - was_buffer_m) * scale, quad_segs=8)
     if not isinstance(grown, shapely.Polygon) or grown.is_empty:
         raise ObstacleError(
             f"A safety margin of {buffer_m:g} m leaves nothing whole of an obstacle drawn with one "
-            f"of {old['buffer_m']:g} m.",
+            f"of {was_buffer_m:g} m.",
             hint="Draw the obstacle anew, or choose another buffer_m.",
         )
     return grown, radius_m
 
 
-def _drawn(table: gpd.GeoDataFrame, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The rows that have no number of their own, or no status."""
-    number = table["obstacle_no"]
-    order = np.argsort(~known, kind="stable")
-    second = np.zeros(len(table), dtype=bool)
-    second[order] = number.iloc[order].duplicated().to_numpy(bool)
-    return np.asarray(number.isna() | table["status"].isna() | second, dtype=bool)
+def _drawn(rows: _Rows, known: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which rows have no number of their own, or no status."""
+    drawn = np.isnan(rows.at["obstacle_no"]) | np.array(
+        [word is None for word in rows.at["status"]], bool
+    )
+    order = np.concatenate([known, np.setdiff1d(np.arange(len(rows)), known)])
+    _, first = np.unique(rows.at["obstacle_no"][order], return_index=True)
+    second = np.ones(len(rows), dtype=bool)
+    second[order[first]] = False
+    return np.asarray(drawn | second, dtype=bool)
 
 
 def _added(rows: gpd.GeoDataFrame, first_no: int, grid: Grid | None) -> gpd.GeoDataFrame:
@@ -337,27 +382,17 @@ def _added(rows: gpd.GeoDataFrame, first_no: int, grid: Grid | None) -> gpd.GeoD
     )
 
 
-def _numbers(table: gpd.GeoDataFrame) -> list[int]:
-    return [int(number) for number in table["obstacle_no"]]
-
-
-def _with_positions(obstacles: gpd.GeoDataFrame, grid: Grid | None) -> gpd.GeoDataFrame:
-    """The table with the position columns of rows that were moved brought up to date."""
-    if not len(obstacles):
-        return obstacles
-    crs = CRS(obstacles.crs)
-    centre = shapely.centroid(obstacles.geometry.to_numpy())
-    x, y = shapely.get_x(centre), shapely.get_y(centre)
-    recorded = transformer(LONLAT, crs).transform(
-        obstacles["lon"].to_numpy(), obstacles["lat"].to_numpy()
-    )
+def _place(rows: _Rows, grid: Grid | None) -> None:
+    """Bring the position columns of rows that were moved up to date."""
+    if not len(rows):
+        return
+    x, y = shapely.get_coordinates(shapely.centroid(rows.shapes)).T
+    at = rows.at
+    recorded = transformer(LONLAT, rows.crs).transform(at["lon"], at["lat"])
     moved = ~(np.hypot(x - recorded[0], y - recorded[1]) <= _MOVED_M)
     if not moved.any():
-        return obstacles
-    result = obstacles.copy()
-    lon, lat = transformer(crs, LONLAT).transform(x[moved], y[moved])
-    result.loc[moved, "lon"], result.loc[moved, "lat"] = lon, lat
+        return
+    x, y = x[moved], y[moved]
+    at["lon"][moved], at["lat"][moved] = transformer(rows.crs, LONLAT).transform(x, y)
     if grid is not None:
-        x_px, y_px = grid.from_crs(x[moved], y[moved], crs)
-        result.loc[moved, "x_px"], result.loc[moved, "y_px"] = x_px, y_px
-    return result
+        at["x_px"][moved], at["y_px"][moved] = grid.from_crs(x, y, rows.crs)

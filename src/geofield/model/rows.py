@@ -128,10 +128,7 @@ class _Table:
 def tables_when_asked(**layers: schema.Layer) -> Callable[[type[_Class]], type[_Class]]:
     """Have fields of a dataclass take :class:`Rows` too, and make tables when they are read.
 
-    Parameters
-    ----------
-    **layers
-        The layer of each such field, by the field's name.
+    The layer of each such field is given by the field's name.
     """
 
     def change(owner: type[_Class]) -> type[_Class]:

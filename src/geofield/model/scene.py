@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,15 +158,9 @@ class Scene:
         r1 = min(row + height_px, self.grid.height_px)
         if c1 <= c0 or r1 <= r0:
             raise ImageryError("The part lies outside the picture.")
-        return Scene(
-            self.grid.crop(c0, r0, c1 - c0, r1 - r0),
-            self.bands[:, r0:r1, c0:c1],
-            self.roles,
-            self.valid[r0:r1, c0:c1],
-            self.source,
-            self.scaling,
-            self.notes,
-        )
+        grid = self.grid.crop(c0, r0, c1 - c0, r1 - r0)
+        bands, valid = self.bands[:, r0:r1, c0:c1], self.valid[r0:r1, c0:c1]
+        return replace(self, grid=grid, bands=bands, valid=valid)
 
     def pixel_of(self, *, lat: float, lon: float) -> tuple[float, float]:
         """The pixel position of a point that must lie on the picture's data.

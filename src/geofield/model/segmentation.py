@@ -10,21 +10,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Segmentation:
-    """A field as pixels.
+    """A field as pixels."""
 
-    Attributes
-    ----------
-    mask : bool array (rows, columns)
-        The field's pixels; what stands in it (crowns, huts, ponds) may be missing.
-    notes : tuple of str
-        What the method had to tell.
-    figures : tuple of (str, float)
-        Evidence that the method measured itself.
-    alternatives : tuple of Segmentation
-        Other fields that may be meant, the likeliest first.
-    """
-
+    #: Shape (rows, columns): the field's pixels; what stands in it (crowns, huts, ponds) may be
+    #: missing.
     mask: NDArray[np.bool_]
+    #: What the method had to tell.
     notes: tuple[str, ...] = ()
+    #: Evidence that the method measured itself.
     figures: tuple[tuple[str, float], ...] = ()
+    #: Other fields that may be meant, the likeliest first.
     alternatives: tuple[Segmentation, ...] = ()

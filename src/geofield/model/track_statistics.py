@@ -156,10 +156,6 @@ def _strips(
     strips = np.asarray(shapely.polygons(corners))
     if headland_tracks is None:
         return strips
-    around = shapely.buffer(
-        headland_tracks.geometry.to_numpy(),
-        width / 2.0,
-        cap_style="flat",
-        join_style="mitre",
-    )
+    lines = headland_tracks.geometry.to_numpy()
+    around = shapely.buffer(lines, width / 2.0, cap_style="flat", join_style="mitre")
     return np.concatenate((strips, around))

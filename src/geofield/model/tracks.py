@@ -168,10 +168,9 @@ class Tracks:
             outline=outline,
             blocked_count=int(evidence.get("blocked_count", 0)),
             losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),
-            headland=tables.get(schema.HEADLAND.name),
-            headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
-            route=tables.get(schema.ROUTE.name),
-            turns=tables.get(schema.TURNS.name),
+            **{
+                name: tables.get(name) for name in ("headland", "headland_tracks", "route", "turns")
+            },
         )
 
     @cached_property
@@ -218,35 +217,16 @@ class Tracks:
             start = np.repeat(coordinates[part, 0], number, axis=0)
             direction = (coordinates[part, 1] - coordinates[part, 0]) / length[part, None]
             xy = start + along[:, None] * np.repeat(direction, number, axis=0)
-            yield self._point_table(
-                xy,
-                np.arange(done + 1, done + total + 1),
-                np.repeat(track_no[part], number),
-                np.repeat(segment_no[part], number),
-            )
-            done += total
-
-    def _point_table(
-        self, xy: np.ndarray, point_no: np.ndarray, track_no: np.ndarray, segment_no: np.ndarray
-    ) -> gpd.GeoDataFrame:
-        lon, lat = transformer(self.crs, LONLAT).transform(xy[:, 0], xy[:, 1])
-        missing = np.full(len(xy), np.nan)
-        x_px, y_px = (
-            (missing, missing)
-            if self.grid is None
-            else self.grid.from_crs(xy[:, 0], xy[:, 1], self.crs)
-        )
-        return schema.table(
-            schema.TRACK_POINTS,
-            {
-                "point_no": point_no,
-                "track_no": track_no,
-                "segment_no": segment_no,
-                "x_px": x_px,
-                "y_px": y_px,
+            lon, lat = transformer(self.crs, LONLAT).transform(xy[:, 0], xy[:, 1])
+            columns = {
+                "point_no": np.arange(done + 1, done + total + 1),
+                "track_no": np.repeat(track_no[part], number),
+                "segment_no": np.repeat(segment_no[part], number),
                 "lat": lat,
                 "lon": lon,
-            },
-            shapely.points(xy),
-            self.crs,
-        )
+            }
+            if self.grid is not None:
+                x_px, y_px = self.grid.from_crs(xy[:, 0], xy[:, 1], self.crs)
+                columns |= {"x_px": x_px, "y_px": y_px}
+            yield schema.table(schema.TRACK_POINTS, columns, shapely.points(xy), self.crs)
+            done += total

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import shapely
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
@@ -26,67 +25,44 @@ if TYPE_CHECKING:
 #: Editors and formats that keep the coordinates stay far below it.
 SAME_M = 0.001
 _DECIMALS = 4
+_WORDS = ("kind", "status")
 
 #: A shape in plain values: centre x, y and radius of a circle, or WKT; in units of the CRS.
 PlainShape = tuple[float, float, float] | str
 
 
-@dataclass(frozen=True, slots=True)
-class WrittenRow:
-    """One obstacle as it was written.
-
-    Attributes
-    ----------
-    obstacle_no : int
-    kind, status : str
-    radius_m, buffer_m : float or None
-    kept : bool
-        Whether it is a person's word, which no detection changes.
-    shape : tuple or str
-        Its buffer, in the plan's metric CRS.
-    """
+class WrittenRow(NamedTuple):
+    """One obstacle as it was written."""
 
     obstacle_no: int
-    kind: str
-    status: str
+    kind: str | None
+    status: str | None
     radius_m: float | None
     buffer_m: float | None
+    #: Whether it is a person's word, which no detection changes.
     kept: bool
+    #: Its buffer, in the plan's metric CRS.
     shape: PlainShape
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The obstacles as they were written, and what a person took away.
-
-    Attributes
-    ----------
-    rows : tuple of WrittenRow
-    removed : tuple of shapes
-        Where a person deleted an obstacle, or moved it away from: nothing is found there again.
-    """
+    """The obstacles as they were written, and what a person took away."""
 
     rows: tuple[WrittenRow, ...] = ()
+    #: Where a person deleted an obstacle, or moved it away from: nothing is found there again.
     removed: tuple[PlainShape, ...] = ()
 
     @classmethod
     def of(
         cls, obstacles: gpd.GeoDataFrame, kept: ArrayLike, removed: Sequence[PlainShape] = ()
     ) -> Written:
-        """The record of a table in which every row has a number.
-
-        Parameters
-        ----------
-        obstacles : GeoDataFrame
-            Layer `obstacles`.
-        kept : bool array
-            Of each row, whether it is a person's word.
-        removed : sequence of shapes
-        """
+        """The record of a table in which every row has a number; a person's word is `kept`."""
         radius, margin = floats(obstacles, "radius_m"), floats(obstacles, "buffer_m")
-        shapes = plain(obstacles.geometry.to_numpy())
-        columns = (obstacles["obstacle_no"], obstacles["kind"], obstacles["status"])
-        rows = zip(*columns, radius, margin, np.asarray(kept, bool), shapes, strict=True)
+        shapes = plain(obstacles.geometry.array)
+        words = ([_word(each) for each in obstacles[column]] for column in _WORDS)
+        numbers, kept = obstacles["obstacle_no"].tolist(), np.asarray(kept, bool)
+        rows = zip(numbers, *words, radius, margin, kept, shapes, strict=True)
         return cls(
             tuple(
                 WrittenRow(int(no), kind, status, _number(r), _number(m), bool(k), shape)
@@ -95,33 +71,22 @@ class Written:
             tuple(dict.fromkeys(removed)),
         )
 
-    def table(self) -> pd.DataFrame:
-        """The rows by number, with their shapes."""
-        columns = {
-            name: [getattr(row, name) for row in self.rows]
-            for name in ("kind", "status", "radius_m", "buffer_m", "kept")
-        }
-        numbers = pd.Index([row.obstacle_no for row in self.rows], dtype="int64")
-        table = pd.DataFrame(columns, index=numbers)
-        table = table.astype({"radius_m": float, "buffer_m": float, "kept": bool})
-        return table.assign(geometry=shapes_of_plain([row.shape for row in self.rows]))
+    @property
+    def by_number(self) -> dict[int, WrittenRow]:
+        """The rows by their obstacles' numbers."""
+        return {row.obstacle_no: row for row in self.rows}
 
     def reprojected(self, source: CRS, target: CRS) -> Written:
         """The same in another metric CRS."""
         if source == target:
             return self
-        from dataclasses import replace
-
-        rows = [replace(row, shape=_moved(row.shape, source, target)) for row in self.rows]
+        rows = [row._replace(shape=_moved(row.shape, source, target)) for row in self.rows]
         return Written(tuple(rows), tuple(_moved(each, source, target) for each in self.removed))
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; see :meth:`from_json`."""
         return {
-            "rows": [
-                [r.obstacle_no, r.kind, r.status, r.radius_m, r.buffer_m, r.kept, _listed(r.shape)]
-                for r in self.rows
-            ],
+            "rows": [[*row[:-1], _listed(row.shape)] for row in self.rows],
             "removed": [_listed(shape) for shape in self.removed],
         }
 
@@ -129,7 +94,10 @@ class Written:
     def from_json(cls, value: Mapping[str, Any]) -> Written:
         """The record that was written with :meth:`to_json`."""
         return cls(
-            tuple(_row(*row) for row in value["rows"]),
+            tuple(
+                WrittenRow._make((number, _word(kind), _word(status), *rest, _unlisted(shape)))
+                for number, kind, status, *rest, shape in value["rows"]
+            ),
             tuple(_unlisted(shape) for shape in value["removed"]),
         )
 
@@ -216,20 +184,13 @@ def _moved(shape: PlainShape, source: CRS, target: CRS) -> PlainShape:
     return str(shapely.to_wkt(moved, rounding_precision=_DECIMALS))
 
 
+def _word(value: Any) -> str | None:
+    """A word; None also for the NaN that earlier versions wrote where there was none."""
+    return value if isinstance(value, str) else None
+
+
 def _number(value: float) -> float | None:
     return None if np.isnan(value) else round(float(value), 6)
-
-
-def _row(
-    obstacle_no: int,
-    kind: str,
-    status: str,
-    radius_m: float | None,
-    buffer_m: float | None,
-    kept: bool,
-    shape: Any,
-) -> WrittenRow:
-    return WrittenRow(obstacle_no, kind, status, radius_m, buffer_m, kept, _unlisted(shape))
 
 
 def _listed(shape: PlainShape) -> list[float] | str:

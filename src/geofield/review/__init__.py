@@ -21,4 +21,4 @@ if TYPE_CHECKING:
 __all__ = ["Session", "apply_command"]
 
 # The server answers before tables and geometry are there.
-__getattr__ = late_names(__name__, {"Session": "session", "apply_command": "commands"})
+__getattr__ = late_names(__name__, {"session": "Session", "commands": "apply_command"})

@@ -41,17 +41,11 @@ def apply_command(plan: Plan, command: Command) -> Plan:
 
     Planning brings the other columns of an obstacle that was moved or reshaped up to date.
 
-    Parameters
-    ----------
-    plan : Plan
-    command : mapping
-        ``do`` and the values of that edit.
-
     Raises
     ------
     EditError
-        For an unknown edit, an obstacle that is not there, a value that is no number, or a
-        shape that crosses itself or lies outside the picture.
+        For an unknown edit, an obstacle that is not there, a value that is no number, or a shape
+        that crosses itself or lies outside the picture.
     """
     name = command.get("do")
     if not isinstance(name, str) or name not in COMMANDS:
@@ -102,23 +96,15 @@ def set_radius(plan: Plan, command: Command) -> Plan:
         )
     radius_m, centre = _radius(command), row.geometry.centroid
     buffer_m = float(np.nan_to_num(row["buffer_m"]))
-    return _reshaped(
-        plan,
-        command,
-        circle_polygons(centre.x, centre.y, radius_m + buffer_m, plan.field.crs)[0],
-        {"radius_m": radius_m, "radius_px": row["radius_px"] * radius_m / row["radius_m"]},
-    )
+    shape = circle_polygons(centre.x, centre.y, radius_m + buffer_m, plan.field.crs)[0]
+    radius_px = row["radius_px"] * radius_m / row["radius_m"]
+    return _reshaped(plan, command, shape, {"radius_m": radius_m, "radius_px": radius_px})
 
 
 def reshape(plan: Plan, command: Command) -> Plan:
     """The shape of an obstacle as a person drew it: ``no``, ``ring``."""
-    shape = _polygon([command["ring"]], "obstacle")
-    return _reshaped(
-        plan,
-        command,
-        shape,
-        {"kind": "other", "radius_m": np.nan, "radius_px": np.nan, "buffer_m": 0.0},
-    )
+    drawn = {"kind": "other", "radius_m": np.nan, "radius_px": np.nan, "buffer_m": 0.0}
+    return _reshaped(plan, command, _polygon([command["ring"]], "obstacle"), drawn)
 
 
 def delete(plan: Plan, command: Command) -> Plan:

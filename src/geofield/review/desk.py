@@ -30,14 +30,9 @@ from geofield.web.view import margin_bounds, place_table
 
 
 class Desk:
-    """A plan on the desk.
+    """A plan, from a GeoPackage of geofield, on the desk.
 
-    Parameters
-    ----------
-    path : Path
-        A GeoPackage of geofield.
-    picture : Path, optional
-        Shown below; the picture that lies beside the plan when not given.
+    Below it the picture is shown: the one that lies beside the plan when none is given.
     """
 
     def __init__(self, path: Path, picture: Path | None = None) -> None:
@@ -63,6 +58,8 @@ class Desk:
 
     def opening(self) -> dict[str, Any]:
         """The session's state and what does not change: picture, file, places."""
+        from geofield.formats import FORMATS
+
         with self.lock:
             plan = self.session.plan
             bounds = self._bounds(plan)
@@ -75,7 +72,7 @@ class Desk:
                 "picture": self._picture_facts(),
                 "scale": 1.0 / float(ground_scale_of(plan.field.polygon, plan.field.crs)),
                 "theme": web_theme(),
-                "formats": _formats(),
+                "formats": [(one.name, one.title) for one in FORMATS.values()],
                 "directions": get_args(DirectionName),
             }
 
@@ -210,12 +207,6 @@ def _in_words(path: Path) -> Iterator[None]:
             f"{path.name} could not be written: {error.strerror or error}.",
             hint="The edits are kept; make room, or save under another name.",
         ) from error
-
-
-def _formats() -> list[tuple[str, str]]:
-    from geofield.formats import FORMATS
-
-    return [(one.name, one.title) for one in FORMATS.values()]
 
 
 def picture_beside(path: Path) -> Path | None:

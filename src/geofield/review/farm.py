@@ -27,15 +27,7 @@ _PLACE = "reviewing"
 
 
 class FarmDesk(Desk):
-    """A field of a farm.
-
-    Parameters
-    ----------
-    folder : Path
-        The farm.
-    field_id : str
-    picture : Path, optional
-    """
+    """A field of a farm, by its id."""
 
     def __init__(self, folder: Path, field_id: str, picture: Path | None) -> None:
         self._folder, self._field_id = folder, field_id

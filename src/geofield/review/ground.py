@@ -23,16 +23,12 @@ if TYPE_CHECKING:
 
 #: Clicks nearer than this are on the same place, metres.
 _SAME_M = 2.0
+#: What the field is called, and the picture behind it.
+_KEPT = ("name", "field_id", "own", "imagery", "imagery_date", "licence")
 
 
 class Ground:
-    """The picture of a plan, searched for outlines.
-
-    Parameters
-    ----------
-    read : callable
-        Reads the picture of a plan; asked once, at the first click.
-    """
+    """The picture of a plan, searched for outlines; it is read at the first click."""
 
     def __init__(self, read: Callable[[Plan], Scene]) -> None:
         self._read = read
@@ -42,11 +38,7 @@ class Ground:
     def find(self, plan: Plan, command: Command) -> Plan:
         """The plan with the outline that follows from a further point.
 
-        Parameters
-        ----------
-        plan : Plan
-        command : mapping
-            ``place``, x and y in the plan's metric CRS, and ``belongs``, true or false.
+        The command has ``place``, x and y in the plan's metric CRS, and ``belongs``, true or false.
 
         Raises
         ------
@@ -78,16 +70,7 @@ class Ground:
         found = extract_field(
             self._scene, lat=lat0, lon=lon0, search=self._search, **said.model_dump()
         )
-        old = plan.field
-        found = replace(
-            found,
-            name=old.name,
-            field_id=old.field_id,
-            own=old.own,
-            imagery=old.imagery,
-            imagery_date=old.imagery_date,
-            licence=old.licence,
-        )
+        found = replace(found, **{name: getattr(plan.field, name) for name in _KEPT})
         return replace(
             plan,
             field=found,

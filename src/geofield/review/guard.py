@@ -31,13 +31,7 @@ SECURITY_HEADERS = {
 
 
 class Guard:
-    """The rules for one server.
-
-    Parameters
-    ----------
-    port : int
-        That it listens on.
-    """
+    """The rules for a server that listens on a port."""
 
     def __init__(self, port: int) -> None:
         self.token = secrets.token_urlsafe(24)

@@ -32,13 +32,7 @@ def fingerprint(plan_path: Path) -> str:
 
 
 class Journal:
-    """The edits of one session, on the disk.
-
-    Parameters
-    ----------
-    plan_path : Path
-        The plan's GeoPackage.
-    """
+    """The edits of one session on a plan's GeoPackage, on the disk."""
 
     def __init__(self, plan_path: Path) -> None:
         self.plan_path = plan_path
@@ -61,15 +55,8 @@ class Journal:
     def replay(self, session: Session) -> str | None:
         """Make the edits of a session that ended without saving again.
 
-        Parameters
-        ----------
-        session : Session
-            On the plan in :attr:`begins_at`.
-
-        Returns
-        -------
-        str or None
-            What was brought back, or why it was not, in words.
+        The session is on the plan in :attr:`begins_at`. What was brought back, or why it was not,
+        is told in words.
         """
         told, self._lost = self._lost, None
         unsaved = done = 0

@@ -33,14 +33,9 @@ _TYPES = {
 
 
 class ReviewServer(ThreadingHTTPServer):
-    """A server for one session, bound to 127.0.0.1.
+    """A server for one session, bound to 127.0.0.1; port 0 takes a free one.
 
     The page itself is served at once; what it asks of the plan waits until :meth:`load` has it.
-
-    Parameters
-    ----------
-    port : int
-        0 takes a free one.
     """
 
     daemon_threads = True
@@ -129,7 +124,8 @@ class _Handler(BaseHTTPRequestHandler):
         token = parse_qs(address.query).get("token", [""])[0]
         if address.path == "/" and token and self.server.guard.opens(token, self._headers()):
             # The key leaves the address line, so that no screenshot shows it.
-            self._send(303, b"", "text/plain", {"Location": "/", **self._cookie()})
+            cookie = self.server.guard.cookie_header()
+            self._send(303, b"", "text/plain", {"Location": "/", "Set-Cookie": cookie})
             return
         if self._refused():
             return
@@ -196,32 +192,28 @@ class _Handler(BaseHTTPRequestHandler):
             number = value.get("plan")
             shelf.open(number if isinstance(number, int) else -1)
             return {"plan": shelf.current}
-        desk = shelf.desk
-        if path == "/api/edit":
-            return desk.edit(value)
-        if path == "/api/preview":
-            return desk.preview(value)
-        if path == "/api/save":
-            name = value.get("name")
-            return desk.save(name if isinstance(name, str) else None)
-        if path == "/api/reload":
-            return desk.reload()
-        if path == "/api/export":
-            return desk.export(str(value.get("format", "")))
-        raise _NoSuchRequestError(path)
+        desk, name = shelf.desk, value.get("name")
+        requests: dict[str, Callable[[], dict[str, Any]]] = {
+            "/api/edit": lambda: desk.edit(value),
+            "/api/preview": lambda: desk.preview(value),
+            "/api/save": lambda: desk.save(name if isinstance(name, str) else None),
+            "/api/reload": desk.reload,
+            "/api/export": lambda: desk.export(str(value.get("format", ""))),
+        }
+        if path not in requests:
+            raise _NoSuchRequestError(path)
+        return requests[path]()
 
     def _tile(self, path: str) -> None:
         show, *places = path.split("/")[2:]
         shelf = self.server.shelf
         numbers = [int(place) for place in places if place.isdecimal()]
-        if len(places) != 4 or len(numbers) != 4 or numbers[0] >= len(shelf.names):
-            self._json(404, {"message": "There is no such tile."})
-            return
-        plan, level, column, row = numbers
-        picture = shelf.desk_of(plan).picture
+        known = len(places) == len(numbers) == 4 and numbers[0] < len(shelf.names)
+        picture = shelf.desk_of(numbers[0]).picture if known else None
         if picture is None or show not in ("colour", "infrared"):
             self._json(404, {"message": "There is no such tile."})
             return
+        _, level, column, row = numbers
         try:
             data, kind = picture.tile(level, column, row, show)  # type: ignore[arg-type]
         except GeofieldError as error:
@@ -238,9 +230,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _headers(self) -> dict[str, str]:
         return {name.title(): value for name, value in self.headers.items()}
-
-    def _cookie(self) -> dict[str, str]:
-        return {"Set-Cookie": self.server.guard.cookie_header()}
 
     def _json(self, status: int, value: dict[str, Any]) -> None:
         data = json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()

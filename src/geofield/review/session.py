@@ -22,20 +22,13 @@ MOST_STEPS = 500
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One state of the plan.
+    """One state of the plan."""
 
-    Attributes
-    ----------
-    plan : Plan
-        With the tracks that belong to it.
-    command : mapping or None
-        What led to it; None for the plan that was opened.
-    notes : tuple of str
-        What the planner had to tell.
-    """
-
+    #: With the tracks that belong to it.
     plan: Plan
+    #: What led to it; None for the plan that was opened.
     command: Command | None = None
+    #: What the planner had to tell.
     notes: tuple[str, ...] = ()
 
 

@@ -13,14 +13,7 @@ from geofield.review.plans import is_farm, plans_in
 
 
 class Shelf:
-    """Plans that can be reviewed in one session.
-
-    Parameters
-    ----------
-    place : Path
-        A GeoPackage of geofield, a farm, or a folder in which several GeoPackages lie.
-    picture : Path, optional
-        Shown below; the picture beside each plan when not given.
+    """Plans that can be reviewed in one session: a GeoPackage, a farm, or a folder with several.
 
     Raises
     ------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from geofield import wording
 
 NonNegative = Annotated[float, Field(ge=0)]
 
@@ -34,6 +35,5 @@ class Section(BaseModel):
 
 
 def nearest(given: str, names: Iterable[str]) -> str:
-    """A sentence with the nearest of some names, or nothing."""
-    close = difflib.get_close_matches(given.lower(), list(names), n=1, cutoff=0.5)
-    return f" Did you mean {close[0]!r}?" if close else ""
+    """A sentence with the nearest of some names of settings, or nothing."""
+    return wording.nearest(given.lower(), names, cutoff=0.5)

@@ -23,4 +23,4 @@ __all__ = [
 ]
 
 # Most runs need no route.
-__getattr__ = late_names(__name__, {"plan_route": "route"})
+__getattr__ = late_names(__name__, {"route": "plan_route"})

@@ -14,7 +14,14 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale, ground_scale_of
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
-from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, active, numbered, shapes_of
+from geofield.model.obstacles import (
+    QUARTER_SEGMENTS,
+    ObstacleShapes,
+    active,
+    floats,
+    numbered,
+    shapes_of,
+)
 
 _POINTS = (shapely.GeometryType.POINT.value, shapely.GeometryType.MULTIPOINT.value)
 _LINES = (
@@ -27,20 +34,10 @@ _LINES = (
 def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> ObstacleShapes:
     """Understand obstacles in any of the forms a user may have them.
 
-    Parameters
-    ----------
-    obstacles : GeoDataFrame, GeoSeries, shapely geometry, sequence of them, or None
-        Tables in another CRS are reprojected; plain geometries are in `crs`. Rows whose `status` is
-        ``rejected`` or ``possible`` are left out. Points need a column `radius_m`, or a clearance.
-    crs : CRS
-        The field's.
-    clearance_m : float
-        Grows everything by this much.
-
-    Returns
-    -------
-    ObstacleShapes
-        With numbers from the column `obstacle_no`, or 1, 2, ... in the order given.
+    Tables in another CRS are reprojected; plain geometries are in `crs`, the field's. Rows whose
+    `status` is ``rejected`` or ``possible`` are left out. Points need a column `radius_m`, or a
+    clearance, which grows everything by that much. Numbers are those of the column `obstacle_no`,
+    else 1, 2, ... in the order given.
 
     Raises
     ------
@@ -54,12 +51,8 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     if not np.isfinite(clearance_m) or clearance_m < 0.0:
         raise TrackError(f"clearance_m is {clearance_m}; it must be 0 or more metres.")
     if obstacles is None:
-        return ObstacleShapes(
-            np.empty((0, 3)),
-            np.empty(0, np.int64),
-            np.empty(0, dtype=object),
-            np.empty(0, np.int64),
-        )
+        none = np.empty(0, np.int64)
+        return ObstacleShapes(np.empty((0, 3)), none, np.empty(0, dtype=object), none)
     frame = _as_table(obstacles, crs)
     frame = active(numbered(frame))
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
@@ -124,7 +117,7 @@ def _with_thin(
     """Add points as circles and lines as strips, or say that they have no width."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     number = frame["obstacle_no"].to_numpy(dtype=np.int64)
-    own = np.nan_to_num(_column(frame, "radius_m")) + np.nan_to_num(_column(frame, "buffer_m"))
+    own = np.nan_to_num(floats(frame, "radius_m")) + np.nan_to_num(floats(frame, "buffer_m"))
     width = (own + clearance_m) * ground_scale_of(geometry, CRS(frame.crs))
     bare = np.flatnonzero((point | line) & ~(width > 0.0))
     if len(bare):
@@ -141,12 +134,6 @@ def _with_thin(
         np.concatenate((shapes.polygons, strips)),
         np.concatenate((shapes.polygon_no, number[line])),
     )
-
-
-def _column(frame: gpd.GeoDataFrame, name: str) -> NDArray[np.float64]:
-    if name not in frame.columns:
-        return np.full(len(frame), np.nan)
-    return np.asarray(frame[name].to_numpy(dtype="float64", na_value=np.nan))
 
 
 def _grown(shapes: ObstacleShapes, clearance_m: float, crs: CRS) -> ObstacleShapes:

@@ -31,17 +31,11 @@ _BLOCK = 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """The drivable pieces of all tracks, by track and then by place.
+    """The drivable pieces of all tracks, by track and then by place."""
 
-    Attributes
-    ----------
-    track : int array, shape (n,)
-        Index of the track in the positions given.
-    start, end : array, shape (n,)
-        Place along the track (u of the frame), metres.
-    """
-
+    #: Shape (n,): index of the track in the positions given.
     track: IntArray
+    #: start, end (n,): place along the track (u of the frame), metres.
     start: FloatArray
     end: FloatArray
 
@@ -76,21 +70,9 @@ def clip_tracks(
 ) -> tuple[Pieces, Crossings]:
     """Find where each track is inside the field and outside every obstacle.
 
-    Parameters
-    ----------
-    positions : array, shape (tracks,)
-        Places v of the tracks in the frame, strictly increasing, metres.
-    edges : Edges
-        Edges of the field (owner ``FIELD``) and of polygonal obstacles.
-    discs : Discs, optional
-        Round obstacles, cut as true circles.
-    min_length_m : float
-        Shorter pieces are not driven: they become part of the gap.
-
-    Returns
-    -------
-    Pieces
-    Crossings
+    `positions` are the places v of the tracks in the frame, strictly increasing, metres; `edges`
+    those of the field (owner ``FIELD``) and of polygonal obstacles; `discs` are cut as true
+    circles. Pieces shorter than `min_length_m` are not driven: they become part of the gap.
     """
     track, u, enters, owner, both = _all_crossings(positions, edges, discs)
     # Sorting by place and then, stably, by track: a radix sort for 16-bit track numbers.

@@ -29,30 +29,20 @@ METHODS = ("dominant", "longest_edge", "hough", "fewest", "fewest_turns")
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """What the tracks are parallel to, and where they are counted from.
+    """What the tracks are parallel to, and where they are counted from."""
 
-    Attributes
-    ----------
-    along : (float, float)
-        Direction of the tracks in the CRS, unit vector, its true heading in [0, 180).
-    heading_deg : float
-        The same as a true heading.
-    left : bool
-        Whether numbers grow to the left of the direction.
-    edge : StraightRun or None
-        The edge of the outline that tracks are counted from, for `dominant`,
-        `longest_edge` and `hough`.
-    through : (float, float) or None
-        A place in the CRS that a track passes through, for an A-B line.
-    why : str
-        Why this direction, where geofield chose it.
-    """
-
+    #: Direction of the tracks in the CRS, unit vector, its true heading in [0, 180).
     along: tuple[float, float]
+    #: The same as a true heading.
     heading_deg: float
+    #: Whether numbers grow to the left of the direction.
     left: bool = False
+    #: The edge of the outline that tracks are counted from, for `dominant`, `longest_edge` and
+    #: `hough`.
     edge: StraightRun | None = None
+    #: A place in the CRS that a track passes through, for an A-B line.
     through: tuple[float, float] | None = None
+    #: Why this direction, where geofield chose it.
     why: str = ""
 
 
@@ -65,22 +55,11 @@ def find_baseline(
     tolerance_m: float = 1.0,
     grid: Grid | None = None,
 ) -> Baseline:
-    """Turn the user's choice of a direction into a baseline.
+    """Turn the user's choice of a direction, as in `plan_tracks`, into a baseline.
 
-    Parameters
-    ----------
-    polygon : shapely.Polygon
-        The field, in a metric CRS.
-    direction : str, float, LineString or pair of points
-        ``dominant``, ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading
-        in degrees, or an A-B line in the CRS.
-    crs : CRS
-    spacing_m : float
-        Needed by ``fewest``.
-    tolerance_m : float
-        Half the width of the band within which an edge counts as straight.
-    grid : Grid, optional
-        Of the picture that the outline was found in: its frame is no edge of the field.
+    The field is in a metric CRS, and so is an A-B line; the spacing is needed by ``fewest``. An
+    edge counts as straight within a band of twice `tolerance_m`. `grid` is that of the picture in
+    which the outline was found: its frame is no edge of the field.
 
     Raises
     ------
@@ -108,13 +87,10 @@ def find_baseline(
         if direction in ("fewest", "fewest_turns"):
             along = fewest_direction(polygon, spacing_m * scale, turns=direction == "fewest_turns")
             return _from_vector(along, north)
-        heading = _number(direction)
-        if heading is None:
-            raise TrackError(
-                f"Unknown direction {direction!r}.",
-                hint=f"Choose one of {', '.join(METHODS)}, a heading in degrees, or an A-B line.",
-            )
-        direction = heading
+        try:
+            direction = float(direction)
+        except ValueError:
+            raise _unknown(direction) from None
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
     return _from_ab(direction, north)
@@ -126,11 +102,11 @@ def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:
     return 0.0 if heading >= 180.0 else heading
 
 
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+def _unknown(direction: Any) -> TrackError:
+    return TrackError(
+        f"Unknown direction {direction!r}.",
+        hint=f"Choose one of {', '.join(METHODS)}, a heading in degrees, or an A-B line.",
+    )
 
 
 def _from_heading(heading_deg: float, north: float) -> Baseline:
@@ -169,10 +145,7 @@ def _from_ab(line: Any, north: float) -> Baseline:
             dtype=np.float64,
         )
     except (TypeError, ValueError) as error:
-        raise TrackError(
-            f"Unknown direction {line!r}.",
-            hint=f"Choose one of {', '.join(METHODS)}, a heading in degrees, or an A-B line.",
-        ) from error
+        raise _unknown(line) from error
     if points.shape != (2, 2) or not np.isfinite(points).all():
         raise TrackError(
             "An A-B line has two points of two finite coordinates in the field's CRS.",

@@ -31,16 +31,8 @@ def dominant_edge(
 ) -> tuple[StraightRun, float]:
     """Find the edge that tracks follow, and what share of the border runs its way.
 
-    Parameters
-    ----------
-    polygon, tolerance, frame
-        As for :func:`geofield.tracks.longest_edge.longest_edge`.
-
-    Returns
-    -------
-    StraightRun
-    float
-        Share of the field's own border (without the picture's frame) within a few degrees, 0 to 1.
+    Arguments are those of :func:`geofield.tracks.longest_edge.longest_edge`. The share, 0 to 1, is
+    that of the field's own border (without the picture's frame) within a few degrees.
     """
     xy, barred = own_edges(polygon, tolerance, frame)
     offset = np.roll(xy, -1, axis=0) - xy

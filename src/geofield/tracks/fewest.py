@@ -9,6 +9,8 @@ depend on notches and holes as well. Each candidate is laid out and clipped, not
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from shapely import Polygon
@@ -25,23 +27,11 @@ _MOST_ANGLES = 600
 def fewest_direction(
     polygon: Polygon, spacing: float, *, turns: bool = False, tolerance: float = 1.0
 ) -> tuple[float, float]:
-    """Find the direction, exact over the candidates.
+    """Find the direction, exact over the candidates, as a unit vector in the (metric) CRS.
 
-    Parameters
-    ----------
-    polygon : shapely.Polygon
-        In a metric CRS.
-    spacing : float
-        Between neighbouring tracks, in units of the CRS.
-    turns : bool
-        Fewest pieces first and tracks second, instead of the other way round.
-    tolerance : float
-        Simplifies the outline before its edges become candidates.
-
-    Returns
-    -------
-    (float, float)
-        Unit vector in the CRS.
+    `spacing` is in units of the CRS. With `turns` the fewest pieces count first and tracks second,
+    instead of the other way round. `tolerance` simplifies the outline before its edges become
+    candidates.
     """
     centre = polygon.centroid
     edges = polygon_edges(
@@ -53,8 +43,7 @@ def fewest_direction(
         near, far = float(turned.va.min()), float(turned.va.max())
         positions = track_positions(near, far, spacing, first_m=near + spacing / 2.0)
         pieces, _ = clip_tracks(positions, turned)
-        tracks = float(len(positions))
-        count = float(len(pieces))
+        tracks, count = float(len(positions)), float(len(pieces))
         # Of equals, the one across which the field is narrowest.
         score = (count, tracks, far - near) if turns else (tracks, count, far - near)
         if best is None or score < best[0]:
@@ -65,11 +54,8 @@ def fewest_direction(
 
 def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
     """Directions to try, radians counter-clockwise from the CRS's x axis, 0 <= angle < pi."""
-    outline = shapely.get_exterior_ring(polygon.simplify(tolerance))
-    hull = polygon.convex_hull
-    rings = [outline]
-    if isinstance(hull, Polygon):
-        rings.append(shapely.get_exterior_ring(hull))
+    outlines = (polygon.simplify(tolerance), polygon.convex_hull)
+    rings = [shapely.get_exterior_ring(one) for one in outlines if isinstance(one, Polygon)]
     edges = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
     angles = np.arctan2(edges[:, 1], edges[:, 0]) % np.pi
     # Edges first: of equals the first wins, and a driver would rather follow an edge.
@@ -87,11 +73,10 @@ def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
 
 def _turned(edges: Edges, angle: float) -> Edges:
     cos, sin = np.cos(angle), np.sin(angle)
-    return Edges(
-        edges.ua * cos + edges.va * sin,
-        edges.va * cos - edges.ua * sin,
-        edges.ub * cos + edges.vb * sin,
-        edges.vb * cos - edges.ub * sin,
-        edges.turn,
-        edges.owner,
+    return replace(
+        edges,
+        ua=edges.ua * cos + edges.va * sin,
+        va=edges.va * cos - edges.ua * sin,
+        ub=edges.ub * cos + edges.vb * sin,
+        vb=edges.vb * cos - edges.ub * sin,
     )

@@ -19,26 +19,19 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class TrackFrame:
-    """Origin and axes of a field's tracks.
+    """Origin and axes of a field's tracks."""
 
-    Attributes
-    ----------
-    origin_x_m, origin_y_m : float
-        Origin in the metric CRS.
-    along_x, along_y : float
-        Unit vector of the tracks (the axis u), in the CRS.
-    across_x, across_y : float
-        Unit vector from one track to the next (the axis v): perpendicular to u, on either side.
-    scale : float
-        Units of the CRS per metre on the ground (`geofield.crs.ground_scale`).
-    """
-
+    #: origin_x_m, origin_y_m: origin in the metric CRS.
     origin_x_m: float
     origin_y_m: float
+    #: along_x, along_y: unit vector of the tracks (the axis u), in the CRS.
     along_x: float
     along_y: float
+    #: across_x, across_y: unit vector from one track to the next (the axis v): perpendicular to u,
+    #: on either side.
     across_x: float
     across_y: float
+    #: Units of the CRS per metre on the ground (`geofield.crs.ground_scale`).
     scale: float = 1.0
 
     @classmethod
@@ -50,31 +43,16 @@ class TrackFrame:
         left: bool = False,
         scale: float = 1.0,
     ) -> TrackFrame:
-        """Make a frame from an origin and a direction.
+        """Make a frame from an origin in the metric CRS and a direction of any length but zero.
 
-        Parameters
-        ----------
-        origin : (float, float)
-            In the metric CRS; rounded to whole metres, so that subtracting it is exact.
-        along : (float, float)
-            Direction of the tracks, any length but zero.
-        left : bool
-            Whether v points to the left of the direction instead of to the right.
-        scale : float
-            Units of the CRS per metre on the ground.
+        The origin is rounded to whole metres, so that subtracting it is exact. `left` says that v
+        points to the left of the direction instead of to the right; `scale` is that of the frame.
         """
         length = float(np.hypot(*along))
         ux, uy = along[0] / length, along[1] / length
         side = -1.0 if left else 1.0
-        return cls(
-            float(np.rint(origin[0])),
-            float(np.rint(origin[1])),
-            ux,
-            uy,
-            side * uy,
-            -side * ux,
-            scale,
-        )
+        x, y = (float(np.rint(value)) for value in origin)
+        return cls(x, y, ux, uy, side * uy, -side * ux, scale)
 
     def to_frame(self, x: Any, y: Any) -> tuple[FloatArray, FloatArray]:
         """Carry CRS coordinates into the frame: (u, v) in ground metres."""

@@ -18,6 +18,12 @@ from geofield.settings import TrackSettings
 from geofield.tracks.outline import metric
 from geofield.tracks.planner import plan_tracks
 
+#: Settings that are arguments of the same name.
+_OF_TRACKS = (
+    "spacing_m", "last_strip", "headland_m", "headland_holes", "min_segment_m", "clearance_m",
+    "step_m", "straight_tolerance_m",
+)  # fmt: skip
+_OF_ROUTE = ("skip", "turning_radius_m", "curve", "margin_m")
 #: A place given for a field is not farther from it, metres.
 _NEAR_M = 20_000.0
 
@@ -32,12 +38,8 @@ def plan_with_settings(
 ) -> Tracks:
     """Plan tracks and, when `settings.route` names a pattern, the route through them.
 
-    Parameters
-    ----------
-    polygon, obstacles, crs, grid
-        As for `plan_tracks`.
-    settings : TrackSettings
-        Places in it are longitude and latitude.
+    The other arguments are those of `plan_tracks`; places in the settings are longitude and
+    latitude.
     """
     metric_crs = metric(crs)
     direction: Any = settings.direction
@@ -52,20 +54,13 @@ def plan_with_settings(
         polygon,
         obstacles,
         crs=metric_crs,
-        spacing_m=settings.spacing_m,
         direction=direction,
         offset_m=offset_m,
         through=None
         if through is None
         else _place(through, metric_crs, polygon, "place to pass through"),
-        last_strip=settings.last_strip,
-        headland_m=settings.headland_m,
-        headland_holes=settings.headland_holes,
-        min_segment_m=settings.min_segment_m,
-        clearance_m=settings.clearance_m,
-        step_m=settings.step_m,
-        straight_tolerance_m=settings.straight_tolerance_m,
         grid=grid,
+        **{name: getattr(settings, name) for name in _OF_TRACKS},
     )
     if settings.route == "none":
         return tracks
@@ -75,10 +70,7 @@ def plan_with_settings(
     return plan_route(
         tracks,
         pattern=settings.route,
-        skip=settings.skip,
-        turning_radius_m=settings.turning_radius_m,
-        curve=settings.curve,
-        margin_m=settings.margin_m,
+        **{name: getattr(settings, name) for name in _OF_ROUTE},
         start=None if start is None else _place(start, metric_crs, polygon, "start"),
     )
 

@@ -22,20 +22,10 @@ _STANDS_OUT_M = 1e-3
 
 
 def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometry:
-    """Move the border inwards by a width.
+    """Move the border inwards by a width in units of the outline's CRS, metres nearly.
 
-    Parameters
-    ----------
-    outline : shapely.Polygon
-    width : float
-        In units of the outline's CRS, metres nearly.
-    holes : bool
-        Whether the strip runs around holes too; otherwise they stay as they are.
-
-    Returns
-    -------
-    shapely.Polygon or MultiPolygon
-        Empty where the field is nowhere wider than twice the width.
+    With `holes` the strip runs around them too; otherwise they stay as they are. Empty where the
+    field is nowhere wider than twice the width.
     """
     moved = outline if holes else Polygon(outline.exterior)
     plain = shapely.simplify(moved, _STANDS_OUT_M, preserve_topology=False)
@@ -53,15 +43,7 @@ def main_area(
 ) -> BaseGeometry:
     """The field without its headland: what straight tracks are laid in.
 
-    Parameters
-    ----------
-    outline : shapely.Polygon
-    width_m : float
-        Metres on the ground.
-    scale : float
-        Units of the outline's CRS per metre on the ground.
-    holes : bool
-        Whether the headland runs around holes too.
+    The width is in metres on the ground, of which one has `scale` units of the outline's CRS.
 
     Raises
     ------

@@ -46,27 +46,16 @@ def track_positions(
     first_m: float,
     last_strip: LastStrip = "overrun",
 ) -> FloatArray:
-    """Places of the tracks across the field, increasing; the n-th is track n + 1.
+    """Places of the tracks across the field, increasing; the n-th is track n + 1, if any fits.
 
-    Parameters
-    ----------
-    near_m, far_m : float
-        Extent of the field across the tracks.
-    spacing_m : float
-        Between neighbouring tracks, which is also the width of the strip each one works.
-    first_m : float
-        Place of one track; all others are whole spacings away from it.
-    last_strip : {"overrun", "leave", "shift", "spread"}
-        What becomes of the rest at the far side. ``overrun``: tracks as far as the field goes (the
-        study's rule), so that the last strip may reach beyond the border by up to half a
-        spacing, or a rest narrower than that stays unworked; ``leave``: only strips that
-        lie wholly inside; ``shift``: one more track, moved back until its strip ends at the far
-        side; ``spread``: the spacing shrinks evenly until strips fill the field exactly.
+    The field reaches from `near_m` to `far_m` across them. The spacing is also the width of the
+    strip that each one works; one track is at `first_m`, all others whole spacings away from it.
 
-    Returns
-    -------
-    array, shape (tracks,)
-        Empty when no track fits.
+    `last_strip` is what becomes of the rest at the far side. ``overrun``: tracks as far as the
+    field goes (the study's rule), so that the last strip may reach beyond the border by up to half
+    a spacing, or a rest narrower than that stays unworked; ``leave``: only strips that lie wholly
+    inside; ``shift``: one more track, moved back until its strip ends at the far side; ``spread``:
+    the spacing shrinks evenly until strips fill the field exactly.
     """
     if last_strip not in LAST_STRIPS:
         raise TrackError(

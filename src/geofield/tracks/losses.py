@@ -16,14 +16,9 @@ def gaps_between(pieces: Pieces) -> IntArray:
 
 
 def gap_causes(pieces: Pieces, crossings: Crossings) -> tuple[IntArray, IntArray]:
-    """Name what lies in each gap.
+    """Name what lies in each gap: the piece before it, and an obstacle, by their indices.
 
-    Returns
-    -------
-    gap : int array
-        Index of the piece before the gap.
-    owner : int array
-        Obstacle index, or ``FIELD`` where the gap leaves the field. Pairs are unique and sorted.
+    The second is ``FIELD`` where the gap leaves the field. Pairs are unique and sorted.
     """
     none = np.empty(0, dtype=np.int64)
     if len(pieces) < 2:
@@ -68,9 +63,5 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     share = np.where(counted, width / np.maximum(depth, 1), 0.0)
     before = np.concatenate(([0.0], np.cumsum(share)[:-1]))
     mine = ~is_field
-    lost += np.bincount(
-        owner[mine],
-        weights=-enters[mine] * before[mine],
-        minlength=obstacle_count,
-    )
+    lost += np.bincount(owner[mine], -enters[mine] * before[mine], obstacle_count)
     return np.maximum(lost, 0.0)

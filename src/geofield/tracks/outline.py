@@ -38,14 +38,8 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     """Check a field's outline, and repair what can be repaired without a guess.
 
     Heights are dropped; an invalid outline is repaired where one part keeps at least 99 % of the
-    area; a multi-polygon of one part is that part.
-
-    Returns
-    -------
-    shapely.Polygon
-        Valid, 2D, outer ring counter-clockwise.
-    tuple of str
-        What was changed, for people.
+    area; a multi-polygon of one part is that part. The polygon returned is valid, 2D and counter-
+    clockwise; the texts say what was changed, for people.
 
     Raises
     ------

@@ -201,9 +201,8 @@ def clip_shapes(
     Obstacle indices are those of the circles, followed by those of the polygons.
     """
     circles = len(shapes.circles)
-    discs = discs_in_frame(
-        shapes.circles[:, 0], shapes.circles[:, 1], shapes.circles[:, 2], np.arange(circles), frame
-    )
+    x, y, radius = shapes.circles.T
+    discs = discs_in_frame(x, y, radius, np.arange(circles), frame)
     if len(shapes.polygons):
         owner = np.arange(circles, circles + len(shapes.polygons))
         edges = join_edges(edges, polygon_edges(shapes.polygons, frame, owner))
@@ -264,15 +263,9 @@ def _positions(
     if place is not None:
         first = float(frame.to_frame(*place)[1])
     else:
-        edge = near - inset_m
-        if baseline.edge is not None:
-            edge = float(
-                np.mean(
-                    frame.to_frame(
-                        [baseline.edge.x0, baseline.edge.x1], [baseline.edge.y0, baseline.edge.y1]
-                    )[1]
-                )
-            )
+        edge, run = near - inset_m, baseline.edge
+        if run is not None:
+            edge = float(np.mean(frame.to_frame([run.x0, run.x1], [run.y0, run.y1])[1]))
         offset = spacing_m / 2.0 if offset_m is None else float(offset_m)
         if not np.isfinite(offset):
             raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")

@@ -20,24 +20,17 @@ FIELD = -1
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Directed edges of polygons, all polygons in one set of arrays.
+    """Directed edges of polygons, all polygons in one set of arrays."""
 
-    Attributes
-    ----------
-    ua, va, ub, vb : array, shape (n,)
-        Ends in the track frame, metres.
-    turn : int8 array, shape (n,)
-        +1 where the ring, as stored, has its polygon's inside on the left of the edge, -1 where on
-        the right, 0 for a ring without area.
-    owner : int array, shape (n,)
-        Which obstacle the edge belongs to, or ``FIELD``.
-    """
-
+    #: ua, va, ub, vb (n,): ends in the track frame, metres.
     ua: FloatArray
     va: FloatArray
     ub: FloatArray
     vb: FloatArray
+    #: Shape (n,): +1 where the ring, as stored, has its polygon's inside on the left of the edge,
+    #: -1 where on the right, 0 for a ring without area.
     turn: NDArray[np.int8]
+    #: Shape (n,): which obstacle the edge belongs to, or ``FIELD``.
     owner: IntArray
 
     def __len__(self) -> int:
@@ -62,14 +55,9 @@ def polygon_edges(
     frame: TrackFrame,
     owner: int | IntArray,
 ) -> Edges:
-    """Take the edges of polygons and multi-polygons.
+    """Take the edges of valid polygons and multi-polygons in the CRS of the frame.
 
-    Parameters
-    ----------
-    polygons : one or many shapely polygons or multi-polygons
-        Valid, in the CRS of the frame.
-    frame : TrackFrame
-    owner : int or int array of one per polygon
+    `owner` is one number, or one for each polygon.
     """
     if isinstance(polygons, BaseGeometry):
         polygons = [polygons]

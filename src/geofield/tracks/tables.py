@@ -116,14 +116,11 @@ def _in_words(
             words.append("border")
             lowest.append(None)
             continue
-        if len(mine) == 1:
-            text = f"obstacle {mine[0]}"
-        else:
-            # Parts of one obstacle share its number.
-            each = sorted(set(mine))
-            text = f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}"
+        # Parts of one obstacle share its number.
+        each = sorted(set(mine))
+        text = f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}"
         words.append(f"border, {text}" if at_border else text)
-        lowest.append(min(mine))
+        lowest.append(each[0])
     return words, lowest
 
 

@@ -21,17 +21,12 @@ _MATCH = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Candidate curves for many pairs of poses.
+    """Candidate curves for many pairs of poses."""
 
-    Attributes
-    ----------
-    steer : int array, shape (words, pieces)
-        ``LEFT``, ``STRAIGHT`` or ``RIGHT``; shorter words are filled with straights of length 0.
-    length : array, shape (pairs, words, pieces)
-        In radii, signed; NaN where a word does not join the pair.
-    """
-
+    #: Shape (words, pieces): ``LEFT``, ``STRAIGHT`` or ``RIGHT``; shorter words are filled with
+    #: straights of length 0.
     steer: NDArray[np.int8]
+    #: Shape (pairs, words, pieces): in radii, signed; NaN where a word does not join the pair.
     length: FloatArray
 
     @property
@@ -99,12 +94,7 @@ def trace(
     *,
     step_m: float,
 ) -> FloatArray:
-    """Points along one word from a pose, every `step_m` on arcs, straights by their ends.
-
-    Returns
-    -------
-    array, shape (points, 2)
-    """
+    """Points (n, 2) along one word from a pose: every `step_m` on arcs, straights by their ends."""
     x, y, angle = (float(value) for value in start)
     xs, ys = [np.array([x])], [np.array([y])]
     for way, part in zip(steer.tolist(), length.tolist(), strict=True):
@@ -124,19 +114,10 @@ def trace(
 
 
 def dubins_words(start: FloatArray, goal: FloatArray, radius_m: float) -> Words:
-    """The six words of Dubins for each pair of poses: forwards only.
+    """The six words of Dubins for each pair of poses, in metres and radians: forwards only.
 
-    Parameters
-    ----------
-    start, goal : array, shape (n, 3)
-        Poses in metres and radians.
-    radius_m : float
-
-    Returns
-    -------
-    Words
-        In the order LSL, RSR, LSR, RSL, RLR, LRL (Dubins 1957, "On curves of minimal length with a
-        constraint on average curvature"; equations of Shkel and Lumelsky 2001).
+    In the order LSL, RSR, LSR, RSL, RLR, LRL (Dubins 1957, "On curves of minimal length with a
+    constraint on average curvature"; equations of Shkel and Lumelsky 2001).
     """
     x, y, angle = to_unit(start, goal, radius_m)
     d = np.hypot(x, y)

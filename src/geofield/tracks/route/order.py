@@ -9,25 +9,17 @@ from numpy.typing import NDArray
 
 from geofield.errors import TrackError
 from geofield.tracks.frame import FloatArray
+from geofield.tracks.shapes import IntArray
 
 Pattern = Literal["boustrophedon", "skip", "shortest"]
 PATTERNS: tuple[str, ...] = get_args(Pattern)
-
-IntArray = NDArray[np.int64]
 
 
 def track_order(tracks: IntArray, skip: int) -> list[int]:
     """Order of the tracks: every (skip + 1)-th, then those between on the way back, and so on.
 
-    With ``skip=1`` from track 1 to 3, as in the study, because a turn to the next track would
-    need a smaller radius; with ``skip=0`` one after the other.
-
-    Parameters
-    ----------
-    tracks : int array
-        Track numbers, increasing.
-    skip : int
-        Tracks left out at each turn.
+    With ``skip=1`` from track 1 to 3, as in the study, because a turn to the next track would need
+    a smaller radius; with ``skip=0`` one after the other.
     """
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
@@ -43,21 +35,9 @@ def field_order(
 ) -> tuple[IntArray, NDArray[np.bool_]]:
     """Segments of the tracks in order, up one track and down the next.
 
-    Parameters
-    ----------
-    track_no : int array, shape (segments,)
-        Track of each segment; segments of a track follow one another along it.
-    order : list of int
-        Track numbers.
-    backward_first : bool
-        Start against the segments' direction.
-
-    Returns
-    -------
-    segment : int array
-        Row of each segment, in the order of driving.
-    backward : bool array
-        Whether it is driven against its direction.
+    `track_no` is the track of each segment; segments of a track follow one another along it.
+    Returned are the row of each segment in the order of driving, and whether it is driven against
+    its direction, as the first one is if `backward_first`.
     """
     rows: list[IntArray] = []
     flags: list[NDArray[np.bool_]] = []
@@ -79,16 +59,16 @@ def nearest_start(
 ) -> tuple[IntArray, NDArray[np.bool_]]:
     """Of the four ways to begin (first or last track, either direction) the one near a place."""
     numbers = np.unique(track_no)
-    best: tuple[float, IntArray, NDArray[np.bool_]] | None = None
-    for reverse in (False, True):
-        order = track_order(numbers[::-1] if reverse else numbers, skip)
-        for backward in (False, True):
-            rows, flags = field_order(track_no, order, backward_first=backward)
-            if start is None or not len(rows):
-                return rows, flags
-            away = float(np.hypot(*(ends[rows[0], int(flags[0])] - start)))
-            if best is None or away < best[0]:
-                best = (away, rows, flags)
-    if best is None:
-        return np.empty(0, np.int64), np.empty(0, bool)
-    return best[1], best[2]
+    ways = (
+        field_order(track_no, track_order(order, skip), backward_first=backward)
+        for order in (numbers, numbers[::-1])
+        for backward in (False, True)
+    )
+    if start is None or not len(track_no):
+        return next(ways)
+
+    def away(way: tuple[IntArray, NDArray[np.bool_]]) -> float:
+        rows, flags = way
+        return float(np.hypot(*(ends[rows[0], int(flags[0])] - start)))
+
+    return min(ways, key=away)

@@ -43,14 +43,8 @@ class _Sight:
 class Passage:
     """The area open to the machine between segments.
 
-    Parameters
-    ----------
-    outline : shapely.Polygon
-        The field; its holes are shapes to go around.
-    shapes : ObstacleShapes
-        Obstacles.
-    margin_m : float
-        How far beyond the outer border the machine may go.
+    Holes of the outline are shapes to go around, as obstacles are; beyond the outer border the
+    machine may go by `margin_m`.
     """
 
     def __init__(self, outline: Polygon, shapes: ObstacleShapes, *, margin_m: float = 0.0) -> None:
@@ -77,11 +71,11 @@ class Passage:
             for x, y, r in zip(*shapes.circles[:, :2].T.tolist(), out.tolist(), strict=True)
         ]
         corners += [
-            _sticking_out(shapely.buffer(each, _AROUND_M, join_style="mitre")) for each in solid
+            _corners_of(shapely.buffer(each, _AROUND_M, join_style="mitre")) for each in solid
         ]
         self._corners: dict[int, FloatArray] = dict(enumerate(corners))
         inner = shapely.buffer(shell, margin_m - _AROUND_M, join_style="mitre")
-        self._corners[_SHELL] = _sticking_in(inner)
+        self._corners[_SHELL] = _corners_of(inner, inward=True)
         self._sights: dict[tuple[int, int], _Sight] = {}
 
     def fits(self, lines: NDArray[np.object_]) -> NDArray[np.bool_]:
@@ -102,17 +96,9 @@ class Passage:
         return float(shapely.length(shapely.difference(line, self.open_shell)))
 
     def shortest(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """Find the shortest way between two places.
+        """Find the shortest way between two places in the CRS; None where there is none.
 
-        Parameters
-        ----------
-        start, goal : array, shape (2,)
-            In the CRS.
-
-        Returns
-        -------
-        array of shape (n, 2), or None
-            Corners of the way with both ends; None where there is no way.
+        It is told by its corners (n, 2), both ends among them.
         """
         around: list[int] = []
         while True:
@@ -196,25 +182,15 @@ def _circle_corners(x: float, y: float, radius: float) -> FloatArray:
     return np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle)))
 
 
-def _sticking_out(shape: BaseGeometry) -> FloatArray:
-    """Corners that stick out of a shape: only there can a shortest way around it turn."""
-    found = []
+def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> FloatArray:
+    """Corners that stick out of a shape: only there can a shortest way around it turn.
+
+    Or those that stick into it: of the border, within which ways are.
+    """
+    found = [np.empty((0, 2))]
     for part in shapely.get_parts(shape):
         ring = shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
-        found.append(ring[_left_turns(ring)])
-    return np.concatenate(found) if found else np.empty((0, 2))
-
-
-def _sticking_in(shape: BaseGeometry) -> FloatArray:
-    """Corners of a border that stick into the field."""
-    found = []
-    for part in shapely.get_parts(shape):
-        ring = shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
-        found.append(ring[~_left_turns(ring)])
-    return np.concatenate(found) if found else np.empty((0, 2))
-
-
-def _left_turns(ring: FloatArray) -> NDArray[np.bool_]:
-    into = ring - np.roll(ring, 1, axis=0)
-    out = np.roll(ring, -1, axis=0) - ring
-    return np.asarray(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] > 0.0)
+        into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+        left = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] > 0.0
+        found.append(ring[left != inward])
+    return np.concatenate(found)

@@ -18,10 +18,11 @@ from geofield.errors import TrackError, TrackWarning
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.route.order import PATTERNS, IntArray, Pattern, nearest_start
+from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
 from geofield.tracks.route.turns import Curve, Turn, plan_turns, straight_ways
+from geofield.tracks.shapes import IntArray
 
 _SPARE_SHARE = 0.45
 """Of a segment, at most this much may be left out at either end to pass an obstacle."""

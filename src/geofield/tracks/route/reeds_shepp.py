@@ -20,14 +20,7 @@ _PIECES = 5
 
 
 def reeds_shepp_words(start: FloatArray, goal: FloatArray, radius_m: float) -> Words:
-    """All words of Reeds and Shepp for each pair of poses.
-
-    Parameters
-    ----------
-    start, goal : array, shape (n, 3)
-        Poses in metres and radians.
-    radius_m : float
-    """
+    """All words of Reeds and Shepp for each pair of poses (n, 3), in metres and radians."""
     x, y, angle = to_unit(start, goal, radius_m)
     angle = _wrap(angle)
     # Exchanging start and goal reverses the word: the goal seen from the other end.

@@ -17,9 +17,9 @@ from scipy.spatial import cKDTree
 
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.route.curves import dubins_words
-from geofield.tracks.route.order import IntArray
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.tour import improve_tour
+from geofield.tracks.shapes import IntArray
 
 _NEIGHBOURS = 12
 _BLOCKED_FACTOR = 1.5
@@ -36,23 +36,11 @@ def shortest_order(
     radius_m: float | None,
     start: FloatArray | None,
 ) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Shorten the drive between segments.
+    """Shorten the drive between segments; the new `rows` and `backward`.
 
-    Parameters
-    ----------
-    ends : array, shape (segments, 2, 2)
-        Both ends of each segment in the CRS.
-    rows, backward : int and bool arrays
-        The order to begin with.
-    passage : Passage
-    radius_m : float or None
-        Turning radius, for the cost of turning round.
-    start : array, shape (2,), or None
-        Where the machine comes from.
-
-    Returns
-    -------
-    rows, backward : int and bool arrays
+    `ends` are both ends of each segment (segments, 2, 2) in the CRS, `rows` and `backward` the
+    order to begin with; `radius_m` is for the cost of turning round, `start` where the machine
+    comes from.
     """
     count = len(ends)
     if count < 2:
@@ -94,12 +82,8 @@ def _link_costs(
 ) -> tuple[list[list[int]], dict[int, float]]:
     """Near neighbours of each end, and what driving to them costs.
 
-    Returns
-    -------
-    near : list of list of int
-        For every end (2 row, 2 row + 1) the ends that are cheap to drive to, cheapest first.
-    cost : dict
-        From ``a * ends + b`` (both ways round) to metres.
+    For every end (2 row, 2 row + 1) the ends that are cheap to drive to, cheapest first; then a
+    dictionary from ``a * ends + b`` (both ways round) to metres.
     """
     places = ends.reshape(-1, 2)
     total = len(places)

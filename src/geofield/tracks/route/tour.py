@@ -30,24 +30,9 @@ def improve_tour(
 ) -> list[int]:
     """Shorten a tour by local search with kicks; deterministic.
 
-    Parameters
-    ----------
-    tour : list of int
-        Ends: entry and exit of each segment in turn.
-    places : list of (x, y)
-        Of the ends.
-    near : list of list of int
-        Cheap links of every end.
-    cost : dict
-        Cost of the links listed, by ``a * len(places) + b``.
-    detour_m : float
-        What links that are not listed cost above the straight line.
-    begin : list of float, optional
-        Cost of starting at each end.
-
-    Returns
-    -------
-    list of int
+    The tour is entry and exit of each segment in turn, `places` are those of the ends, `near` the
+    cheap links of every end, whose `cost` is listed by ``a * len(places) + b``. Links that are not
+    listed cost `detour_m` above the straight line, starting at an end what `begin` says.
     """
     search = _Search(tour, places, near, cost, detour_m, begin)
     search.improve(range(len(tour)))

@@ -10,7 +10,7 @@ sharp corners. No way ever runs through an obstacle or a hole.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -34,42 +34,26 @@ _STEP_RADII = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """One way between segments.
+    """One way between segments."""
 
-    Attributes
-    ----------
-    places : array, shape (n, 2)
-        The way, in the CRS.
-    kind : str
-        ``dubins``, ``reeds_shepp``, ``drive``, or ``none`` where there is no way at all.
-    length_m, reverse_m, outside_m : float
-        All of it, backwards, beyond the border and its margin.
-    fits : bool
-        Whether the machine can drive it within the allowed area; without a turning radius,
-        whether there is a way at all.
-    early_m, late_m : float
-        How much of the segment before and of the one after it leaves out.
-    """
-
+    #: Shape (n, 2): the way, in the CRS.
     places: FloatArray
+    #: ``dubins``, ``reeds_shepp``, ``drive``, or ``none`` where there is no way at all.
     kind: str
+    #: length_m, reverse_m, outside_m: all of it, backwards, beyond the border and its margin.
     length_m: float
     reverse_m: float = 0.0
     outside_m: float = 0.0
+    #: Whether the machine can drive it within the allowed area; without a turning radius, whether
+    #: there is a way at all.
     fits: bool = True
+    #: early_m, late_m: how much of the segment before and of the one after it leaves out.
     early_m: float = 0.0
     late_m: float = 0.0
 
 
 def straight_ways(exits: FloatArray, entries: FloatArray, passage: Passage) -> list[Turn]:
-    """Shortest ways without regard to a turning radius.
-
-    Parameters
-    ----------
-    exits, entries : array, shape (n, 3)
-        Poses.
-    passage : Passage
-    """
+    """Shortest ways between poses (n, 3) without regard to a turning radius."""
     ends = np.stack((exits[:, :2], entries[:, :2]), axis=1)
     if not len(ends):
         return []
@@ -89,19 +73,10 @@ def plan_turns(
     curve: Curve = "dubins",
     spare_m: FloatArray | None = None,
 ) -> list[Turn]:
-    """Turns of a turning radius.
+    """Turns of a turning radius between poses (n, 3), metres and radians.
 
-    Parameters
-    ----------
-    exits, entries : array, shape (n, 3)
-        Poses: where each way begins and ends, metres and radians.
-    passage : Passage
-    radius_m : float
-    curve : {"dubins", "reeds_shepp"}
-        Forwards only, or with reversing.
-    spare_m : array, shape (n, 2), optional
-        Length of the segments before and after that a way around an obstacle on their track may
-        leave out; 0 where the segments are on different tracks.
+    `spare_m` (n, 2) is the length of the segments before and after that a way around an obstacle on
+    their track may leave out; 0 where the segments are on different tracks.
     """
     count = len(exits)
     found: list[Turn | None] = [None] * count
@@ -109,29 +84,17 @@ def plan_turns(
     if not count:
         return []
     spare = np.zeros((count, 2)) if spare_m is None else spare_m
-    _single_curves(
-        exits,
-        entries,
-        passage,
-        radius_m=radius_m,
-        curve=curve,
-        found=found,
-        loose=loose,
-        spare=spare,
-    )
+    machine = _Machine(passage, radius_m, curve)
+    _single_curves(exits, entries, machine, spare, found, loose)
     for row in range(count):
         if found[row] is not None:
             continue
         ends = np.stack((exits[row, :2], entries[row, :2]))
         way = passage.shortest(ends[0], ends[1])
         if way is not None and len(way) > 2:
-            found[row] = _chain(
-                exits[row], entries[row], way, passage, radius_m=radius_m, curve=curve
-            )
+            found[row] = _chain(exits[row], entries[row], way, machine)
             if found[row] is None and spare[row].min() > 0.0:
-                found[row] = _lane_change(
-                    exits[row], entries[row], way, passage, radius_m=radius_m, spare_m=spare[row]
-                )
+                found[row] = _lane_change(exits[row], entries[row], way, machine, spare[row])
         if found[row] is None:
             found[row] = loose[row] or (
                 _no_way(ends) if way is None else _polyline(way, fits=False)
@@ -139,19 +102,34 @@ def plan_turns(
     return [turn for turn in found if turn is not None]
 
 
+@dataclass(frozen=True, slots=True)
+class _Machine:
+    """What turns, how tightly, and where it may."""
+
+    passage: Passage
+    radius_m: float
+    curve: Curve
+
+    def words(self, exits: FloatArray, entries: FloatArray) -> Words:
+        words = dubins_words if self.curve == "dubins" else reeds_shepp_words
+        return words(exits, entries, self.radius_m)
+
+    def trace(self, start: FloatArray, words: Words, row: int, word: int) -> FloatArray:
+        steer, length = words.steer[word], words.length[row, word]
+        return trace(start, steer, length, self.radius_m, step_m=_STEP_RADII * self.radius_m)
+
+
 def _single_curves(
     exits: FloatArray,
     entries: FloatArray,
-    passage: Passage,
-    *,
-    radius_m: float,
-    curve: Curve,
+    machine: _Machine,
+    spare: FloatArray,
     found: list[Turn | None],
     loose: list[Turn | None],
-    spare: FloatArray,
 ) -> None:
     """Try one curve for every pair, from the shortest word upwards, all pairs at a time."""
-    words = _words(exits, entries, radius_m, curve)
+    passage, radius_m = machine.passage, machine.radius_m
+    words = machine.words(exits, entries)
     cost = words.total + _CUSP_RADII * words.cusps
     rank = np.argsort(cost, axis=1)
     wider = shapely.buffer(passage.open_shell, _NEAR_RADII * radius_m)
@@ -167,16 +145,8 @@ def _single_curves(
         rows, word = open_rows[usable], word[usable]
         if not len(rows):
             break
-        places = [
-            trace(
-                exits[row],
-                words.steer[w],
-                words.length[row, w],
-                radius_m,
-                step_m=_STEP_RADII * radius_m,
-            )
-            for row, w in zip(rows.tolist(), word.tolist(), strict=True)
-        ]
+        pairs = zip(rows.tolist(), word.tolist(), strict=True)
+        places = [machine.trace(exits[row], words, row, w) for row, w in pairs]
         lines = np.array([_line(each) for each in places], dtype=object)
         clear = ~passage.hits(lines)
         inside = clear & shapely.covers(passage.open_shell, lines)
@@ -186,7 +156,7 @@ def _single_curves(
                 pieces = words.length[row, word[at]] * radius_m
                 turn = Turn(
                     places[at],
-                    curve if (pieces < 0).any() else "dubins",
+                    machine.curve if (pieces < 0).any() else "dubins",
                     float(np.abs(pieces).sum()),
                     float(-pieces[pieces < 0].sum()),
                     0.0 if inside[at] else passage.outside_m(lines[at]),
@@ -199,44 +169,27 @@ def _single_curves(
         open_rows = np.array([row for row in open_rows if found[row] is None], dtype=np.int64)
 
 
-def _words(exits: FloatArray, entries: FloatArray, radius_m: float, curve: Curve) -> Words:
-    return (dubins_words if curve == "dubins" else reeds_shepp_words)(exits, entries, radius_m)
-
-
-def _chain(
-    start: FloatArray,
-    goal: FloatArray,
-    way: FloatArray,
-    passage: Passage,
-    *,
-    radius_m: float,
-    curve: Curve,
-) -> Turn | None:
+def _chain(start: FloatArray, goal: FloatArray, way: FloatArray, machine: _Machine) -> Turn | None:
     """Curves from corner to corner of the shortest way, a little outside of each corner."""
+    radius_m = machine.radius_m
     for out in (0.1, 0.3 * radius_m, radius_m):
-        turn = _through(
-            np.vstack((start, _corner_poses(way, out, radius_m), goal)), passage, radius_m, curve
-        )
+        turn = _through(np.vstack((start, _corner_poses(way, out, radius_m), goal)), machine)
         if turn is not None and turn.length_m < 2.0 * _length(way) + 4.0 * np.pi * radius_m:
             return turn
     return None
 
 
-def _through(poses: FloatArray, passage: Passage, radius_m: float, curve: Curve) -> Turn | None:
+def _through(poses: FloatArray, machine: _Machine) -> Turn | None:
     """The shortest curves through poses, where together they fit."""
-    words = _words(poses[:-1], poses[1:], radius_m, curve)
+    words = machine.words(poses[:-1], poses[1:])
     cost = words.total + _CUSP_RADII * words.cusps
     best = np.argmin(cost, axis=1)
     if not np.isfinite(cost[np.arange(len(best)), best]).all():
         return None
-    pieces = words.length[np.arange(len(best)), best] * radius_m
-    step_m = _STEP_RADII * radius_m
-    parts = [
-        trace(poses[k], words.steer[word], words.length[k, word], radius_m, step_m=step_m)
-        for k, word in enumerate(best.tolist())
-    ]
+    pieces = words.length[np.arange(len(best)), best] * machine.radius_m
+    parts = [machine.trace(poses[k], words, k, word) for k, word in enumerate(best.tolist())]
     places = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
-    if not passage.fits(np.array([_line(places)], dtype=object))[0]:
+    if not machine.passage.fits(np.array([_line(places)], dtype=object))[0]:
         return None
     reverse = float(-pieces[pieces < 0].sum())
     kind = "reeds_shepp" if reverse > 0.0 else "dubins"
@@ -266,15 +219,10 @@ def _corner_poses(way: FloatArray, out_m: float, radius_m: float) -> FloatArray:
 
 
 def _lane_change(
-    start: FloatArray,
-    goal: FloatArray,
-    way: FloatArray,
-    passage: Passage,
-    *,
-    radius_m: float,
-    spare_m: FloatArray,
+    start: FloatArray, goal: FloatArray, way: FloatArray, machine: _Machine, spare_m: FloatArray
 ) -> Turn | None:
     """Leave the track before the obstacle, pass beside it, join the track behind it."""
+    radius_m, forwards = machine.radius_m, replace(machine, curve="dubins")
     ahead = np.array([np.cos(start[2]), np.sin(start[2])])
     left = np.array([-ahead[1], ahead[0]])
     along, across = (way - way[0]) @ ahead, (way - way[0]) @ left
@@ -302,7 +250,7 @@ def _lane_change(
                 [*(goal[:2] + late * ahead), start[2]],
             ]
         )
-        turn = _through(poses, passage, radius_m, "dubins")
+        turn = _through(poses, forwards)
         if turn is not None and turn.length_m < 1.5 * (gap + early + late) + np.pi * radius_m:
             return Turn(turn.places, turn.kind, turn.length_m, early_m=early, late_m=late)
     return None
