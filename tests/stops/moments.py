@@ -29,6 +29,8 @@ GEOFIELD = Path(sys.executable).with_name("geofield")
 STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGKILL)
 STOPPED = "Stopped; nothing half-written is left."
 GOES_ON = "The same command does what is missing."
+#: After so long, a command that was stopped goes on for ever, seconds.
+_ENDS_S = 120
 #: The command's own hidden folders.
 HIDDEN = ".geofield-"
 EXPORTS = (
@@ -142,7 +144,9 @@ def _digests(farm: Path) -> frozenset[tuple[str, str]]:
 
 
 def _sound(words: list[str]) -> None:
-    done = subprocess.run([GEOFIELD, *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [GEOFIELD, *words], capture_output=True, text=True, check=False, timeout=_ENDS_S
+    )
     assert done.returncode == 0, (words, done.stderr)
 
 
@@ -164,7 +168,11 @@ def stop(work: Work, kind: signal.Signals, dice: random.Random, out: Path, *, ai
     was = _inodes(out)
     line = [word.replace("OUT", str(out)) for word in work.words]
     with subprocess.Popen(
-        [GEOFIELD, *line], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        [GEOFIELD, *line],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     ) as process:
         if aimed:
             wait_s = dice.uniform(0, 0.004)
@@ -174,7 +182,11 @@ def stop(work: Work, kind: signal.Signals, dice: random.Random, out: Path, *, ai
             wait_s = dice.uniform(0.05, work.seconds)
         time.sleep(wait_s)
         process.send_signal(kind)
-        _, told = process.communicate(timeout=120)
+        try:
+            _, told = process.communicate(timeout=_ENDS_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)  # its workers hold what it says open
+            raise
     moment = "while moving" if aimed else f"{wait_s:.2f} s"
     found = Stop(work.name, kind.name, moment, process.returncode)
     found.at_once = _products(work, out, was)
@@ -199,27 +211,9 @@ def stop(work: Work, kind: signal.Signals, dice: random.Random, out: Path, *, ai
 
 
 def next_start(out: Path) -> None:
-    """What every command does first with its folder, by one that writes other files there.
-
-    In a fork of this process, which has everything imported: a second less for each stop.
-    """
+    """What every command does first with its folder, by one that writes other files there."""
     was = set(out.iterdir())
-    child = os.fork()
-    if child == 0:
-        code = 99
-        try:
-            sink = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(sink, 1)
-            os.dup2(sink, 2)
-            from geofield.cli.main import main
-
-            main(["simulate", "--size", "64", "--fields", "1", "--out", str(out)])
-        except SystemExit as done:
-            code = done.code if isinstance(done.code, int) else 1
-        finally:
-            os._exit(code)
-    _, status = os.waitpid(child, 0)
-    assert os.waitstatus_to_exitcode(status) == 0
+    _sound(["simulate", "--size", "64", "--fields", "1", "--out", str(out)])
     for each in set(out.iterdir()) - was:
         each.unlink()
 

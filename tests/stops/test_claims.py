@@ -58,11 +58,11 @@ def asleep(folder: Path, *words: object) -> Iterator[Asleep]:
                 time.sleep(0.005)
             process.send_signal(signal.SIGSTOP)
             yield process
+            process.send_signal(signal.SIGCONT)
+            process.told = process.communicate(timeout=300)[1]
         except BaseException:
             process.kill()
             raise
-        process.send_signal(signal.SIGCONT)
-        process.told = process.communicate(timeout=300)[1]
 
 
 def leftovers(folder: Path) -> list[Path]:

@@ -11,16 +11,12 @@ from pathlib import Path
 
 import pytest
 
-import geofield.cli.main  # noqa: F401  (the children inherit what is imported)
 from geofield.imagery import write_scene
 from geofield.simulate import SimulationSettings, simulate_field
 
 from .moments import STOPS, Work, make_works, stop
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore:This process.*fork:DeprecationWarning"),
-    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs signals"),
-]
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs signals")
 
 
 @pytest.fixture(scope="module")

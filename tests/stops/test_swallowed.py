@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,29 @@ main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])
 """
 
 
+#: A program that goes on after the command; what it starts inherits which signals are ignored.
+GOES_ON = """
+import signal, subprocess, sys, time
+import geofield.formats
+from geofield.cli import main
+def read(*_, **__):
+    signal.raise_signal(getattr(signal, sys.argv[1]))
+hooks = sys.excepthook, sys.unraisablehook
+signal.signal(signal.SIGINT, signal.default_int_handler)
+geofield.formats.read_dataset = read
+try:
+    main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])
+except SystemExit as stop:
+    assert stop.code == 1
+time.sleep(0.5)
+assert (sys.excepthook, sys.unraisablehook) == hooks
+assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+child = subprocess.Popen(["sleep", "10"])
+child.terminate()
+print("the child ended by", child.wait())
+"""
+
+
 def ended(*words: str, folder: Path) -> tuple[int, str, str]:
     """Exit code and what was said of a Python that was told in these words what to do."""
     done = subprocess.run(
@@ -99,3 +123,9 @@ def test_a_stop_in_a_destructor(kind: str, tmp_path: Path) -> None:
 def test_a_stop_in_a_call_back(kind: str, error: str, tmp_path: Path) -> None:
     code = CODE.format(error=error)
     assert ended("-c", code, kind, folder=tmp_path) == (1, STOPPED, "")
+
+
+@pytest.mark.parametrize("kind", ["SIGTERM", "SIGINT"])
+def test_a_program_that_calls_the_command_is_stopped_as_before(kind: str, tmp_path: Path) -> None:
+    said = f"the child ended by {-signal.SIGTERM}"
+    assert ended("-c", GOES_ON, kind, folder=tmp_path) == (0, STOPPED, said)

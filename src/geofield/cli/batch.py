@@ -213,7 +213,11 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
             "A Dask cluster needs the extra: pip install geofield[batch]",
             hint="Without it, --workers N uses this machine.",
         )
-    say(f"Workers    {engine.where}")
+    try:
+        say(f"Workers    {engine.where}")
+    except BaseException:  # a stop: nobody else knows of it yet
+        engine.close()
+        raise
     return engine
 
 

@@ -10,6 +10,7 @@ import importlib
 import os
 import sys
 import warnings
+from contextlib import ExitStack
 from typing import Any, NoReturn
 
 import click
@@ -17,7 +18,7 @@ import click
 from geofield import __version__
 from geofield.cli.console import progress_option, say_error, say_note
 from geofield.cli.log import end_log, log_options
-from geofield.cli.stops import stop_cleanly, stop_no_more, was_stopped
+from geofield.cli.stops import stop_no_more, stoppable, was_stopped
 from geofield.errors import GeofieldError, GeofieldWarning
 from geofield.wording import nearest
 
@@ -113,17 +114,26 @@ def _end_stopped() -> NoReturn:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage."""
+    """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage.
+
+    Parameters
+    ----------
+    args : list of str, optional
+        The words behind ``geofield``, from a program that goes on afterwards; without them those
+        that this process was started with.
+    """
     # What libraries make while they load stays to the end: going through it is 7 % of a start.
     gc.set_threshold(10_000)
     # OpenBLAS's threads spin for 25 ms behind every product of matrices that small; it is told
     # before NumPy loads it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with warnings.catch_warnings():
+    with ExitStack() as around:
+        around.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", GeofieldWarning)
         warnings.showwarning = _show_warning
-        stop_cleanly()
+        around.callback(end_log)
+        around.enter_context(stoppable(whole_process=args is None))
         try:
             # Not standalone, click hands the code of `context.exit` back instead of leaving.
             code = cli.main(args=args, prog_name="geofield", standalone_mode=False)
@@ -149,6 +159,3 @@ def main(args: list[str] | None = None) -> None:
             if not was_stopped():
                 raise
             _end_stopped()
-        finally:
-            stop_no_more()
-            end_log()

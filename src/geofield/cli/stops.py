@@ -12,6 +12,8 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 #: Programs say a stop in two ways at once, as they may not know which one is heard.
@@ -26,6 +28,8 @@ _ASKS = signal.SIGTERM
 _STOPS: list[float] = []
 #: Whether the next of these signals only asks.
 _ASKED: list[bool] = []
+#: Held while somebody asks.
+_ASKING = _thread.allocate_lock()
 
 
 class _Stop(KeyboardInterrupt):
@@ -36,12 +40,34 @@ class _Stop(KeyboardInterrupt):
     """
 
 
-def stop_cleanly() -> None:
-    """Let SIGTERM end the work as Ctrl+C does."""
-    if threading.current_thread() is threading.main_thread():
-        _STOPS.clear()
-        for kind in _KINDS:
-            signal.signal(kind, _stop)
+@contextmanager
+def stoppable(*, whole_process: bool) -> Iterator[None]:
+    """Let SIGTERM end the work of the block as Ctrl+C does.
+
+    Parameters
+    ----------
+    whole_process : bool
+        Whether nothing comes behind the block: then there is nothing to stop any more. Otherwise
+        the program that called is stopped as it was before, and so is whatever it starts: a
+        process inherits which signals are ignored.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _STOPS.clear()
+    hooks = sys.unraisablehook, sys.excepthook
+    usual = {kind: signal.signal(kind, _stop) for kind in _KINDS}
+    try:
+        yield
+    finally:
+        stop_no_more()
+        if not whole_process:
+            _STOPS.clear()
+            with _ASKING:  # its last question would end the program
+                _ASKED.clear()
+            sys.unraisablehook, sys.excepthook = hooks
+            for kind, handler in usual.items():
+                signal.signal(kind, handler or signal.SIG_DFL)
 
 
 def stop_heard() -> None:
@@ -88,11 +114,12 @@ def _stop(kind: int, _: Any) -> None:
 
 def _ask() -> None:
     """Ask what became of the stop, until somebody heard it."""
-    time.sleep(_AGAIN_S)
-    while _STOPS:
-        _ASKED.append(True)
-        stop_main(_ASKS)
+    with _ASKING:
         time.sleep(_AGAIN_S)
+        while _STOPS:
+            _ASKED.append(True)
+            stop_main(_ASKS)
+            time.sleep(_AGAIN_S)
 
 
 def _on_its_way() -> bool:

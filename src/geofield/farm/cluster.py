@@ -204,21 +204,26 @@ class Cluster:
                     future.cancel()
 
     def close(self) -> None:
-        """Leave the cluster; end it where it is our own."""
-        for each in self._own:
-            for nanny in getattr(each, "workers", {}).values():
-                # Native code does not listen: it is not asked.
-                nanny.auto_restart = False
-                with contextlib.suppress(OSError, AttributeError, TypeError):
-                    os.kill(nanny.pid, signal.SIGKILL)
-        ended = True
-        for each in self._own:
-            try:
-                each.close(timeout=10)
-            except (TimeoutError, OSError):
-                ended = False  # it goes on ending, and talks of it
-        if ended:
-            self._after()
+        """Leave the cluster; end it where it is our own.
+
+        A stop waits until that is done: what is left half closed Dask closes when Python ends, and
+        waits ten seconds for it.
+        """
+        with unstopped():
+            for each in self._own:
+                for nanny in getattr(each, "workers", {}).values():
+                    # Native code does not listen: it is not asked.
+                    nanny.auto_restart = False
+                    with contextlib.suppress(OSError, AttributeError, TypeError):
+                        os.kill(nanny.pid, signal.SIGKILL)
+            ended = True
+            for each in self._own:
+                try:
+                    each.close(timeout=10)
+                except (TimeoutError, OSError):
+                    ended = False  # it goes on ending, and talks of it
+            if ended:
+                self._after()
 
 
 def _held_messages() -> Callable[[], None]:
