@@ -14,9 +14,9 @@ place deep in the first answer gave .756 / .814 / .828 with one, two and three p
 gives .749 / .808 / .833, and the first outline took a tenth longer. Its first answer as an input of
 a second one, features compared with their mean over it, gave .756 / .739 / .712 in four bands,
 colour and grey for .750 / .737 / .707; learned on with 124 more fields, outlines of 66 others were
-.820 / .814 / .787 for .817 / .808 / .766, with three points .863 for .879. The network that is
-shipped, learned on with 78 more fields (900 steps at two fifths of the rate), alone gave .724 / .708
-/ .684 on 112 others for .731 / .714 / .684: a fifth more fields is too little to be seen.
+.820 / .814 / .787 for .817 / .808 / .766, with three points .863 for .879. The shipped
+network, learned on with 78 more fields (900 steps at two fifths of the rate), alone gave .724 /
+.708 / .684 on 112 others for .731 / .714 / .684: a fifth more fields is too little to be seen.
 """
 
 from __future__ import annotations
