@@ -74,6 +74,7 @@ def read(*_, **__):
     signal.raise_signal(getattr(signal, sys.argv[1]))
 hooks = sys.excepthook, sys.unraisablehook
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
 geofield.formats.read_dataset = read
 try:
     main(["export", "plan.gpkg", "-f", "kml", "--out", sys.argv[2]])
