@@ -45,6 +45,20 @@ class Asleep(subprocess.Popen[str]):
     told = ""
 
 
+def between_two_steps(folder: Path) -> bool:
+    """Whether somebody makes or moves files in a folder now, which others wait for."""
+    import fcntl
+
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(opened)
+    return False
+
+
 @contextmanager
 def asleep(folder: Path, *words: object) -> Iterator[Asleep]:
     """A command that has begun to work on a folder and sleeps until the block is over."""
@@ -57,6 +71,10 @@ def asleep(folder: Path, *words: object) -> Iterator[Asleep]:
                 assert time.monotonic() < until
                 time.sleep(0.005)
             process.send_signal(signal.SIGSTOP)
+            while between_two_steps(folder):
+                process.send_signal(signal.SIGCONT)
+                time.sleep(0.005)
+                process.send_signal(signal.SIGSTOP)
             yield process
             process.send_signal(signal.SIGCONT)
             process.told = process.communicate(timeout=300)[1]
