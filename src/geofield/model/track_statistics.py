@@ -11,8 +11,6 @@ import shapely
 if TYPE_CHECKING:
     import geopandas as gpd
 
-    from geofield.model.tracks import Tracks
-
 
 @dataclass(frozen=True, slots=True)
 class ObstacleLoss:
@@ -75,52 +73,36 @@ class TrackStatistics:
     losses: tuple[ObstacleLoss, ...]
 
 
-def track_statistics(tracks: Tracks) -> TrackStatistics:
-    """Compute the figures of planned tracks."""
-    outline, scale = tracks.outline, tracks.ground_scale
-    length = tracks.segments["length_m"].to_numpy(dtype=np.float64)
-    gap = tracks.gaps["length_m"].to_numpy(dtype=np.float64)
-    nan = float("nan")
-    area = worked = coverage = overlap = nan
-    if outline is not None:
-        area = float(outline.area)
-        worked, single = _worked(tracks, outline, tracks.spacing_m * scale)
-        coverage = 100.0 * worked / area
-        overlap = 100.0 * max(0.0, single - worked) / area
-    return TrackStatistics(
-        track_count=len(tracks.lines),
-        segment_count=len(length),
-        gap_count=len(gap),
-        point_count=int(tracks.lines["point_count"].sum()),
-        blocked_count=tracks.blocked_count,
-        length_m=float(length.sum()),
-        gap_length_m=float(gap.sum()),
-        mean_segment_m=float(length.mean()) if len(length) else nan,
-        longest_segment_m=float(length.max()) if len(length) else nan,
-        shortest_segment_m=float(length.min()) if len(length) else nan,
-        area_ha=area / scale**2 / 10_000.0,
-        worked_ha=worked / scale**2 / 10_000.0,
-        coverage_percent=coverage,
-        overlap_percent=overlap,
-        losses=tracks.losses,
-    )
+def worked(
+    segments: gpd.GeoDataFrame,
+    headland_tracks: gpd.GeoDataFrame | None,
+    outline: shapely.Polygon,
+    width: float,
+) -> tuple[float, float]:
+    """Area of the outline within a strip: counted once, and once for every strip.
 
-
-def _worked(tracks: Tracks, outline: shapely.Polygon, width: float) -> tuple[float, float]:
-    """Area of the outline within a strip: counted once, and once for every strip."""
-    strips = _strips(tracks.segments, tracks.headland_tracks, width)
-    if tracks.headland_tracks is None and _apart(tracks.segments, width):
+    Parameters
+    ----------
+    segments, headland_tracks : GeoDataFrame
+        Layers of these names, in a metric CRS.
+    outline : Polygon
+        The field, in the same.
+    width : float
+        Of a strip, units of that CRS.
+    """
+    strips = _strips(segments, headland_tracks, width)
+    if headland_tracks is None and _apart(segments, width):
         # Strips of every other track do not even touch: their union is the list of them.
-        even = tracks.segments["track_no"].to_numpy(dtype=np.int64) % 2 == 0
+        even = segments["track_no"].to_numpy(dtype=np.int64) % 2 == 0
         rows = [shapely.multipolygons(strips[even]), shapely.multipolygons(strips[~even])]
         alone = float(shapely.area(shapely.intersection(rows, outline)).sum())
         return alone, alone
     together = shapely.union_all(strips)
-    worked = float(shapely.intersection(together, outline).area)
+    once = float(shapely.intersection(together, outline).area)
     # Cutting an outline of a million vertices once for every strip takes its time.
     if shapely.area(strips).sum() <= together.area * (1.0 + 1e-9):
-        return worked, worked
-    return worked, float(shapely.area(shapely.intersection(strips, outline)).sum())
+        return once, once
+    return once, float(shapely.area(shapely.intersection(strips, outline)).sum())
 
 
 def _apart(segments: gpd.GeoDataFrame, width: float) -> bool:

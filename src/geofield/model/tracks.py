@@ -18,7 +18,7 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
-from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, track_statistics
+from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -185,7 +185,32 @@ class Tracks:
     @cached_property
     def statistics(self) -> TrackStatistics:
         """Counts, lengths and areas, computed when first asked for."""
-        return track_statistics(self)
+        scale = self.ground_scale
+        length = self.segments["length_m"].to_numpy(dtype=np.float64)
+        gap = self.gaps["length_m"].to_numpy(dtype=np.float64)
+        nan = float("nan")
+        area = once = every = nan
+        if self.outline is not None:
+            area = float(self.outline.area)
+            width = self.spacing_m * scale
+            once, every = worked(self.segments, self.headland_tracks, self.outline, width)
+        return TrackStatistics(
+            track_count=len(self.lines),
+            segment_count=len(length),
+            gap_count=len(gap),
+            point_count=int(self.lines["point_count"].sum()),
+            blocked_count=self.blocked_count,
+            length_m=float(length.sum()),
+            gap_length_m=float(gap.sum()),
+            mean_segment_m=float(length.mean()) if len(length) else nan,
+            longest_segment_m=float(length.max()) if len(length) else nan,
+            shortest_segment_m=float(length.min()) if len(length) else nan,
+            area_ha=area / scale**2 / 10_000.0,
+            worked_ha=once / scale**2 / 10_000.0,
+            coverage_percent=100.0 * once / area,
+            overlap_percent=100.0 * max(0.0, every - once) / area,
+            losses=self.losses,
+        )
 
     @cached_property
     def points(self) -> gpd.GeoDataFrame:
