@@ -190,9 +190,13 @@ def test_a_stop_at_any_moment_leaves_products_whole(plan: Path, kind: signal.Sig
     for spacing in (5, 6, 7):
         line = [str(GEOFIELD), "tracks", str(plan), "--spacing", str(spacing), "-o", str(plan)]
         with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as process:
-            time.sleep(dice.uniform(0.3, 2.5))
-            process.send_signal(kind)
-            _, told = process.communicate(timeout=60)
+            try:
+                time.sleep(dice.uniform(0.3, 2.5))
+                process.send_signal(kind)
+                _, told = process.communicate(timeout=60)
+            except BaseException:
+                process.kill()  # it would be waited for without end
+                raise
         assert "Traceback" not in told
         whole(plan)
         if kind != signal.SIGKILL:

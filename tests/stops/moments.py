@@ -20,7 +20,7 @@ import time
 import warnings
 import zipfile
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -174,18 +174,20 @@ def stop(work: Work, kind: signal.Signals, dice: random.Random, out: Path, *, ai
         text=True,
         start_new_session=True,
     ) as process:
-        if aimed:
-            wait_s = dice.uniform(0, 0.004)
-            while process.poll() is None and not _moving(out):
-                time.sleep(0.0005)
-        else:
-            wait_s = dice.uniform(0.05, work.seconds)
-        time.sleep(wait_s)
-        process.send_signal(kind)
         try:
+            if aimed:
+                wait_s = dice.uniform(0, 0.004)
+                while process.poll() is None and not _moving(out):
+                    time.sleep(0.0005)
+            else:
+                wait_s = dice.uniform(0.05, work.seconds)
+            time.sleep(wait_s)
+            process.send_signal(kind)
             _, told = process.communicate(timeout=_ENDS_S)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)  # its workers hold what it says open
+        except BaseException:
+            # It would be waited for without end; its workers hold open what it says.
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
             raise
     moment = "while moving" if aimed else f"{wait_s:.2f} s"
     found = Stop(work.name, kind.name, moment, process.returncode)
