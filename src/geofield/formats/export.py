@@ -66,6 +66,11 @@ def write_datasets(
     tell_drops : bool
         Warn of what a format cannot carry; False where the caller tells it another way.
 
+    Returns
+    -------
+    list of Path
+        What was written.
+
     Warns
     -----
     FormatWarning

@@ -37,9 +37,22 @@ class Finding:
 
 
 def validate_file(path: Path | str) -> list[Finding]:
-    """All findings in a product, a file or folder of any format.
+    """All findings in a product.
 
-    The format's own rules come first; an unknown format is an error.
+    Parameters
+    ----------
+    path : Path
+        A file or folder of any format.
+
+    Returns
+    -------
+    list of Finding
+        The format's own rules first; empty when there is no fault.
+
+    Raises
+    ------
+    FormatError
+        When there is no such file or its format is not known.
     """
     place = Path(path)
     if place.suffix.lower() == ".zip" and place.is_file():

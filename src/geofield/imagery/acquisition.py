@@ -33,23 +33,33 @@ Zoom = int | Literal["max", "fit"] | None
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """What part of the earth is wanted: a square around a point, or an area."""
+    """What part of the earth is wanted: a square around a point, or an area.
 
-    #: lat, lon: the centre, degrees, WGS 84.
+    Attributes
+    ----------
+    lat, lon : float, optional
+        The centre, degrees, WGS 84.
+    size_px, size_m : optional
+        Side of the square, pixels (640 by default) or ground metres.
+    area : shapely geometry, optional
+        In lon/lat degrees; instead of the square, or with a point to look around in it.
+    zoom : int, "max", "fit" or None
+        The source's zoom; its finest; the largest at which the area (or `size_m`) still fits
+        a frame of `frame_px`; None takes `resolution_m`.
+    resolution_m : float
+        Ground resolution wanted when no zoom is given.
+    whole_tiles : bool
+        Keep the touched tiles whole.
+    """
+
     lat: float | None = None
     lon: float | None = None
-    #: size_px, size_m: side of the square, pixels (640 by default) or ground metres.
     size_px: int | None = None
     size_m: float | None = None
-    #: In lon/lat degrees; instead of the square, or with a point to look around in it.
     area: BaseGeometry | None = None
-    #: The source's zoom; its finest; the largest at which the area (or `size_m`) still fits a frame
-    #: of `frame_px`; None takes `resolution_m`.
     zoom: Zoom = None
-    #: Ground resolution wanted when no zoom is given.
     resolution_m: float = 0.6
     frame_px: int = 640
-    #: Keep the touched tiles whole.
     whole_tiles: bool = False
 
     def __post_init__(self) -> None:
@@ -72,7 +82,15 @@ class Where:
 
 @dataclass(frozen=True, slots=True)
 class Acquired:
-    """What `acquire` made."""
+    """What `acquire` made.
+
+    Attributes
+    ----------
+    path : Path
+    grid : Grid
+    source : ImagerySource
+    report : FetchReport
+    """
 
     path: Path
     grid: Grid
@@ -90,6 +108,17 @@ def acquire(
     progress: Progress | None = None,
 ) -> Acquired:
     """Get the picture of a place from a source and write it as a COG.
+
+    Parameters
+    ----------
+    source : Source
+        From `geofield.imagery.sources.find_source`.
+    place : Where
+    path : path
+        The GeoTIFF to write.
+    options : FetchOptions, optional
+    overwrite : bool
+    progress : callable (done, total, what), optional
 
     Raises
     ------

@@ -33,9 +33,23 @@ def picture_at(
 ) -> Iterator[str]:
     """A path that `read_scene` reads, of a source's picture around a place.
 
-    It is the source's own file or address, or a file that is gone behind the block. `size_m` is the
-    side of the square on the ground, `bands` is what the bands show by the user's word. The terms
-    of the source were checked before.
+    Parameters
+    ----------
+    source : Source
+        Its terms were checked.
+    lat, lon : float
+        Degrees, WGS 84.
+    size_m : float, optional
+        Side of the square on the ground.
+    bands : sequence of str, optional
+        What the bands show, by the user's word.
+    options : FetchOptions
+    progress : callable, optional
+
+    Yields
+    ------
+    str
+        The source's own file or address, or a file that is gone behind the block.
     """
     size_px = None if size_m else _SIDE_PX
     if isinstance(source, PictureSource):

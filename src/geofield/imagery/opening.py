@@ -37,29 +37,44 @@ class OpenOptions:
 
 @dataclass(frozen=True, slots=True)
 class FetchOptions:
-    """How tiles are fetched and kept."""
+    """How tiles are fetched and kept.
 
-    #: Where tile caches live; None keeps nothing.
+    Attributes
+    ----------
+    cache_dir : Path or None
+        Where tile caches live; None keeps nothing.
+    offline : bool
+        Work from the cache alone.
+    missing : "error" or "mask"
+        What happens to tiles that cannot be had: stop, or leave no-data.
+    threads, attempts : int
+        Requests at once, and at most for one answer.
+    timeout_s : float
+        For connecting, for each pause within a body, and three times that for the whole.
+    backoff_s : float
+        The first pause before the same request; doubled each time.
+    cache_max_bytes, cache_max_age_s
+        Limits of each cache file.
+    acknowledged : bool
+        The user answers for terms that forbid deriving geodata.
+    proxy : str or None
+        Address of an HTTP proxy; never used for this machine itself.
+    no_proxy : tuple of str
+        Endings of host names that are asked without the proxy.
+    allow : tuple of str
+        Folders and hosts that files and servers may lead to besides their own.
+    """
+
     cache_dir: Path | None = None
-    #: Work from the cache alone.
     offline: bool = False
-    #: What happens to tiles that cannot be had: stop, or leave no-data.
     missing: Literal["error", "mask"] = "error"
-    #: threads, attempts: requests at once, and at most for one answer.
     threads: int = 16
     attempts: int = 6
-    #: For connecting, for each pause within a body, and three times that for the whole.
     timeout_s: float = 20.0
-    #: The first pause before the same request; doubled each time.
     backoff_s: float = 0.25
-    #: cache_max_bytes, cache_max_age_s: limits of each cache file.
     cache_max_bytes: int | None = 2 * 2**30
     cache_max_age_s: float | None = 90 * 86400.0
-    #: The user answers for terms that forbid deriving geodata.
     acknowledged: bool = False
-    #: Address of an HTTP proxy; never used for this machine itself.
     proxy: str | None = None
-    #: Endings of host names that are asked without the proxy.
     no_proxy: tuple[str, ...] = ()
-    #: Folders and hosts that files and servers may lead to besides their own.
     allow: tuple[str, ...] = ()

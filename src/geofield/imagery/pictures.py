@@ -20,10 +20,22 @@ _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
 
 
 def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneReader:
-    """A reader of any picture or set of pictures: a file, folder, index, STAC file or address.
+    """A reader of any picture or set of pictures.
 
-    VRTs, indexes and STAC files may lead to what `allow` names besides their own folder; `known` is
-    `lat`, `lon`, `bands`, `crs`, `scaling` and `source` of `OpenOptions`.
+    Parameters
+    ----------
+    path : str
+        A file, folder, tile index or STAC file, or an address.
+    allow : sequence of str
+        Files, folders and addresses that VRTs, indexes and STAC files may lead to besides
+        their own folder.
+    **known
+        What is known of the picture: `lat`, `lon`, `bands`, `crs`, `scaling` and `source` of
+        `OpenOptions`.
+
+    Raises
+    ------
+    ImageryError
     """
     options = OpenOptions(**known, reach=Reach(tuple(allow)))
     if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):

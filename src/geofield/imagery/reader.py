@@ -41,19 +41,31 @@ _NOTHING = OpenOptions()
 
 @dataclass(frozen=True, eq=False)
 class SceneReader:
-    """A picture that scenes are read from: facts of its file, found by :meth:`open`."""
+    """A picture that scenes are read from.
 
-    #: Path or address, as GDAL takes it.
+    Make one with :meth:`open`. The attributes are facts of the file.
+
+    Attributes
+    ----------
+    path : str
+        Path or address, as GDAL takes it.
+    grid : Grid
+        Of the whole picture, as it is read (reprojected where that is needed).
+    roles : BandRoles
+        What each band of the file shows.
+    source : ImagerySource
+    scaling : (float, float) or None
+        Values that become 0 and 255 in every window; None means the window's percentiles.
+    notes : tuple of str
+        What was decided about the whole picture.
+    """
+
     path: str
-    #: Of the whole picture, as it is read (reprojected where that is needed).
     grid: Grid
-    #: What each band of the file shows.
     roles: BandRoles
     dtype: str
     source: ImagerySource
-    #: Values that become 0 and 255 in every window; None means the window's percentiles.
     scaling: tuple[float, float] | None = None
-    #: What was decided about the whole picture.
     notes: tuple[str, ...] = ()
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
@@ -67,7 +79,14 @@ class SceneReader:
 
     @classmethod
     def open(cls, path: str, options: OpenOptions = _NOTHING) -> SceneReader:
-        """Look at a picture, by its path or http(s) address, without reading its pixels.
+        """Look at a picture without reading its pixels.
+
+        Parameters
+        ----------
+        path : str
+            Path, or an http(s) address of a GeoTIFF; anything GDAL opens.
+        options : OpenOptions
+            What is known of it.
 
         Raises
         ------
@@ -126,9 +145,23 @@ class SceneReader:
         size_m: float | None = None,
         size_px: int | None = None,
     ) -> tuple[int, int, int, int]:
-        """Column, row, width and height of a square around a point (degrees, WGS 84), cut at edges.
+        """The part of the picture around a point, cut at its edges.
 
-        Without a size it is all of the picture or, where that is enormous, `MAX_SIDE_PX` pixels.
+        Parameters
+        ----------
+        lat, lon : float
+            Degrees, WGS 84.
+        size_m, size_px : optional
+            Side of the square; without both, all of the picture or, where it is enormous,
+            `MAX_SIDE_PX` pixels.
+
+        Returns
+        -------
+        column, row, width_px, height_px : int
+
+        Raises
+        ------
+        PointOutsideError
         """
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
@@ -164,11 +197,16 @@ class SceneReader:
         shape_px: tuple[int, int] | None = None,
         scaling: tuple[float, float] | None = None,
     ) -> Scene:
-        """Read a part of the picture: column, row, width and height; all of it by default.
+        """Read a part of the picture.
 
-        `shape_px` reads that many rows and columns instead, each pixel the average of those it
-        covers; `scaling` are the file values that become 0 and 255: that of another scene makes a
-        second window fit.
+        Parameters
+        ----------
+        window : (column, row, width_px, height_px), optional
+            Must lie inside the picture; all of it by default.
+        shape_px : (rows, columns), optional
+            Read that many pixels instead, each the average of those it covers.
+        scaling : (float, float), optional
+            File values that become 0 and 255; a scene's `scaling` makes a second window fit.
 
         Raises
         ------

@@ -18,13 +18,20 @@ def _empty() -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Circles:
-    """Circles found in a picture, strongest first unless said otherwise."""
+    """Circles found in a picture, strongest first unless said otherwise.
 
-    #: Centres (n,), from the corner of the top-left pixel, as in every table.
+    Attributes
+    ----------
+    x_px, y_px : float64 arrays, shape (n,)
+        Centres, from the corner of the top-left pixel, as in every table.
+    radius_px : float64 array, shape (n,)
+    strength : float64 array, shape (n,)
+        The detector's own measure of support; comparable within one picture only.
+    """
+
     x_px: FloatArray = field(default_factory=_empty)
     y_px: FloatArray = field(default_factory=_empty)
     radius_px: FloatArray = field(default_factory=_empty)
-    #: Shape (n,): the detector's own measure of support; comparable within one picture only.
     strength: FloatArray = field(default_factory=_empty)
 
     def __len__(self) -> int:

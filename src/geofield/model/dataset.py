@@ -24,15 +24,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a dataset comes from."""
+    """Where a dataset comes from.
 
-    #: Name and version.
+    Attributes
+    ----------
+    software : str
+        Name and version.
+    source : ImagerySource
+        The picture behind it.
+    settings : mapping
+        All settings of the run, as plain JSON values.
+    evidence : mapping
+        What the stages measured (field quality, detection method and counts), plain JSON.
+    """
+
     software: str = ""
-    #: The picture behind it.
     source: ImagerySource = field(default_factory=ImagerySource)
-    #: All settings of the run, as plain JSON values.
     settings: Mapping[str, Any] = field(default_factory=dict)
-    #: What the stages measured (field quality, detection method and counts), plain JSON.
     evidence: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -93,7 +101,10 @@ class Dataset:
     def layers(self, *, working: bool = False) -> list[schema.Layer]:
         """The layers to write, in the schema's order: all that are not optional, and these.
 
-        `working` adds those that only the plan's own file has.
+        Parameters
+        ----------
+        working : bool
+            With those that only the plan's own file has.
         """
         return [
             each

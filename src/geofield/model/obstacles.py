@@ -33,13 +33,21 @@ _CIRCLE_TOLERANCE = (0.02, 0.002)
 
 @dataclass(frozen=True, slots=True)
 class ObstacleShapes:
-    """What tracks are clipped against: true circles and polygons."""
+    """What tracks are clipped against: true circles and polygons.
 
-    #: Shape (n, 3): centre x, centre y, radius, all in units of the metric CRS, as polygons are.
+    Attributes
+    ----------
+    circles : float array (n, 3)
+        Centre x, centre y, radius, all in units of the metric CRS, as polygons are.
+    circle_no : int array (n,)
+        The obstacle numbers of the circles.
+    polygons : object array (m,)
+        Shapely polygons.
+    polygon_no : int array (m,)
+    """
+
     circles: FloatArray
-    #: Shape (n,): the obstacle numbers of the circles.
     circle_no: NDArray[np.int64]
-    #: Shape (m,): shapely polygons.
     polygons: NDArray[np.object_]
     polygon_no: NDArray[np.int64]
 

@@ -55,11 +55,22 @@ def find_baseline(
     tolerance_m: float = 1.0,
     grid: Grid | None = None,
 ) -> Baseline:
-    """Turn the user's choice of a direction, as in `plan_tracks`, into a baseline.
+    """Turn the user's choice of a direction into a baseline.
 
-    The field is in a metric CRS, and so is an A-B line; the spacing is needed by ``fewest``. An
-    edge counts as straight within a band of twice `tolerance_m`. `grid` is that of the picture in
-    which the outline was found: its frame is no edge of the field.
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        The field, in a metric CRS.
+    direction : str, float, LineString or pair of points
+        ``dominant``, ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading
+        in degrees, or an A-B line in the CRS.
+    crs : CRS
+    spacing_m : float
+        Needed by ``fewest``.
+    tolerance_m : float
+        Half the width of the band within which an edge counts as straight.
+    grid : Grid, optional
+        Of the picture that the outline was found in: its frame is no edge of the field.
 
     Raises
     ------

@@ -38,8 +38,12 @@ def plan_with_settings(
 ) -> Tracks:
     """Plan tracks and, when `settings.route` names a pattern, the route through them.
 
-    The other arguments are those of `plan_tracks`; places in the settings are longitude and
-    latitude.
+    Parameters
+    ----------
+    polygon, obstacles, crs, grid
+        As for `plan_tracks`.
+    settings : TrackSettings
+        Places in it are longitude and latitude.
     """
     metric_crs = metric(crs)
     direction: Any = settings.direction

@@ -23,10 +23,14 @@ _REAL_SHARE = 0.15
 
 @dataclass(frozen=True, slots=True)
 class StraightRun:
-    """A straight run of the outer ring, as the line that fits it best."""
+    """A straight run of the outer ring, as the line that fits it best.
 
-    #: x0, y0, x1, y1: its ends in the CRS; the field lies to the left of the way from the first to
-    #: the second.
+    Attributes
+    ----------
+    x0, y0, x1, y1 : float
+        Its ends in the CRS; the field lies to the left of the way from the first to the second.
+    """
+
     x0: float
     y0: float
     x1: float
@@ -41,12 +45,22 @@ class StraightRun:
 def longest_edge(
     polygon: Polygon, *, tolerance: float = 1.0, frame: Polygon | None = None
 ) -> StraightRun:
-    """Find the longest straight run of a polygon's outer ring, in a metric CRS.
+    """Find the longest straight run of a polygon's outer ring.
 
-    A vertex may lie `tolerance` units of the CRS from the line; the default is that of outlines
-    digitised from imagery of half a metre per pixel. Where the outline runs along the `frame` of
-    the picture that it was found in, the field goes on outside: that is no edge of the field, and
-    nobody drives along it.
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        In a metric CRS.
+    tolerance : float
+        How far a vertex may lie from the line, in units of the CRS. The default is that of
+        outlines digitised from imagery of half a metre per pixel.
+    frame : shapely.Polygon, optional
+        The picture that the outline was found in. Where the outline runs along it, the field goes
+        on outside: that is no edge of the field, and nobody drives along it.
+
+    Returns
+    -------
+    StraightRun
     """
     xy, barred = own_edges(polygon, tolerance, frame)
     return longest_run(xy, tolerance, barred)

@@ -56,11 +56,22 @@ def find_source(
 ) -> Source:
     """The source that a name, address or path means.
 
-    It is a name of the catalogue (the built-in one by default); a tile address with ``{z}``,
-    ``{x}``, ``{y}``; the address of a WMS, WMTS or GeoTIFF (``wms:`` or ``wmts:`` in front settles
-    doubt); a file or folder. `keys` are by source name. The client is for capabilities documents,
-    which may lead to the hosts of `allow` besides their own; a WMS without Web Mercator is asked in
-    the UTM zone of the point (longitude, latitude) where the picture will be.
+    Parameters
+    ----------
+    what : str
+        A name of the catalogue; a tile address with ``{z}``, ``{x}``, ``{y}``; the address of
+        a WMS, WMTS or GeoTIFF (``wms:`` or ``wmts:`` in front settles doubt); a file or folder.
+    catalogue : mapping, optional
+        Sources by name; the built-in ones by default.
+    keys : mapping of source name to key, optional
+    client : Client, optional
+        For capabilities documents.
+    layer : str
+        Of a WMS or WMTS.
+    point : (lon, lat), optional
+        Where the picture will be; a WMS without Web Mercator is asked in its UTM zone.
+    allow : sequence of str
+        Hosts that a capabilities document may lead to besides its own.
 
     Raises
     ------
