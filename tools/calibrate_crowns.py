@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ from scipy import ndimage
 from scipy.optimize import isotonic_regression
 from standing_things import place_things
 
+from geofield.errors import ObstacleWarning
 from geofield.evaluation import match_points, reliability
 from geofield.grid import Grid
 from geofield.learned import network
@@ -182,6 +184,7 @@ def main() -> None:
     parser.add_argument("--share", type=float, default=0.7)
     parser.add_argument("--least-px", type=float, default=4.0)
     given = parser.parse_args()
+    warnings.simplefilter("ignore", ObstacleWarning)  # simulated pictures are coarse on purpose
     pictures = Pictures.read(given.pictures)
     which = np.flatnonzero(pictures.left_out)
     sites = np.array([site_of(str(pictures.names[i])) for i in which])
