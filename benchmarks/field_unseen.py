@@ -37,6 +37,8 @@ from outline_cases import FOLDS, Case, fold_of, middle_of_error, other, unseen
 #: Overlaps that count: a good outline, one that clicks aim at, one to be warned of.
 GOOD, AIM, BAD = 0.88, 0.93, 0.8
 MOST_CLICKS = 10
+#: After how many points overlaps are told; what a point should not cost.
+TOLD_POINTS, LOST = (1, 2, 3, 5, MOST_CLICKS), 0.05
 #: Turned by so many degrees, enlarged by so much.
 RESAMPLED = {"1.2 m": (0.0, 0.5), "0.3 m": (0.0, 2.0), "warped": (1.3, 1.24)}
 KINDS = ("JPEG 30", "JPEG 60", "JPEG 85", "haze", "contrast", "16 bit", "moved 10 m", *RESAMPLED)
@@ -290,18 +292,21 @@ def main() -> None:
             part = [one for one in results["4 bands"] if one.name.startswith(mark)]
             lines.append(row(f"of these, table `{mark}`", part))
         lines += ["", "## Certainty", "", *certainty(results["4 bands"])]
-        lines += ["## Further points", "", "| way | fields | first | second | third | until .93 |"]
-        lines.append("|---" * 6 + "|")
+        lines += ["## Further points", ""]
+        heads = [f"{number} points" for number in TOLD_POINTS]
+        lines.append(f"| way | fields | {' | '.join(heads)} | until {AIM} | lost .05 |")
+        lines.append("|---" * (4 + len(heads)) + "|")
         for way in WAYS:
             overlaps = pool.map(partial(clicked, way=way), every[: options.clicks], chunksize=1)
-            at = [np.mean([one[min(k, len(one) - 1)] for one in overlaps]) for k in range(3)]
+            at = [np.mean([one[min(k, len(one)) - 1] for one in overlaps]) for k in TOLD_POINTS]
+            steps = np.concatenate([np.diff(one) for one in overlaps])
             clicks = [
                 next((n for n, value in enumerate(one, 1) if value >= AIM), MOST_CLICKS)
                 for one in overlaps
             ]
             lines.append(
-                f"| {way} | {len(overlaps)} | {at[0]:.3f} | {at[1]:.3f} | {at[2]:.3f} | "
-                f"{np.mean(clicks):.1f} |"
+                f"| {way} | {len(overlaps)} | {' | '.join(f'{one:.3f}' for one in at)} | "
+                f"{np.mean(clicks):.1f} | {np.mean(steps < -LOST):.0%} of points |"
             )
             print(lines[-1], flush=True)
         lines += ["", "## Other pictures of the same fields", ""]

@@ -4,10 +4,11 @@
 
 Learned from fields drawn by eye on sites that the network has not seen, and from simulated ones:
 the curves over the figures of the outlines make beliefs as likely as their overlaps with the
-truth say. Part K of the table is learned without the sites of fold K, and what certainty is worth
-from outlines taken by such parts. CACHE keeps the searches. These follow the table that is there,
-and a ranking sees other outlines where it has led the search itself: so learn and write, search
-into one more CACHE, learn from both and write.
+truth say. Every other search is asked on with points, each where its best outline errs most, as
+people correct it. Part K of the table is learned without the sites of fold K, and what certainty
+is worth from outlines taken by such parts. CACHE keeps the searches. These follow the table that
+is there, and a ranking sees other outlines where it has led the search itself: so learn and write,
+search into one more CACHE, learn from both and write.
 
 Not the choice among the outlines is what is short, given these beliefs: the ground with the largest
 expected overlap, put together from all outlines instead of taken from one, is .750 where the choice
@@ -71,6 +72,9 @@ SHARPNESS, WORST = 8.0, 0.5
 EXACT_SHARPNESS, EXACT_RIDGE, EXACT_FROM, EXACT_WHOLE = 50.0, 1e-3, 0.5, 0.8
 #: Simulated pictures, and what one counts against a real one.
 SIMULATED, SIMULATED_COUNTS = 20, 4.0
+#: Points that correct what was found before; what the outlines with such count against those
+#: without.
+CLICKS, CLICKED, CLICKED_COUNTS = 3, "clicked", 0.5
 #: Other pictures of the fields.
 OTHERS = ("colour", "grey", "JPEG 40", "colour", "grey", "haze", "contrast")
 #: Overlap from which an outline is right, by what is asked.
@@ -85,6 +89,7 @@ EVIDENCE = (
     "inside_95_above_border",
     "frame_share",
     "long_sides_share",
+    "corrections",
 )
 
 
@@ -99,6 +104,7 @@ class Searched:
     figures: np.ndarray
     polygons: list[shapely.Polygon]
     overlap: np.ndarray
+    corrections: int = 0
 
     @property
     def fold(self) -> int:
@@ -106,13 +112,13 @@ class Searched:
 
 
 def searched(case: Case) -> list[Searched]:
-    """The search of a case, and once more with a point where its best outline errs."""
+    """The search of a case, of every other one again with points where its best outline errs."""
     search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
     truth = shapely.transform(case.truth, lambda c: c / search.factor)
     found = []
     include: tuple[tuple[float, float], ...] = ()
     exclude: tuple[tuple[float, float], ...] = ()
-    for turn in range(2):
+    for turn in range(1 + CLICKS):
         candidates = search.candidates(include, exclude)
         if not candidates:
             break
@@ -122,28 +128,30 @@ def searched(case: Case) -> list[Searched]:
         names = tuple(candidates[0].figures)
         values = np.array([[one.figures[name] for name in names] for one in candidates])
         name = f"{case.name} {turn}"
-        mark = case.mark if turn == 0 else f"{case.mark} clicked"
-        found.append(Searched(name, mark, case.site, names, values, polygons, common / either))
+        mark = case.mark if turn == 0 else f"{case.mark} {CLICKED} {turn}"
+        overlap = common / either
+        found.append(Searched(name, mark, case.site, names, values, polygons, overlap, turn))
         wrong = middle_of_error(polygons[0], truth, search.surface.shape)
-        if wrong is None or turn or zlib.crc32(case.name.encode()) % 2:
+        if wrong is None or zlib.crc32(case.name.encode()) % 2:
             break
         if wrong[0]:
-            include = (wrong[1],)
+            include = (*include, wrong[1])
         else:
-            exclude = (wrong[1],)
+            exclude = (*exclude, wrong[1])
     return found
 
 
 def weights(known: Sequence[Searched]) -> np.ndarray:
     """What each counts: a site by the root of its pictures, as its years are much alike."""
-    often = Counter(one.site for one in known)
-    share = np.array(
-        [
-            (SIMULATED_COUNTS if one.mark.startswith("simulated") else 1.0) / often[one.site] ** 0.5
-            for one in known
-        ]
-    )
+    often = Counter(one.site for one in known if CLICKED not in one.mark)
+    share = np.array([counts(one.mark) / often[one.site] ** 0.5 for one in known])
     return share / share.sum()
+
+
+def counts(mark: str) -> float:
+    """What a search of a kind counts."""
+    kind = SIMULATED_COUNTS if mark.startswith("simulated") else 1.0
+    return kind * (CLICKED_COUNTS if CLICKED in mark else 1.0)
 
 
 #: Weight, figures bent (outlines, 3 x names), beliefs that are wanted.
@@ -219,6 +227,7 @@ def chosen(one: Searched, ranking: Ranking) -> Chosen:
     best = exact(expected, overlap, exactness, [one.polygons[k] for k in order])
     figures = dict(zip(one.names, one.figures[order[best]].tolist(), strict=True))
     candidate = Candidate(one.polygons[order[best]], None, figures, 0.0)  # type: ignore[arg-type]
+    figures["corrections"] = float(one.corrections)
     evidence = evidence_of(candidate, float(expected[best]), belief, overlap[best])
     return Chosen(one, float(one.overlap[order[best]]), dict(evidence))
 

@@ -12,8 +12,9 @@ from geofield.errors import FieldError
 from geofield.field.border import measure
 from geofield.field.cuts import divided
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
-from geofield.field.ranking import agreement, exact, trained
+from geofield.field.ranking import exact, trained
 from geofield.field.regions import partition
+from geofield.field.said import Said
 from geofield.field.straight import ring
 from geofield.field.surface import Surface
 from geofield.learned.network import network
@@ -35,13 +36,14 @@ def several():
     stack[2, 120:] += 5 * rng.random((40, 160), np.float32)
     surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
     likely = np.clip(surface.parted.mean(stack[0]) / 9 + 0.1, 0.02, 0.97)
-    found = []
-    for corners in OUTLINES:
-        outline = shapely.Polygon(corners)
-        inside = surface.members(ring(outline))
-        agrees = agreement(likely, surface.size_px, [inside])[0]
-        found.append({**measure(surface, outline, inside), **agrees})
-    return found
+    outlines = [shapely.Polygon(corners) for corners in OUTLINES]
+    inside = [surface.members(ring(one)) for one in outlines]
+    said = Said(likely, surface.size_px, ((162.0, 44.0), (150.0, 5.0)), inside[1])
+    told = said.figures(outlines, inside)
+    return [
+        {**measure(surface, outline, held), **more}
+        for outline, held, more in zip(outlines, inside, told, strict=True)
+    ]
 
 
 @pytest.fixture

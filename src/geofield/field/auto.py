@@ -60,15 +60,16 @@ def segment(
     """
     if search is None:
         search = search_field(scene, x_px, y_px)
-    reduced = [
+    belong, apart = (
         tuple((x / search.factor, y / search.factor) for x, y in one) for one in (include, exclude)
-    ]
-    found = search.candidates(*reduced)
+    )
+    found = search.candidates(belong, apart)
     if not found:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     likely = likely_outlines(found[:WEIGHED], search)
-    masks = carried(scene, [one.candidate.polygon for one in likely], search.factor, search.seed_px)
+    outlines = [one.candidate.polygon for one in likely]
+    masks = carried(scene, outlines, search.factor, (search.seed_px, *belong), apart)
     chosen, *others = (
         _told(scene, search, one, mask) for one, mask in zip(likely, masks, strict=True)
     )

@@ -13,7 +13,7 @@ from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
 from geofield.field.plausible import look
-from geofield.field.points import obeying
+from geofield.field.points import obeying, obeys
 from geofield.field.quality import judge
 from geofield.field.search import FieldSearch, search_field
 from geofield.field.segmentation import fill_holes, part_at
@@ -24,6 +24,8 @@ from geofield.model.segmentation import Segmentation
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
+#: How near an outline keeps to the border it was found at where a point needs it, pixels.
+_EXACT_PX = 1.0
 #: Longitude and latitude, degrees.
 Places = Sequence[tuple[float, float]]
 
@@ -129,7 +131,11 @@ def extract_field(
             )
         outline_px = straight_outline(filled, tolerance_px=tolerance_px)
         if belong or apart:
-            outline_px = obeying(outline_px, (seed, *belong), apart)
+            points = (seed, *belong), apart
+            if not obeys(outline_px, *points):
+                # A line drawn straight passes a point on its wrong side: drawn more exactly first.
+                outline_px = straight_outline(filled, tolerance_px=min(tolerance_px, _EXACT_PX))
+            outline_px = obeying(outline_px, *points)
         return outline_px, judge(scene, seen, filled, outline_px, one, seed)
 
     outline_px, quality = outlined(found)

@@ -41,39 +41,6 @@ _NEARLY = 0.1
 _CURVES = ("slopes", "edges")
 
 
-def agreement(
-    likely: FloatArray, size_px: FloatArray, inside: Sequence[BoolArray]
-) -> list[dict[str, float]]:
-    """How well outlines agree with what the network takes for the field, by name.
-
-    Parameters
-    ----------
-    likely, size_px : float array (superpixels,)
-        How likely each belongs to the field; its pixels.
-    inside : sequence of bool array (superpixels,)
-        Which each outline holds; at least one.
-    """
-    sure, field = np.clip(likely, 0.005, 0.995), likely > 0.5
-    without = np.log1p(-sure)
-    counted = size_px[:, None] * np.column_stack(
-        [np.ones_like(likely), likely, field, likely < 0.3, np.log(sure) - without]
-    )
-    area, common, both, unlikely, gain = (np.array(inside) @ counted).T
-    everywhere, fields = size_px @ likely, size_px @ field
-    fit = size_px @ without + gain
-    figures = {
-        "network_overlap": log_odds(common / (area + everywhere - common)),
-        "network_field_overlap": log_odds(both / (area + fields - both)),
-        "network_inside": common / area,
-        "network_missed": 1.0 - common / max(everywhere, 1e-9),
-        "network_unlikely_share": unlikely / area,
-        "network_fit": np.log(0.02 - fit / size_px.sum()),
-        "network_fit_of_area": np.log(0.02 - fit / area),
-    }
-    rows = np.column_stack(list(figures.values())).tolist()
-    return [dict(zip(figures, row, strict=True)) for row in rows]
-
-
 def log_odds(share: FloatArray | float) -> FloatArray:
     """Logarithm of the odds of a share, within bounds."""
     return np.asarray(logit(np.clip(share, 0.01, 0.995)))

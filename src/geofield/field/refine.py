@@ -15,7 +15,8 @@ from shapely import Polygon
 from shapely.affinity import scale
 
 from geofield.field.evidence import channels, whiten
-from geofield.field.straight import on_frame, ring
+from geofield.field.points import Points, obeys
+from geofield.field.straight import meeting, on_frame, ring
 from geofield.model import Scene
 from geofield.raster import bilinear
 
@@ -38,14 +39,14 @@ _ACROSS_PX, _SMOOTH_PX, _ALONG_PX = 1.0, 1.0, 9
 _STAY = 0.2
 #: A side that stays this near the picture's frame is the frame, pixels.
 _FRAME_PX = 2.5
-#: Sides whose directions differ less (sine) have no well-defined meeting point.
-_PARALLEL = 0.12
 
 
 def carried(
-    scene: Scene, outlines: Sequence[Polygon], factor: int, seed_px: tuple[float, float]
+    scene: Scene, outlines: Sequence[Polygon], factor: int, include: Points, exclude: Points = ()
 ) -> list[BoolArray]:
     """The pixels of a scene within each of some outlines that were found in its reduced picture.
+
+    One that obeys the points, and would no longer, stays where it was found.
 
     Parameters
     ----------
@@ -54,17 +55,23 @@ def carried(
         Pixel coordinates of the reduced picture.
     factor : int
         Pixels of the scene along one of the reduced picture.
-    seed_px : (float, float)
-        The point, pixel coordinates of the reduced picture.
+    include, exclude : sequence of (float, float)
+        The seed and further points that belong, points that do not; pixel coordinates of the
+        reduced picture.
     """
     size, reach = factor, _REACH_PX
     finest = math.ceil(max(scene.grid.shape) / _FINEST_PX)
     while True:
-        stack = whiten(
-            channels(scene, size), (seed_px[0] * factor / size, seed_px[1] * factor / size)
-        )
+        points = [
+            [(x * factor / size, y * factor / size) for x, y in some] for some in (include, exclude)
+        ]
+        stack = whiten(channels(scene, size), points[0][0])
         layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
-        outlines = [aligned(one, layers, reach) for one in outlines]
+        moved = [aligned(one, layers, reach) for one in outlines]
+        outlines = [
+            one if obeys(one, *points) and not obeys(new, *points) else new
+            for one, new in zip(outlines, moved, strict=True)
+        ]
         if size <= finest:
             return [
                 within(scale(one, size, size, origin=(0, 0)), scene.grid.shape) for one in outlines
@@ -116,7 +123,8 @@ def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> P
     for at in range(len(sides)):
         before, after = sides[at - 1], sides[at]
         if firm[at - 1] and firm[at]:
-            corners.append(_meeting(before, after, start[at], 3.0 * reach_px))
+            corner = meeting(before, after, start[at], 3.0 * reach_px)
+            corners.append(0.5 * (before[1] + after[0]) if corner is None else corner)
         else:
             corners.append(before[1] if firm[at - 1] else after[0])
     polygon = Polygon(np.clip(corners, 0, [shape[1], shape[0]]))
@@ -171,21 +179,3 @@ def _moved(
     value = strength[rows, np.arange(count)].mean(axis=1)
     best = np.argmax(value * 0.5 * (stay[one + steps] + stay[other + steps]))
     return a + one[best] * _FINE_PX * across, b + other[best] * _FINE_PX * across
-
-
-def _meeting(
-    before: tuple[FloatArray, FloatArray],
-    after: tuple[FloatArray, FloatArray],
-    corner: FloatArray,
-    reach_px: float,
-) -> FloatArray:
-    """Where two sides meet, or halfway between their ends."""
-    halfway = 0.5 * (before[1] + after[0])
-    u, v = before[1] - before[0], after[1] - after[0]
-    size = float(np.hypot(*u) * np.hypot(*v))
-    cross = float(u[0] * v[1] - u[1] * v[0])
-    if abs(cross) <= _PARALLEL * size:  # also where a side has no length
-        return halfway
-    gap = after[0] - before[0]
-    meeting = before[0] + (gap[0] * v[1] - gap[1] * v[0]) / cross * u
-    return meeting if np.hypot(*(meeting - corner)) <= reach_px else halfway

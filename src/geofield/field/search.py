@@ -2,7 +2,8 @@
 
 The regions around the points become straight outlines, the best of them redrawn along their own
 straight sides. What the points say is obeyed by every outline. What was measured is kept, so
-that a further point costs the network's answer to it and a few new outlines.
+that a further point costs the network's answer to it and a few new outlines: it corrects what was
+found before it, and what was right there should stay.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from geofield.errors import FieldError
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
+from geofield.field.mend import drawn, mended
 from geofield.field.network import Seen, seen
-from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.outline import straight_outline
 from geofield.field.points import obeys
-from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures, agreement, trained
+from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures, trained
 from geofield.field.regions import (
     SMALLEST_PX,
     SMALLEST_SHARE,
@@ -32,6 +34,7 @@ from geofield.field.regions import (
     partition,
     regions,
 )
+from geofield.field.said import Said
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 from geofield.model import Scene
@@ -119,6 +122,7 @@ class FieldSearch:
     moved: bool
     part: int | None = None
     known: dict[Polygon, Held] = field(default_factory=dict)
+    taken: dict[tuple[Points, Points], list[Polygon]] = field(default_factory=dict)
 
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
@@ -128,16 +132,38 @@ class FieldSearch:
     def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
         """Outlines that obey the points, the best first; none where nothing stands out.
 
+        Where none can, for two points of both kinds share a pixel of the reduced picture, those
+        found without the last point: they are cut at full size.
+
         Parameters
         ----------
         include, exclude : tuple of (float, float)
             Further points that belong and that do not, pixel coordinates of the searched
             picture.
         """
+        shorter = _shorter(include, exclude)
+        found = self._found(include, exclude, self._before(shorter))
+        ranked = best_first(found)
+        if found:
+            self.taken[include, exclude] = [self._most_exact(found), ranked[0]]
+        elif shorter:
+            return self.candidates(*shorter[0])
+        return [found[polygon] for polygon in ranked]
+
+    def _found(
+        self, include: Points, exclude: Points, before: Sequence[Polygon]
+    ) -> dict[Polygon, Candidate]:
+        """Outlines that obey the points, after some that were taken without the last one."""
         likely = self.likely(include, exclude)
         points = (self.seed_px, *include), exclude
         ground = self.surface.parted.mean(likely)
-        earlier = self._earlier(ground) if include or exclude else []
+        said = Said(
+            ground,
+            self.surface.size_px,
+            (*include, *exclude),
+            self.known[before[0]].inside if before else None,
+        )
+        earlier = self._earlier(said) if include or exclude else []
         found: dict[Polygon, Candidate] = {}
 
         def add(outlines: Mapping[Polygon, BoolArray]) -> None:
@@ -145,7 +171,7 @@ class FieldSearch:
             new = [polygon for polygon in outlines if polygon not in found]
             obeying = np.array(new)[obeys(np.array(new), *points)] if new else ()
             held = [self._held(polygon, outlines[polygon]) for polygon in obeying]
-            for one, figures, score in self._scored(held, ground):
+            for one, figures, score in self._scored(held, said):
                 found[one.polygon] = Candidate(one.polygon, one.holes, figures, score)
 
         add({polygon: one.holes for polygon, one in self.known.items()})
@@ -154,7 +180,7 @@ class FieldSearch:
             *regions(self.surface.parted, ground, *points, earlier),
             *regions(self.second, second, *points),
         ]
-        rough = {rough_outline(one.mask): one for one in around}
+        rough = {drawn(one.mask, *points): one for one in around}
         add({polygon: one.holes for polygon, one in rough.items()})
         fitted = {}
         for polygon in self._different([one for one in best_first(found) if one in rough], _FITTED):
@@ -162,6 +188,9 @@ class FieldSearch:
                 outline = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
                 fitted[Polygon(outline.exterior)] = rough[polygon].holes
         add(fitted)
+        for polygon in before:
+            changed = mended(polygon, *points, self.surface.shape)
+            add(dict.fromkeys(changed, self.known[polygon].holes))
         tried: set[Polygon] = set()
 
         def redraw(best: Iterable[Polygon]) -> None:
@@ -175,7 +204,16 @@ class FieldSearch:
             redraw(self._different(best_first(found), _BREADTH))
         for _ in range(_POLISHED if found else 0):
             redraw([self._most_exact(found)])
-        return [found[polygon] for polygon in best_first(found)]
+        return found
+
+    def _before(self, shorter: Sequence[tuple[Points, Points]]) -> list[Polygon]:
+        """What was taken before the last of the points; none without points."""
+        if not shorter:
+            return []
+        asked = [one for one in shorter if one in self.taken]
+        if not asked:
+            self.candidates(*shorter[0])
+        return list(dict.fromkeys(self.taken.get((asked or shorter)[0], [])))
 
     def _most_exact(self, found: Mapping[Polygon, Candidate]) -> Polygon:
         """Of the outlines that hold much the same ground as the best, the most exact one."""
@@ -187,23 +225,19 @@ class FieldSearch:
         exactness = trained(self.part).exactness([found[polygon].figures for polygon in ranked])
         return ranked[int(np.argmax(np.where(alike, exactness, -np.inf)))]
 
-    def _scored(
-        self, held: Sequence[Held], ground: FloatArray
-    ) -> Iterator[tuple[Held, Figures, float]]:
+    def _scored(self, held: Sequence[Held], said: Said) -> Iterator[tuple[Held, Figures, float]]:
         """Outlines that are no scraps, with all their figures and their scores."""
         some = [one for one in held if one.figures is not None]
         if not some:
             return
-        agrees = agreement(ground, self.surface.size_px, [one.inside for one in some])
-        figures = [{**(one.figures or {}), **more} for one, more in zip(some, agrees, strict=True)]
+        told = said.figures([one.polygon for one in some], [one.inside for one in some])
+        figures = [{**(one.figures or {}), **more} for one, more in zip(some, told, strict=True)]
         scores = trained(self.part).scores(figures).tolist()
         yield from zip(some, figures, scores, strict=True)
 
-    def _earlier(self, ground: FloatArray) -> list[BoolArray]:
+    def _earlier(self, said: Said) -> list[BoolArray]:
         """The best of what is known, also where it does not obey the points."""
-        if not self.known:
-            self.candidates()  # points correct what is found without them
-        scored = self._scored(list(self.known.values()), ground)
+        scored = self._scored(list(self.known.values()), said)
         ranked = sorted(((one.inside, score) for one, _, score in scored), key=lambda one: -one[1])
         return [inside for inside, _ in ranked[:_MENDED]]
 
@@ -238,6 +272,12 @@ class FieldSearch:
             figures = measure(self.surface, polygon, inside)
             self.known[polygon] = Held(polygon, holes, inside, figures)
         return self.known[polygon]
+
+
+def _shorter(include: Points, exclude: Points) -> list[tuple[Points, Points]]:
+    """The points without the last one; which kind that was is not known."""
+    shorter = [(include, exclude[:-1])] if exclude else []
+    return [*shorter, (include[:-1], exclude)] if include else shorter
 
 
 def best_first(found: Mapping[Polygon, Candidate]) -> list[Polygon]:

@@ -139,3 +139,19 @@ class _Sides:
 def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
     """Cross products of plane vectors (n, 2)."""
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def meeting(
+    one: tuple[FloatArray, FloatArray],
+    other: tuple[FloatArray, FloatArray],
+    near: FloatArray,
+    reach_px: float,
+) -> FloatArray | None:
+    """Where the lines of two sides (start, end) meet, if that is within reach of a place."""
+    u, v, gap = one[1] - one[0], other[1] - other[0], other[0] - one[0]
+    cross = float(u[0] * v[1] - u[1] * v[0])
+    # Also where a side has no length.
+    if abs(cross) <= _PARALLEL * float(np.hypot(*u) * np.hypot(*v)):
+        return None
+    found: FloatArray = one[0] + float(gap[0] * v[1] - gap[1] * v[0]) / cross * u
+    return found if np.hypot(*(found - near)) <= reach_px else None
