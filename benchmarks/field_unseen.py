@@ -293,7 +293,7 @@ def main() -> None:
             lines.append(row(f"of these, table `{mark}`", part))
         lines += ["", "## Certainty", "", *certainty(results["4 bands"])]
         lines += ["## Further points", ""]
-        heads = [f"{number} points" for number in TOLD_POINTS]
+        heads = [f"{number} point{'s' * (number > 1)}" for number in TOLD_POINTS]
         lines.append(f"| way | fields | {' | '.join(heads)} | until {AIM} | lost .05 |")
         lines.append("|---" * (4 + len(heads)) + "|")
         for way in WAYS:

@@ -55,26 +55,25 @@ class Said:
         inside : sequence of bool array (superpixels,)
             Which each holds.
         """
-        members = np.array(inside)
         figures = {
-            **self._agreement(members),
-            "kept": self._kept(members),
+            **self._shares(np.array(inside)),
             "clearance": self._clearance(polygons),
-            "corrections": np.full(len(members), float(len(self.corrections))),
+            "corrections": np.full(len(polygons), float(len(self.corrections))),
         }
         rows = np.column_stack(list(figures.values())).tolist()
         return [dict(zip(figures, row, strict=True)) for row in rows]
 
-    def _agreement(self, members: BoolArray) -> dict[str, FloatArray]:
-        """How well outlines agree with what the network takes for the field."""
+    def _shares(self, members: BoolArray) -> dict[str, FloatArray]:
+        """Of the ground: what agrees with the network's answer, what is kept of the one before."""
         likely, size_px = self.likely, self.size_px
         sure, field = np.clip(likely, 0.005, 0.995), likely > 0.5
         without = np.log1p(-sure)
+        before = np.zeros_like(field) if self.before is None else self.before
         counted = size_px[:, None] * np.column_stack(
-            [np.ones_like(likely), likely, field, likely < 0.3, np.log(sure) - without]
+            [np.ones_like(likely), likely, field, likely < 0.3, np.log(sure) - without, before]
         )
-        area, common, both, unlikely, gain = (members @ counted).T
-        everywhere, fields = size_px @ likely, size_px @ field
+        area, common, both, unlikely, gain, kept = (members @ counted).T
+        everywhere, fields, earlier = (float(size_px @ one) for one in (likely, field, before))
         fit = size_px @ without + gain
         return {
             "network_overlap": log_odds(common / (area + everywhere - common)),
@@ -84,14 +83,9 @@ class Said:
             "network_unlikely_share": unlikely / area,
             "network_fit": np.log(0.02 - fit / size_px.sum()),
             "network_fit_of_area": np.log(0.02 - fit / area),
+            # Whole where nothing was taken before.
+            "kept": np.ones_like(area) if self.before is None else kept / (area + earlier - kept),
         }
-
-    def _kept(self, members: BoolArray) -> FloatArray:
-        """Overlap with the outline before; whole where there was none."""
-        if self.before is None:
-            return np.ones(len(members))
-        common, area = members @ (self.size_px * self.before), members @ self.size_px
-        return np.asarray(common / (area + self.size_px @ self.before - common))
 
     def _clearance(self, polygons: Sequence[Polygon]) -> FloatArray:
         """How far borders keep from the nearest correction, pixels, up to a bound."""
