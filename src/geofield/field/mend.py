@@ -27,6 +27,8 @@ Points = Sequence[tuple[float, float]]
 _TOLERANCES_PX = (3.0, 1.0)
 #: Sides beside a point that are moved; by so many times its distance, pixels at least.
 _SIDES, _REACHES, _LEAST_PX = 2, (1.5, 2.0, 3.0), 1.0
+#: From so many corrections on they are details: before, a whole side is meant.
+_DETAILS_FROM = 3
 #: A side is turned about an end that is farther from the point than this share of it.
 _LEVER = 0.3
 
@@ -45,7 +47,7 @@ def drawn(mask: BoolArray, include: Points, exclude: Points) -> Polygon:
         polygon = rough_outline(mask, tolerance_px=tolerance_px)
         if obeys(polygon, include, exclude):
             return polygon
-    return polygon if polygon.is_empty else _cut(polygon, include, exclude)
+    return Polygon()
 
 
 def mended(
@@ -53,14 +55,15 @@ def mended(
 ) -> list[Polygon]:
     """Outlines with a side moved or turned past the first point that the given one disobeys.
 
-    The last one is changed at the points alone: where they leave a side nowhere to go.
+    Where the other points leave no side anywhere to go, and where a person is at details, one
+    gives way at the points alone.
 
     Parameters
     ----------
     polygon : Polygon
         Pixel coordinates.
     include, exclude : sequence of (float, float)
-        Points that belong and that do not.
+        Points that belong, the seed first, and that do not.
     shape : (int, int)
         Rows and columns of the picture.
     """
@@ -68,7 +71,10 @@ def mended(
     missing += [(point, -1.0) for point in exclude if shapely.intersects_xy(polygon, *point)]
     if not missing:
         return []
-    return [*_beyond(polygon, *missing[0], shape), _cut(polygon, include, exclude)]
+    moved = [one for one in _beyond(polygon, *missing[0], shape) if obeys(one, include, exclude)]
+    if moved and len(include) + len(exclude) - 1 < _DETAILS_FROM:
+        return moved
+    return [*moved, _cut(polygon, include, exclude)]
 
 
 def _cut(polygon: Polygon, include: Points, exclude: Points) -> Polygon:
