@@ -74,7 +74,7 @@ EXACT_SHARPNESS, EXACT_RIDGE, EXACT_FROM, EXACT_WHOLE = 50.0, 1e-3, 0.5, 0.8
 SIMULATED, SIMULATED_COUNTS = 20, 4.0
 #: Points that correct what was found before; what the outlines with such count against those
 #: without.
-CLICKS, CLICKED, CLICKED_COUNTS = 3, "clicked", 0.5
+CORRECTIONS, CORRECTED_COUNTS = 3, 0.5
 #: Other pictures of the fields.
 OTHERS = ("colour", "grey", "JPEG 40", "colour", "grey", "haze", "contrast")
 #: Overlap from which an outline is right, by what is asked.
@@ -104,7 +104,7 @@ class Searched:
     figures: np.ndarray
     polygons: list[shapely.Polygon]
     overlap: np.ndarray
-    corrections: int = 0
+    corrections: int
 
     @property
     def fold(self) -> int:
@@ -118,7 +118,7 @@ def searched(case: Case) -> list[Searched]:
     found = []
     include: tuple[tuple[float, float], ...] = ()
     exclude: tuple[tuple[float, float], ...] = ()
-    for turn in range(1 + CLICKS):
+    for turn in range(1 + CORRECTIONS):
         candidates = search.candidates(include, exclude)
         if not candidates:
             break
@@ -128,7 +128,7 @@ def searched(case: Case) -> list[Searched]:
         names = tuple(candidates[0].figures)
         values = np.array([[one.figures[name] for name in names] for one in candidates])
         name = f"{case.name} {turn}"
-        mark = case.mark if turn == 0 else f"{case.mark} {CLICKED} {turn}"
+        mark = case.mark if turn == 0 else f"{case.mark} clicked {turn}"
         overlap = common / either
         found.append(Searched(name, mark, case.site, names, values, polygons, overlap, turn))
         wrong = middle_of_error(polygons[0], truth, search.surface.shape)
@@ -143,15 +143,15 @@ def searched(case: Case) -> list[Searched]:
 
 def weights(known: Sequence[Searched]) -> np.ndarray:
     """What each counts: a site by the root of its pictures, as its years are much alike."""
-    often = Counter(one.site for one in known if CLICKED not in one.mark)
-    share = np.array([counts(one.mark) / often[one.site] ** 0.5 for one in known])
+    often = Counter(one.site for one in known if not one.corrections)
+    share = np.array([counts(one) / often[one.site] ** 0.5 for one in known])
     return share / share.sum()
 
 
-def counts(mark: str) -> float:
-    """What a search of a kind counts."""
-    kind = SIMULATED_COUNTS if mark.startswith("simulated") else 1.0
-    return kind * (CLICKED_COUNTS if CLICKED in mark else 1.0)
+def counts(one: Searched) -> float:
+    """What a search of its kind counts."""
+    kind = SIMULATED_COUNTS if one.mark.startswith("simulated") else 1.0
+    return kind * (CORRECTED_COUNTS if one.corrections else 1.0)
 
 
 #: Weight, figures bent (outlines, 3 x names), beliefs that are wanted.

@@ -1,16 +1,23 @@
 """Further points correct the outline that was there: locally, and without losing its ground."""
 
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
 import shapely
+from affine import Affine
+from pyproj import CRS
 from shapely import box
 
 from geofield.field import extract_field, prepare_field
-from geofield.field.mend import drawn, mended
-from geofield.field.points import obeys
+from geofield.field.mend import mended
+from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.points import drawn, obeys
+from geofield.field.refine import carried
 from geofield.field.said import Said
+from geofield.grid import Grid
+from geofield.model.scene import Scene
 from geofield.simulate import SimulationSettings, simulate_field
 
 SQUARE = box(40, 40, 120, 120)
@@ -18,6 +25,18 @@ SQUARE = box(40, 40, 120, 120)
 
 def overlap(a, b):
     return a.intersection(b).area / a.union(b).area
+
+
+def outline_of(field, include, exclude, search=None):
+    """The outline in pixels, of points in pixels."""
+    scene = field.scene
+    belong, apart = ([scene.grid.to_lonlat(*one) for one in some] for some in (include, exclude))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = extract_field(
+            scene, lat=field.lat, lon=field.lon, include=belong, exclude=apart, search=search
+        )
+    return found.polygon_px(scene.grid)
 
 
 @pytest.mark.parametrize(
@@ -47,15 +66,45 @@ def test_a_side_does_not_leave_the_picture_and_an_obeyed_point_moves_none():
     assert all(box(0, 0, 160, 160).covers(one) for one in found)
 
 
-def test_a_region_is_drawn_as_exactly_as_its_points_need():
+def test_a_first_correction_moves_a_side_and_details_give_way_at_a_point_too():
+    seed, beyond = (80.0, 80.0), (124.0, 80.0)
+    first = mended(SQUARE, [seed, beyond], [], (160, 160))
+    assert min(one.symmetric_difference(SQUARE).area for one in first) > 80 * 3, "no mere strip"
+    later = mended(SQUARE, [seed, beyond], [(20.0, 20.0), (20.0, 140.0)], (160, 160))
+    assert min(one.symmetric_difference(SQUARE).area for one in later) < 20
+    # Sides that move beyond the point would cross others: it gives way at once.
+    beside = [(124.0, y) for y in (50.0, 65.0, 95.0, 110.0)]
+    only = mended(SQUARE, [seed, beyond], beside, (160, 160))
+    assert len(only) == 1
+    assert obeys(only[0], [seed, beyond], beside)
+
+
+def test_an_outline_is_drawn_as_exactly_as_its_points_need():
     mask = np.zeros((160, 160), bool)
     mask[40:120, 40:120] = True
     mask[40:42, 70:90] = False  # a notch that a rough outline passes over
     seed, notch = (80.0, 80.0), (80.0, 40.9)
-    assert len(drawn(mask, [seed], []).exterior.coords) == 5
-    exact = drawn(mask, [seed], [notch])
-    assert obeys(exact, [seed], [notch])
-    assert overlap(exact, box(40, 40, 120, 120).difference(box(70, 40, 90, 42))) > 0.98
+    truth = box(40, 40, 120, 120).difference(box(70, 40, 90, 42))
+    for way in (rough_outline, straight_outline):
+        draw = partial(way, mask)
+        assert len(drawn(draw, (3.0, 1.0), [seed], []).exterior.coords) == 5
+        exact = drawn(draw, (3.0, 1.0), [seed], [notch])
+        assert obeys(exact, [seed], [notch])
+        assert overlap(exact, truth) > 0.98
+    assert not obeys(drawn(draw, (3.0, 1.0), [seed], [(60.0, 60.0)]), [seed], [(60.0, 60.0)])
+
+
+def test_a_side_does_not_move_onto_a_border_across_a_point():
+    bands = np.full((3, 160, 160), 90, np.uint8)
+    bands[:, 40:120, 40:120] = 160
+    bands += np.random.default_rng(0).integers(0, 6, bands.shape, dtype=np.uint8)
+    grid = Grid(160, 160, Affine(0.6, 0, 4e5, 0, -0.6, 4e6), CRS.from_epsg(32636))
+    scene = Scene(grid, bands, ("red", "green", "blue"), np.ones((160, 160), bool))
+    inner, seed, said = box(40, 40, 118.2, 120), (80.0, 80.0), (119.2, 80.0)
+    free, held = (carried(scene, [inner], 1, [seed], away)[0] for away in ((), [said]))
+    assert free[80, 119], "without the point it moves onto the border"
+    assert not held[80, 119]
+    assert held[80, 117]
 
 
 def test_points_close_to_each_other_are_no_error_in_a_reduced_picture():
@@ -64,16 +113,7 @@ def test_points_close_to_each_other_are_no_error_in_a_reduced_picture():
     scene = large.scene
     x, y = (float(v) for v in scene.grid.from_lonlat(large.lon, large.lat))
     include, exclude = (x + 90.0, y), (x + 91.2, y)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        field = extract_field(
-            scene,
-            lat=large.lat,
-            lon=large.lon,
-            include=[scene.grid.to_lonlat(*include)],
-            exclude=[scene.grid.to_lonlat(*exclude)],
-        )
-    outline = field.polygon_px(scene.grid)
+    outline = outline_of(large, [include], [exclude])
     assert shapely.contains_xy(outline, *include)
     assert not shapely.contains_xy(outline, *exclude)
     assert overlap(outline, large.field.polygon_px(scene.grid)) > 0.8
@@ -109,12 +149,8 @@ def test_points_that_move_the_border_a_little_do_not_lose_the_field(field):
         place = shapely.line_interpolate_point(ring, share, normalized=True)
         line = truth.buffer(3 if number % 2 else -3).exterior
         at = line.interpolate(line.project(place))
-        (include if number % 2 else exclude).append(scene.grid.to_lonlat(at.x, at.y))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            outline = extract_field(
-                scene, lat=field.lat, lon=field.lon, include=include, exclude=exclude, search=search
-            ).polygon_px(scene.grid)
+        (include if number % 2 else exclude).append((at.x, at.y))
+        outline = outline_of(field, include, exclude, search)
         found.append(overlap(outline, truth))
     assert min(found) > 0.95, np.round(found, 2)
 

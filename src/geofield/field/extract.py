@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Literal
 
 import shapely
@@ -13,7 +14,7 @@ from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
 from geofield.field.plausible import look
-from geofield.field.points import obeying, obeys
+from geofield.field.points import EXACT_PX, drawn, obeying
 from geofield.field.quality import judge
 from geofield.field.search import FieldSearch, search_field
 from geofield.field.segmentation import fill_holes, part_at
@@ -24,8 +25,6 @@ from geofield.model.segmentation import Segmentation
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
-#: How near an outline keeps to the border it was found at where a point needs it, pixels.
-_EXACT_PX = 1.0
 #: Longitude and latitude, degrees.
 Places = Sequence[tuple[float, float]]
 
@@ -129,13 +128,13 @@ def extract_field(
                 f"No field was found at lat {lat}, lon {lon}.",
                 hint="Choose a point in the open field, or give its outline with --boundary.",
             )
-        outline_px = straight_outline(filled, tolerance_px=tolerance_px)
+        draw = partial(straight_outline, filled)
         if belong or apart:
             points = (seed, *belong), apart
-            if not obeys(outline_px, *points):
-                # A line drawn straight passes a point on its wrong side: drawn more exactly first.
-                outline_px = straight_outline(filled, tolerance_px=min(tolerance_px, _EXACT_PX))
-            outline_px = obeying(outline_px, *points)
+            tolerances_px = tolerance_px, min(tolerance_px, EXACT_PX)
+            outline_px = obeying(drawn(draw, tolerances_px, *points), *points)
+        else:
+            outline_px = draw(tolerance_px=tolerance_px)
         return outline_px, judge(scene, seen, filled, outline_px, one, seed)
 
     outline_px, quality = outlined(found)

@@ -8,6 +8,7 @@ of what is wrong, so the border is about as far beyond the point as the side is 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 import shapely
@@ -15,39 +16,18 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.outline import rough_outline
 from geofield.field.points import obeying, obeys
 from geofield.field.straight import meeting, ring
 
-BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
-#: How far the outline of a region may leave its border, pixels: less where a point needs it.
-_TOLERANCES_PX = (3.0, 1.0)
 #: Sides beside a point that are moved; by so many times its distance, pixels at least.
 _SIDES, _REACHES, _LEAST_PX = 2, (1.5, 2.0, 3.0), 1.0
 #: From so many corrections on they are details: before, a whole side is meant.
 _DETAILS_FROM = 3
 #: A side is turned about an end that is farther from the point than this share of it.
 _LEVER = 0.3
-
-
-def drawn(mask: BoolArray, include: Points, exclude: Points) -> Polygon:
-    """A region's outline, as rough as the points allow; it obeys them, or is empty.
-
-    Parameters
-    ----------
-    mask : bool array (rows, columns)
-    include, exclude : sequence of (float, float)
-        Pixel coordinates; the first one is the seed.
-    """
-    polygon = Polygon()
-    for tolerance_px in _TOLERANCES_PX:
-        polygon = rough_outline(mask, tolerance_px=tolerance_px)
-        if obeys(polygon, include, exclude):
-            return polygon
-    return Polygon()
 
 
 def mended(
@@ -67,31 +47,25 @@ def mended(
     shape : (int, int)
         Rows and columns of the picture.
     """
-    missing = [(point, 1.0) for point in include if not shapely.contains_xy(polygon, *point)]
-    missing += [(point, -1.0) for point in exclude if shapely.intersects_xy(polygon, *point)]
-    if not missing:
+    wrong = [(point, 1.0) for point in include if not shapely.contains_xy(polygon, *point)]
+    wrong += [(point, -1.0) for point in exclude if shapely.intersects_xy(polygon, *point)]
+    if not wrong:
         return []
-    moved = [one for one in _beyond(polygon, *missing[0], shape) if obeys(one, include, exclude)]
-    if moved and len(include) + len(exclude) - 1 < _DETAILS_FROM:
-        return moved
-    return [*moved, _cut(polygon, include, exclude)]
-
-
-def _cut(polygon: Polygon, include: Points, exclude: Points) -> Polygon:
-    """An outline cut or grown at the points alone; empty where they are too near to each other.
-
-    In a reduced picture, that is: whether they contradict each other is asked at full size.
-    """
-    try:
-        return obeying(polygon, include, exclude)
-    except FieldError:
-        return Polygon()
+    moved = _beyond(polygon, *wrong[0], shape)
+    found = list(moved[obeys(moved, include, exclude)])
+    if found and len(include) + len(exclude) - 1 < _DETAILS_FROM:
+        return found
+    # Whether points that share a pixel of a reduced picture contradict each other is asked at
+    # full size.
+    with suppress(FieldError):
+        found.append(obeying(polygon, include, exclude))
+    return found
 
 
 def _beyond(
     polygon: Polygon, point: tuple[float, float], outwards: float, shape: tuple[int, int]
-) -> list[Polygon]:
-    """Outlines with one of the sides beside a point moved beyond it."""
+) -> NDArray[np.object_]:
+    """Outlines with one of the sides beside a point moved or turned beyond it; not all valid."""
     vertices, at = ring(polygon), np.array(point)
     along = np.roll(vertices, -1, axis=0) - vertices
     length = np.maximum(np.hypot(*along.T), 1e-9)
@@ -100,26 +74,27 @@ def _beyond(
     rings = []
     for i in np.argsort(away, kind="stable")[:_SIDES].tolist():
         across = outwards * np.array([along[i, 1], -along[i, 0]]) / length[i]
+        # How far its ends go, for the side to pass the point at a distance of one.
+        ends = [(1.0, 1.0)]
+        if share[i] < 1 - _LEVER:
+            ends.append((1 / (1 - share[i]), 0.0))
+        if share[i] > _LEVER:
+            ends.append((0.0, 1 / share[i]))
         for reach in _REACHES:
-            far = reach * max(float(away[i]), _LEAST_PX)
-            rings.append(_moved(vertices, i, far * across, far * across))
-            if share[i] < 1 - _LEVER:
-                rings.append(_moved(vertices, i, far / (1 - share[i]) * across, 0.0 * across))
-            if share[i] > _LEVER:
-                rings.append(_moved(vertices, i, 0.0 * across, far / share[i] * across))
+            far = reach * max(float(away[i]), _LEAST_PX) * across
+            rings += [_moved(vertices, i, one * far, other * far) for one, other in ends]
     limit = np.array([shape[1], shape[0]], float)
-    outlines = [Polygon(np.clip(one, 0.0, limit)) for one in rings]
-    return [one for one in outlines if one.is_valid and one.area > 0.0]
+    return np.asarray(shapely.polygons(np.clip(np.stack(rings), 0.0, limit)))
 
 
 def _moved(vertices: FloatArray, i: int, start: FloatArray, end: FloatArray) -> FloatArray:
     """A ring with the ends of a side moved, along the sides beside it where these go that way."""
-    j = (i + 1) % len(vertices)
-    side = vertices[i] + start, vertices[j] + end
+    h, j, k = i - 1, (i + 1) % len(vertices), (i + 2) % len(vertices)
+    a, b = vertices[i] + start, vertices[j] + end
     reach = 3.0 * max(float(np.hypot(*start)), float(np.hypot(*end)))
     changed = vertices.copy()
-    before, after = (vertices[i - 1], vertices[i]), (vertices[j], vertices[(j + 1) % len(vertices)])
-    for at, beside, end_px in ((i, before, side[0]), (j, after, side[1])):
-        corner = meeting(side, beside, end_px, reach)
-        changed[at] = end_px if corner is None else corner
+    for at, place, beside in ((i, a, (h, i)), (j, b, (j, k))):
+        one, other = vertices[list(beside)]
+        corner = meeting((a, b - a), (one, other - one), place, reach)
+        changed[at] = place if corner is None else corner
     return changed

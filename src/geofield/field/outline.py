@@ -18,12 +18,11 @@ from shapely import Polygon
 
 from geofield.errors import FieldError
 from geofield.field.median import median
+from geofield.field.straight import Line, meeting
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 
-#: Adjacent lines closer in direction than this (sine) have no well-defined meeting point.
-_PARALLEL_SINE = 0.12
 #: How far a corner may move from where the chain turns, in tolerances.
 _CORNER_REACH = 2.5
 #: Pieces of fewer steps than this, in tolerances, say nothing about a direction.
@@ -213,10 +212,7 @@ def _indices(closed: FloatArray, simple: FloatArray) -> list[int]:
     return [*found, len(closed) - 1]
 
 
-_Line = tuple[FloatArray, FloatArray]
-
-
-def _fit(points: FloatArray) -> _Line:
+def _fit(points: FloatArray) -> Line:
     """Total least squares line, robust: a point on it and its direction.
 
     A crown or a bay beside a straight border pulls no line: points farther from it than
@@ -236,7 +232,7 @@ def _fit(points: FloatArray) -> _Line:
     return centre, direction
 
 
-def _least_squares(points: FloatArray) -> _Line:
+def _least_squares(points: FloatArray) -> Line:
     centre = points.mean(axis=0)
     if len(points) < 3:
         direction = points[-1] - points[0]
@@ -246,7 +242,7 @@ def _least_squares(points: FloatArray) -> _Line:
     return centre, direction / max(float(np.hypot(*direction)), 1e-12)
 
 
-def _edge_line(points: FloatArray, width: int, height: int) -> _Line | None:
+def _edge_line(points: FloatArray, width: int, height: int) -> Line | None:
     """The picture's edge, where most of a piece lies on it."""
     limits = np.array([[0.0, 0.0], [width, height]])
     share = np.mean(np.abs(points[:, None] - limits) < 0.25, axis=0)
@@ -259,15 +255,12 @@ def _edge_line(points: FloatArray, width: int, height: int) -> _Line | None:
     return centre, direction
 
 
-def _corner(before: _Line, after: _Line, turn: FloatArray, reach: float) -> list[FloatArray]:
+def _corner(before: Line, after: Line, turn: FloatArray, reach: float) -> list[FloatArray]:
     """Where two lines meet; their feet near the turn where they meet too far away."""
+    corner = meeting(before, after, turn, reach)
+    if corner is not None:
+        return [corner]
     (p, u), (q, v) = before, after
-    cross = u[0] * v[1] - u[1] * v[0]
-    if abs(cross) > _PARALLEL_SINE:
-        along = ((q - p)[0] * v[1] - (q - p)[1] * v[0]) / cross
-        meeting = p + along * u
-        if np.hypot(*(meeting - turn)) <= reach:
-            return [meeting]
     feet = [p + ((turn - p) @ u) * u, q + ((turn - q) @ v) * v]
     if np.hypot(*(feet[0] - feet[1])) < 0.75:
         return [0.5 * (feet[0] + feet[1])]

@@ -6,7 +6,7 @@ where straightening or the border's exact place has moved a side across a point.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -17,6 +17,8 @@ from geofield.errors import FieldError
 
 Points = Sequence[tuple[float, float]]
 
+#: How near an outline keeps to the border it was found at where a point needs it, pixels.
+EXACT_PX = 1.0
 #: What is cut off or added at a point that an outline disobeys is this wide, pixels.
 _AROUND_PX = 3.0
 
@@ -31,6 +33,27 @@ def obeys(
     for x, y in exclude:
         good &= ~shapely.intersects_xy(polygons, x, y)
     return np.asarray(good)
+
+
+def drawn(
+    draw: Callable[..., Polygon], tolerances_px: Iterable[float], include: Points, exclude: Points
+) -> Polygon:
+    """An outline drawn as roughly as the points allow: the last drawing where none obeys them.
+
+    Parameters
+    ----------
+    draw : callable
+        Called with ``tolerance_px=``.
+    tolerances_px : iterable of float
+        At least one, the largest first.
+    include, exclude : sequence of (float, float)
+    """
+    polygon = Polygon()
+    for tolerance_px in tolerances_px:
+        polygon = draw(tolerance_px=tolerance_px)
+        if obeys(polygon, include, exclude):
+            break
+    return polygon
 
 
 def obeying(polygon: Polygon, include: Points, exclude: Points) -> Polygon:

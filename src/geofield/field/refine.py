@@ -123,7 +123,8 @@ def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> P
     for at in range(len(sides)):
         before, after = sides[at - 1], sides[at]
         if firm[at - 1] and firm[at]:
-            corner = meeting(before, after, start[at], 3.0 * reach_px)
+            one, other = ((a, b - a) for a, b in (before, after))
+            corner = meeting(one, other, start[at], 3.0 * reach_px)
             corners.append(0.5 * (before[1] + after[0]) if corner is None else corner)
         else:
             corners.append(before[1] if firm[at - 1] else after[0])

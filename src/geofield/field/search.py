@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,10 @@ from geofield.errors import FieldError
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
-from geofield.field.mend import drawn, mended
+from geofield.field.mend import mended
 from geofield.field.network import Seen, seen
-from geofield.field.outline import straight_outline
-from geofield.field.points import obeys
+from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.points import EXACT_PX, drawn, obeys
 from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures, trained
 from geofield.field.regions import (
     SMALLEST_PX,
@@ -48,6 +49,7 @@ COARSE_PX = 400
 _STRAY_PX = 20
 #: How far the first outlines may leave their regions' borders, pixels.
 _TOLERANCE_PX = 3.0
+_TOLERANCES_PX = _TOLERANCE_PX, EXACT_PX
 #: So many of the regions' outlines get well fitted sides; so many are redrawn, so many times.
 _FITTED, _BREADTH, _ROUNDS = 5, 4, 2
 #: So many times the most exact one is redrawn once more.
@@ -112,6 +114,10 @@ class FieldSearch:
         Whether the seed itself lies on something small: a crown, a hut.
     part : int or None
         The only part of the ranking to ask: the one learned without the sites of this fold.
+    known : dict
+        What was measured, by outline.
+    taken : dict
+        The best outlines of each question, by its points.
     """
 
     factor: int
@@ -145,7 +151,7 @@ class FieldSearch:
         found = self._found(include, exclude, self._before(shorter))
         ranked = best_first(found)
         if found:
-            self.taken[include, exclude] = [self._most_exact(found), ranked[0]]
+            self.taken[include, exclude] = list(dict.fromkeys([self._most_exact(found), ranked[0]]))
         elif shorter:
             return self.candidates(*shorter[0])
         return [found[polygon] for polygon in ranked]
@@ -180,7 +186,9 @@ class FieldSearch:
             *regions(self.surface.parted, ground, *points, earlier),
             *regions(self.second, second, *points),
         ]
-        rough = {drawn(one.mask, *points): one for one in around}
+        rough = {
+            drawn(partial(rough_outline, one.mask), _TOLERANCES_PX, *points): one for one in around
+        }
         add({polygon: one.holes for polygon, one in rough.items()})
         fitted = {}
         for polygon in self._different([one for one in best_first(found) if one in rough], _FITTED):
@@ -210,10 +218,10 @@ class FieldSearch:
         """What was taken before the last of the points; none without points."""
         if not shorter:
             return []
-        asked = [one for one in shorter if one in self.taken]
-        if not asked:
-            self.candidates(*shorter[0])
-        return list(dict.fromkeys(self.taken.get((asked or shorter)[0], [])))
+        asked = next((one for one in shorter if one in self.taken), shorter[0])
+        if asked not in self.taken:
+            self.candidates(*asked)
+        return self.taken.get(asked, [])
 
     def _most_exact(self, found: Mapping[Polygon, Candidate]) -> Polygon:
         """Of the outlines that hold much the same ground as the best, the most exact one."""

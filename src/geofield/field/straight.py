@@ -16,6 +16,8 @@ from shapely import Polygon
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+#: A point on it and its direction.
+Line = tuple[FloatArray, FloatArray]
 
 #: Sides from this length on are drawn on, pixels.
 _LONG_PX = 14.0
@@ -141,17 +143,13 @@ def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
-def meeting(
-    one: tuple[FloatArray, FloatArray],
-    other: tuple[FloatArray, FloatArray],
-    near: FloatArray,
-    reach_px: float,
-) -> FloatArray | None:
-    """Where the lines of two sides (start, end) meet, if that is within reach of a place."""
-    u, v, gap = one[1] - one[0], other[1] - other[0], other[0] - one[0]
+def meeting(one: Line, other: Line, near: FloatArray, reach_px: float) -> FloatArray | None:
+    """Where two lines (a point, a direction) meet, if that is within reach of a place."""
+    (p, u), (q, v) = one, other
     cross = float(u[0] * v[1] - u[1] * v[0])
     # Also where a side has no length.
     if abs(cross) <= _PARALLEL * float(np.hypot(*u) * np.hypot(*v)):
         return None
-    found: FloatArray = one[0] + float(gap[0] * v[1] - gap[1] * v[0]) / cross * u
+    gap = q - p
+    found: FloatArray = p + float(gap[0] * v[1] - gap[1] * v[0]) / cross * u
     return found if np.hypot(*(found - near)) <= reach_px else None
