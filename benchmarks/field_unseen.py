@@ -28,7 +28,8 @@ import shapely.affinity
 from common import machine, overlap, write_page
 from geofield.errors import GeofieldError
 from geofield.field import extract_field, prepare_field
-from geofield.field.search import search_field
+from geofield.field.magnify import magnified
+from geofield.field.search import FieldSearch, search_field
 from geofield.simulate import SimulationSettings, simulate_field
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
@@ -40,7 +41,13 @@ MOST_CLICKS = 10
 #: After how many points overlaps are told; what a point should not cost.
 TOLD_POINTS, LOST = (1, 2, 3, 5, MOST_CLICKS), 0.05
 #: Turned by so many degrees, enlarged by so much.
-RESAMPLED = {"1.2 m": (0.0, 0.5), "0.3 m": (0.0, 2.0), "warped": (1.3, 1.24)}
+RESAMPLED = {
+    "3 m": (0.0, 0.2),
+    "1.2 m": (0.0, 0.5),
+    "0.3 m": (0.0, 2.0),
+    "0.1 m": (0.0, 6.0),
+    "warped": (1.3, 1.24),
+}
 KINDS = ("JPEG 30", "JPEG 60", "JPEG 85", "haze", "contrast", "16 bit", "moved 10 m", *RESAMPLED)
 Point = tuple[float, float]
 Way = Callable[[Case, list[Point], list[Point]], shapely.Polygon]
@@ -62,7 +69,7 @@ def found(case: Case) -> Result:
     """The outline of a case."""
     start = time.process_time()
     try:
-        search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
+        search = searched(case)
         lon, lat = case.scene.grid.to_lonlat(case.x_px, case.y_px)
         field = extract_field(case.scene, lat=lat, lon=lon, search=search)
     except GeofieldError:
@@ -74,6 +81,13 @@ def found(case: Case) -> Result:
     shared = overlap(field.polygon_px(case.scene.grid), case.truth)
     certain = figures.get("certainty", 0.0)
     return Result(case.name, case.site, shared, not quality.trusted, certain, seconds)
+
+
+def searched(case: Case) -> FieldSearch:
+    """As `prepare_field`, by the part of the ranking that has not seen the site."""
+    lon, lat = case.scene.grid.to_lonlat(case.x_px, case.y_px)
+    scene = magnified(case.scene)
+    return search_field(scene, *scene.pixel_of(lat=lat, lon=lon), part=fold_of(case.site, FOLDS))
 
 
 def of_kind(case: Case, kind: str) -> Result:
@@ -145,7 +159,7 @@ def clicked(case: Case, way: str, most: int = MOST_CLICKS) -> list[float]:
 
 def ours(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
     grid = case.scene.grid
-    search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
+    search = searched(case)
     lon, lat = grid.to_lonlat(case.x_px, case.y_px)
 
     def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
@@ -265,6 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=10_000)
     parser.add_argument("--clicks", type=int, default=10_000)
+    parser.add_argument("--rivals", type=int, default=24, help="fields of other ways (slow)")
     parser.add_argument("--others", type=int, default=10_000)
     parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
@@ -297,7 +312,8 @@ def main() -> None:
         lines.append(f"| way | fields | {' | '.join(heads)} | until {AIM} | lost .05 |")
         lines.append("|---" * (4 + len(heads)) + "|")
         for way in WAYS:
-            overlaps = pool.map(partial(clicked, way=way), every[: options.clicks], chunksize=1)
+            count = options.clicks if way == "geofield" else options.rivals
+            overlaps = pool.map(partial(clicked, way=way), every[:count], chunksize=1)
             at = [np.mean([one[min(k, len(one)) - 1] for one in overlaps]) for k in TOLD_POINTS]
             steps = np.concatenate([np.diff(one) for one in overlaps])
             clicks = [

@@ -12,6 +12,7 @@ from shapely import Polygon
 
 from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
+from geofield.field.magnify import magnified
 from geofield.field.outline import straight_outline
 from geofield.field.plausible import look
 from geofield.field.points import EXACT_PX, drawn, obeying
@@ -71,7 +72,8 @@ def extract_field(
     min_hole_m2 : float
         Holes below this size are always filled, square metres on the ground.
     tolerance_px : float
-        How far the straightened outline may leave the mask's border; 0 keeps the staircase.
+        How far the straightened outline may leave the mask's border; 0 keeps the staircase. Of
+        ``auto``, pixels of a small picture (170 and fewer along a side) count as it enlarges them.
     smooth : {"none", "diffusion"}
         Smoothing of the picture first: anisotropic diffusion keeps borders and evens
         surfaces.
@@ -100,6 +102,8 @@ def extract_field(
     _check(method, regions, (*include, *exclude), holes, smooth)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
+    if method == "auto":
+        scene = magnified(scene)
     seed = scene.pixel_of(lat=lat, lon=lon)
     belong, apart = (
         tuple(scene.pixel_of(lat=y, lon=x) for x, y in places) for places in (include, exclude)
@@ -179,6 +183,7 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     lat, lon : float
         The point in the field, degrees, WGS 84.
     """
+    scene = magnified(scene)
     return search_field(scene, *scene.pixel_of(lat=lat, lon=lon))
 
 
