@@ -13,6 +13,7 @@ import argparse
 import sys
 import time
 import warnings
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,11 +26,10 @@ import numpy as np
 import shapely
 import shapely.affinity
 
-from common import machine, overlap, write_page
+from common import DATA, machine, overlap, write_page
 from geofield.errors import GeofieldError
-from geofield.field import extract_field, prepare_field
-from geofield.field.magnify import magnified
-from geofield.field.search import FieldSearch, search_field
+from geofield.field import FieldSearch, extract_field, prepare_field
+from geofield.imagery import read_scene
 from geofield.simulate import SimulationSettings, simulate_field
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
@@ -48,7 +48,19 @@ RESAMPLED = {
     "0.1 m": (0.0, 6.0),
     "warped": (1.3, 1.24),
 }
-KINDS = ("JPEG 30", "JPEG 60", "JPEG 85", "haze", "contrast", "16 bit", "moved 10 m", *RESAMPLED)
+#: In the middle of so many chips of other places along a side.
+AMONG = {"among 3 x 3 chips": 3, "among 5 x 5 chips": 5}
+KINDS = (
+    "JPEG 30",
+    "JPEG 60",
+    "JPEG 85",
+    "haze",
+    "contrast",
+    "16 bit",
+    "moved 10 m",
+    *RESAMPLED,
+    *AMONG,
+)
 Point = tuple[float, float]
 Way = Callable[[Case, list[Point], list[Point]], shapely.Polygon]
 
@@ -85,9 +97,8 @@ def found(case: Case) -> Result:
 
 def searched(case: Case) -> FieldSearch:
     """As `prepare_field`, by the part of the ranking that has not seen the site."""
-    lon, lat = case.scene.grid.to_lonlat(case.x_px, case.y_px)
-    scene = magnified(case.scene)
-    return search_field(scene, *scene.pixel_of(lat=lat, lon=lon), part=fold_of(case.site, FOLDS))
+    lonlat = case.scene.grid.to_lonlat(case.x_px, case.y_px)
+    return FieldSearch(lonlat, part=fold_of(case.site, FOLDS))
 
 
 def of_kind(case: Case, kind: str) -> Result:
@@ -106,6 +117,8 @@ def another(case: Case, kind: str) -> Case:
         return replace(case, scene=replace(case.scene, bands=np.rint(spread).astype(np.uint8)))
     if kind in RESAMPLED:
         return resampled(case, *RESAMPLED[kind])
+    if kind in AMONG:
+        return among(case, AMONG[kind])
     if kind == "moved 10 m":
         step = 10.0 / case.scene.grid.ground_resolution_m
         ways = [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)]
@@ -139,6 +152,27 @@ def resampled(case: Case, turn_deg: float, scale: float) -> Case:
     valid = np.ones((height, width), bool)
     scene = replace(case.scene, grid=grid, bands=np.stack(warped), valid=valid)
     return replace(case, scene=scene, truth=truth, x_px=float(x), y_px=float(y))
+
+
+def among(case: Case, number: int) -> Case:
+    """The case in a wide picture: its chip in the middle of chips of other places."""
+    rows, columns = case.scene.grid.shape
+    bands = np.tile(case.scene.bands, (1, number, number))
+    rng = np.random.default_rng(zlib.crc32(case.name.encode()))
+    chips = sorted((DATA / "trees_train").glob("*.tif"))
+    middle = number // 2
+    for row, column in np.ndindex(number, number):
+        if (row, column) != (middle, middle):
+            other_chip = read_scene(chips[int(rng.integers(len(chips)))])
+            shown = [other_chip.bands[other_chip.roles.index(role)] for role in case.scene.roles]
+            fitted = [cv2.resize(band, (columns, rows)) for band in shown]
+            top, left = row * rows, column * columns
+            bands[:, top : top + rows, left : left + columns] = fitted
+    left, top = middle * columns, middle * rows
+    grid = case.scene.grid.crop(-left, -top, number * columns, number * rows)
+    scene = replace(case.scene, grid=grid, bands=bands, valid=np.ones(grid.shape, bool))
+    truth = shapely.affinity.translate(case.truth, left, top)
+    return replace(case, scene=scene, truth=truth, x_px=case.x_px + left, y_px=case.y_px + top)
 
 
 def clicked(case: Case, way: str, most: int = MOST_CLICKS) -> list[float]:

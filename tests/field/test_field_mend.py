@@ -163,6 +163,6 @@ def test_points_given_at_once_are_taken_one_after_the_other(field):
     exclude = tuple(shapely.get_coordinates(inner)[[1, 3]].tolist())
     exclude = tuple((x, y) for x, y in exclude)
     for count in range(3):
-        one_by_one = search.candidates((), exclude[:count])
+        one_by_one = outline_of(field, [], exclude[:count], search)
     fresh = prepare_field(scene, lat=field.lat, lon=field.lon)
-    assert fresh.candidates((), exclude)[0].polygon.equals(one_by_one[0].polygon)
+    assert outline_of(field, [], exclude, fresh).equals(one_by_one)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from geofield.field.morphology import inner, plump
 from geofield.field.ranking import WEIGHED, Figures, exact, expected_overlaps, log_odds, trained
 from geofield.field.refine import carried, enlarged
-from geofield.field.search import Candidate, FieldSearch, search_field
+from geofield.field.search import Candidate, WindowSearch, search_field
 from geofield.model import Scene
 from geofield.model.segmentation import Segmentation
 
@@ -44,7 +44,7 @@ def segment(
     *,
     include: Points = (),
     exclude: Points = (),
-    search: FieldSearch | None = None,
+    search: WindowSearch | None = None,
 ) -> Segmentation:
     """The field around points, with the most likely other ones.
 
@@ -55,14 +55,12 @@ def segment(
         The seed, pixel coordinates.
     include, exclude : sequence of (float, float)
         Further points that belong and that do not, pixel coordinates.
-    search : FieldSearch, optional
+    search : WindowSearch, optional
         Of the same scene and seed, from an earlier call.
     """
     if search is None:
         search = search_field(scene, x_px, y_px)
-    belong, apart = (
-        tuple((x / search.factor, y / search.factor) for x, y in one) for one in (include, exclude)
-    )
+    belong, apart = (tuple(search.place(*at) for at in one) for one in (include, exclude))
     found = search.candidates(belong, apart)
     if not found:
         # Nothing stands out of anything: one surface fills the picture.
@@ -86,7 +84,7 @@ class Likely:
     border: float
 
 
-def likely_outlines(found: Sequence[Candidate], search: FieldSearch) -> list[Likely]:
+def likely_outlines(found: Sequence[Candidate], search: WindowSearch) -> list[Likely]:
     """The most likely different outlines; of the likeliest ground, the most exact one first.
 
     What the first leaves of certainty is dealt to the others by the beliefs in what is like them.
@@ -128,7 +126,7 @@ def evidence_of(
 
 
 def _told(
-    scene: Scene, search: FieldSearch, likely: Likely, mask: NDArray[np.bool_]
+    scene: Scene, search: WindowSearch, likely: Likely, mask: NDArray[np.bool_]
 ) -> Segmentation:
     """An outline on the picture's own pixels, with what is to be told of it."""
     things = plump(likely.candidate.holes | search.surface.things)

@@ -12,13 +12,14 @@ from shapely import Polygon
 
 from geofield.errors import FieldError, FieldWarning, SettingsError
 from geofield.field.diffusion import diffused
-from geofield.field.magnify import magnified
 from geofield.field.outline import straight_outline
+from geofield.field.part import Part
 from geofield.field.plausible import look
 from geofield.field.points import EXACT_PX, drawn, obeying
 from geofield.field.quality import judge
-from geofield.field.search import FieldSearch, search_field
 from geofield.field.segmentation import fill_holes, part_at
+from geofield.field.views import FieldSearch
+from geofield.grid import Grid
 from geofield.methods import FIELD
 from geofield.methods import method as method_of
 from geofield.model import Alternative, Field, FieldQuality, Scene
@@ -26,6 +27,8 @@ from geofield.model.segmentation import Segmentation
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
+#: An alternative this near to a side of the part that was searched runs along it, pixels.
+_NEAR_PX = 2.5
 #: Longitude and latitude, degrees.
 Places = Sequence[tuple[float, float]]
 
@@ -102,21 +105,21 @@ def extract_field(
     _check(method, regions, (*include, *exclude), holes, smooth)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
+    _check_places(scene, ((lon, lat), *include, *exclude))
+    picture = diffused(scene) if smooth == "diffusion" else scene
+    part, whole = Part.whole(scene), scene.grid
+    chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
-        scene = magnified(scene)
+        search = search or FieldSearch((lon, lat))
+        view = search.view(picture, *(tuple((x, y) for x, y in one) for one in (include, exclude)))
+        part, chosen = view.part, {"search": view.search}
+    scene, picture = part.of(scene), part.of(picture)
     seed = scene.pixel_of(lat=lat, lon=lon)
     belong, apart = (
         tuple(scene.pixel_of(lat=y, lon=x) for x, y in places) for places in (include, exclude)
     )
-    if scene.is_blank:
-        raise FieldError(
-            "The picture is empty: all its pixels have the same value.",
-            hint="Check the source, the band and the scaling, for instance with QGIS.",
-        )
-    picture = diffused(scene) if smooth == "diffusion" else scene
-    chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
-        chosen = {"include": belong, "exclude": apart, "search": search}
+        chosen |= {"include": belong, "exclude": apart}
     found: Segmentation = method_of(FIELD, method)(picture, *seed, **chosen)
     keep = holes == "keep" or (holes is None and method == "study")
     smallest = min_hole_m2 / scene.grid.ground_resolution_m**2 if keep else None
@@ -139,13 +142,16 @@ def extract_field(
             outline_px = obeying(drawn(draw, tolerances_px, *points), *points)
         else:
             outline_px = draw(tolerance_px=tolerance_px)
-        return outline_px, judge(scene, seen, filled, outline_px, one, seed)
+        return outline_px, judge(scene, seen, filled, outline_px, one, seed, part.frame_px)
 
     outline_px, quality = outlined(found)
     others = [outlined(one) for one in found.alternatives]
+    # What goes on beyond the part that was searched is not all of a field.
+    others = [one for one in others if not part.cuts(one[0], _NEAR_PX)]
+    offered = [(outline_px, quality), *others] if method == "auto" else []
     field = Field(
-        _to_metric(outline_px, scene),
-        scene.grid.metric_crs,
+        _to_metric(part.to_picture(outline_px), whole),
+        whole.metric_crs,
         name=name,
         method=method if not regions else "study-manual",
         quality=quality,
@@ -153,11 +159,9 @@ def extract_field(
         imagery_date=scene.source.date,
         licence=scene.source.licence,
         alternatives=tuple(
-            Alternative(_to_metric(polygon, scene), dict(judged.figures)["certainty"])
-            for polygon, judged in ((outline_px, quality), *others)
-        )
-        if method == "auto"
-        else (),
+            Alternative(_to_metric(part.to_picture(one), whole), dict(its.figures)["certainty"])
+            for one, its in offered
+        ),
     )
     if not quality.trusted:
         warnings.warn(
@@ -183,8 +187,9 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     lat, lon : float
         The point in the field, degrees, WGS 84.
     """
-    scene = magnified(scene)
-    return search_field(scene, *scene.pixel_of(lat=lat, lon=lon))
+    search = FieldSearch((lon, lat))
+    search.view(scene)
+    return search
 
 
 def _check(
@@ -209,8 +214,19 @@ def _check(
         raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
 
 
-def _to_metric(outline_px: Polygon, scene: Scene) -> Polygon:
-    polygon = shapely.transform(outline_px, scene.grid.to_metric_array)
+def _check_places(scene: Scene, places: Places) -> None:
+    """Refuse places off the picture, and a picture that shows nothing."""
+    for lon, lat in places:
+        scene.pixel_of(lat=lat, lon=lon)
+    if scene.is_blank:
+        raise FieldError(
+            "The picture is empty: all its pixels have the same value.",
+            hint="Check the source, the band and the scaling, for instance with QGIS.",
+        )
+
+
+def _to_metric(outline_px: Polygon, grid: Grid) -> Polygon:
+    polygon = shapely.transform(outline_px, grid.to_metric_array)
     if not polygon.is_valid:
         polygon = max(
             (p for p in shapely.get_parts(shapely.make_valid(polygon)) if isinstance(p, Polygon)),

@@ -28,6 +28,7 @@ def judge(
     outline_px: Polygon,
     found: Segmentation,
     seed_px: tuple[float, float],
+    frame_px: Polygon,
 ) -> FieldQuality:
     """Measure an outline against its picture.
 
@@ -44,10 +45,12 @@ def judge(
         What the method measured and noted.
     seed_px : (float, float)
         The point, pixel coordinates.
+    frame_px : shapely.Polygon
+        The frame of the whole picture, of which the scene may be a part.
     """
     area_m2 = outline_px.area * scene.grid.ground_resolution_m**2
     strange, seen = doubts(look, mask)
-    touching = edge_share(outline_px, mask.shape[1], mask.shape[0])
+    touching = edge_share(outline_px, frame_px)
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
@@ -75,9 +78,8 @@ def judge(
     return FieldQuality(score, tuple(reasons), figures, trusted=score >= _TRUSTED)
 
 
-def edge_share(outline_px: Polygon, width: int, height: int) -> float:
+def edge_share(outline_px: Polygon, frame_px: Polygon) -> float:
     """Share of an outline's length that lies on the picture's edge."""
     border = outline_px.exterior
-    frame = shapely.box(0, 0, width, height).exterior
-    inside = shapely.length(border.difference(frame.buffer(0.25)))
+    inside = shapely.length(border.difference(frame_px.exterior.buffer(0.25)))
     return float(1.0 - inside / border.length) if border.length else 0.0

@@ -95,7 +95,7 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class FieldSearch:
+class WindowSearch:
     """A scene made ready for outlines around a seed, and what was measured so far.
 
     It can be pickled, and asked again with further points.
@@ -118,6 +118,8 @@ class FieldSearch:
         What was measured, by outline.
     taken : dict
         The best outlines of each question, by its points.
+    answered : dict
+        The last question and its candidates.
     """
 
     factor: int
@@ -129,6 +131,11 @@ class FieldSearch:
     part: int | None = None
     known: dict[Polygon, Held] = field(default_factory=dict)
     taken: dict[tuple[Points, Points], list[Polygon]] = field(default_factory=dict)
+    answered: dict[tuple[Points, Points], list[Candidate]] = field(default_factory=dict)
+
+    def place(self, x_px: float, y_px: float) -> tuple[float, float]:
+        """Pixel coordinates of the scene in the searched picture."""
+        return x_px / self.factor, y_px / self.factor
 
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
@@ -147,6 +154,8 @@ class FieldSearch:
             Further points that belong and that do not, pixel coordinates of the searched
             picture.
         """
+        if (include, exclude) in self.answered:
+            return self.answered[include, exclude]
         shorter = _shorter(include, exclude)
         found = self._found(include, exclude, self._before(shorter))
         ranked = best_first(found)
@@ -154,7 +163,9 @@ class FieldSearch:
             self.taken[include, exclude] = list(dict.fromkeys([self._most_exact(found), ranked[0]]))
         elif shorter:
             return self.candidates(*shorter[0])
-        return [found[polygon] for polygon in ranked]
+        self.answered.clear()
+        self.answered[include, exclude] = [found[polygon] for polygon in ranked]
+        return self.answered[include, exclude]
 
     def _found(
         self, include: Points, exclude: Points, before: Sequence[Polygon]
@@ -299,7 +310,7 @@ def search_field(
     y_px: float,
     *,
     part: int | None = None,
-) -> FieldSearch:
+) -> WindowSearch:
     """Make a scene ready.
 
     Parameters
@@ -308,7 +319,7 @@ def search_field(
     x_px, y_px : float
         The seed, pixel coordinates.
     part : int, optional
-        See `FieldSearch`.
+        See `WindowSearch`.
 
     Raises
     ------
@@ -326,7 +337,7 @@ def search_field(
     footing = open_ground(surface.parted, things, seed)
     # Another look: nothing painted over, and colour alone where there is near infrared.
     second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed))
-    return FieldSearch(
+    return WindowSearch(
         factor,
         surface,
         second,

@@ -1,0 +1,168 @@
+"""Views: in which part of the picture an outline is searched.
+
+What network and figures know are grounds that fill a good part of the picture they see, and they
+were learned from pictures of 150 m. So the search begins in a part of that size around the point.
+Where the outline runs out of it, a part twice as wide is looked at, at last the whole picture: a
+field in a wide picture is found as well as in a narrow one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely import Polygon, affinity
+
+from geofield.errors import FieldError, PointOutsideError
+from geofield.field.auto import likely_outlines
+from geofield.field.network import SIDE_PX, seen
+from geofield.field.part import Part
+from geofield.field.ranking import WEIGHED
+from geofield.field.regions import Points
+from geofield.field.search import WindowSearch, search_field
+from geofield.field.segmentation import part_at
+from geofield.model import Scene
+
+#: Longitude and latitude, degrees.
+Places = tuple[tuple[float, float], ...]
+
+#: Side of the first view, metres, and the fewest pixels of one.
+FIRST_M, FEWEST_PX = 150.0, 48
+#: A view of this share of the picture's longer side is the whole picture.
+_WHOLE = 0.75
+#: How near to a side of its view an outline runs along it, pixels of the search; share of its
+#: border there from which the network's ground is taken to go on beyond.
+_NEAR_PX, _GOES_ON = 1.5, 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A part of a picture, and the search in it."""
+
+    part: Part
+    search: WindowSearch
+
+    def cuts(self, outline_px: Polygon) -> bool:
+        """Whether an outline, pixels of the search, runs along sides within the picture."""
+        factor = self.search.factor
+        whole = affinity.scale(outline_px, factor, factor, origin=(0, 0))
+        return self.part.cuts(whole, _NEAR_PX * factor)
+
+
+@dataclass(eq=False)
+class FieldSearch:
+    """What was searched around a point in a picture, kept for further points.
+
+    It can be pickled, and asked again with the same picture.
+
+    Attributes
+    ----------
+    lonlat : (float, float)
+        The point, degrees.
+    part : int or None
+        See `WindowSearch`.
+    views : dict
+        By their level: 0 is the narrowest.
+    levels : dict
+        Which one was taken, by the points that belong and those that do not.
+    """
+
+    lonlat: tuple[float, float]
+    part: int | None = None
+    views: dict[int, View] = field(default_factory=dict)
+    levels: dict[tuple[Places, Places], int] = field(default_factory=dict)
+
+    def view(self, scene: Scene, include: Places = (), exclude: Places = ()) -> View:
+        """The narrowest view that holds the points and the outline.
+
+        It is never narrower than the one with fewer points: what they corrected is kept there.
+
+        Raises
+        ------
+        FieldError
+            When the picture is too small.
+        """
+        return self._at(scene, self._level(scene, include, exclude))
+
+    def _level(self, scene: Scene, include: Places, exclude: Places) -> int:
+        points = include, exclude
+        if points in self.levels:
+            return self.levels[points]
+        shorter = [(include, exclude[:-1])] if exclude else []
+        shorter += [(include[:-1], exclude)] if include else []
+        known = [one for one in shorter if one in self.levels]
+        level = self._level(scene, *(known or shorter)[0]) if shorter else 0
+        last = len(self._parts(scene)) - 1
+        while level < last and not self._holds(scene, level, *points):
+            level += 1
+        self.levels[points] = level
+        return level
+
+    def _holds(self, scene: Scene, level: int, include: Places, exclude: Places) -> bool:
+        """Whether the points and the outline that they give lie within a view."""
+        part = self._parts(scene)[level]
+        seen_part = part.of(scene)
+        try:
+            seed, *belong = (seen_part.pixel_of(lat=y, lon=x) for x, y in (self.lonlat, *include))
+            apart = tuple(seen_part.pixel_of(lat=y, lon=x) for x, y in exclude)
+            if level not in self.views and _ground_goes_on(seen_part, part, (seed, *belong), apart):
+                return False
+            view = self._at(scene, level)
+        except (FieldError, PointOutsideError):
+            return False
+        search = view.search
+        found = search.candidates(
+            *(tuple(search.place(*at) for at in places) for places in (belong, apart))
+        )
+        if not found:
+            return False
+        first, *_ = likely_outlines(found[:WEIGHED], search)
+        return not view.cuts(first.candidate.polygon)
+
+    def _at(self, scene: Scene, level: int) -> View:
+        if level not in self.views:
+            part = self._parts(scene)[level]
+            seen_part = part.of(scene)
+            lon, lat = self.lonlat
+            search = search_field(seen_part, *seen_part.pixel_of(lat=lat, lon=lon), part=self.part)
+            self.views[level] = View(part, search)
+        return self.views[level]
+
+    def _parts(self, scene: Scene) -> Sequence[Part]:
+        """The narrowest first: each twice as wide, the last one is the whole picture."""
+        lon, lat = self.lonlat
+        place = scene.pixel_of(lat=lat, lon=lon)
+        size = scene.grid.width_px, scene.grid.height_px
+        side = max(FIRST_M / scene.grid.ground_resolution_m, FEWEST_PX)
+        parts = []
+        while side < _WHOLE * max(size):
+            width, height = (min(round(side), most) for most in size)
+            left, top = (
+                min(max(round(at - length / 2), 0), most - length)
+                for at, length, most in zip(place, (width, height), size, strict=True)
+            )
+            parts.append(Part((left, top, width, height), size))
+            side *= 2
+        return [part.magnified() for part in (*parts, Part.whole(scene))]
+
+
+def _ground_goes_on(scene: Scene, part: Part, include: Points, exclude: Points) -> bool:
+    """Whether the network's ground goes on beyond sides of a part that lie within the picture.
+
+    It is asked long before an outline is found.
+    """
+    factor = math.ceil(max(scene.grid.shape) / SIDE_PX)
+    belong, apart = (
+        tuple((x / factor, y / factor) for x, y in points) for points in (include, exclude)
+    )
+    rows, columns = (math.ceil(length / factor) for length in scene.grid.shape)
+    likely = seen(scene).probability(belong, apart, (rows, columns), factor)
+    ground = np.pad(part_at(likely > 0.5, *belong[0]), 1)
+    if not ground.any():
+        return False
+    around = sum(int(np.count_nonzero(np.diff(ground, axis=axis))) for axis in (0, 1))
+    sides = (ground[:, 1], ground[1], ground[:, -2], ground[-2])
+    inside = zip(sides, part.sides_inside, strict=True)
+    return sum(int(side.sum()) for side, counts in inside if counts) > _GOES_ON * around

@@ -1,0 +1,168 @@
+"""Views: in which part of a picture a field is searched, and how large it is looked at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.field import FieldSearch, extract_field, prepare_field
+from geofield.field.part import Part
+from geofield.raster import resample
+from geofield.simulate import SimulationSettings, simulate_field
+
+
+def coarser(scene, times):
+    """The same ground in fewer pixels."""
+    bands = np.stack([resample(band.astype(np.float32), times) for band in scene.bands])
+    rows, columns = bands.shape[1:]
+    return replace(
+        scene,
+        grid=scene.grid.resized(columns, rows),
+        bands=np.rint(bands).astype(np.uint8),
+        valid=np.ones((rows, columns), bool),
+    )
+
+
+@pytest.mark.parametrize(("seed", "least"), [(2, 0.97), (3, 0.97), (8, 0.97)])
+def test_a_field_of_few_pixels_is_found_as_exactly_as_one_of_many(seed, least):
+    truth = simulate_field(seed, SimulationSettings(width_px=640, height_px=640))
+    scene = coarser(truth.scene, 10)
+    assert scene.grid.shape == (64, 64)
+    field = extract_field(scene, lat=truth.lat, lon=truth.lon)
+    true = truth.field.polygon
+    overlap = field.polygon.intersection(true).area / field.polygon.union(true).area
+    assert overlap > least
+    assert field.quality is not None
+    assert field.quality.trusted
+    kept = prepare_field(scene, lat=truth.lat, lon=truth.lon)
+    again = extract_field(scene, lat=truth.lat, lon=truth.lon, search=kept)
+    assert again.polygon == field.polygon
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "times"),
+    [(256, 256, 1), (171, 100, 1), (170, 20, 2), (64, 100, 3), (9, 12, 8)],
+)
+def test_only_small_pictures_are_enlarged_onto_the_same_ground(rows, columns, times):
+    scene = simulate_field(1, SimulationSettings(width_px=300, height_px=300)).scene
+    scene = scene.crop(10, 20, columns, rows)
+    valid = scene.valid.copy()
+    valid[0, 1] = False
+    scene = replace(scene, valid=valid)
+    large = Part.whole(scene).magnified().of(scene)
+    assert (large is scene) == (times == 1)
+    assert large.grid.shape == (rows * times, columns * times)
+    corners = ([0, columns, columns], [0, 0, rows])
+    np.testing.assert_allclose(
+        large.grid.to_native(*(times * np.array(one) for one in corners)),
+        scene.grid.to_native(*corners),
+    )
+    # A pixel's middle keeps its value where cutting leaves it a middle.
+    assert large.valid.sum() == valid.sum() * times**2
+    assert not large.valid[0, times : 2 * times].any()
+    if times % 2:
+        middle = large.bands[:, times // 2 :: times, times // 2 :: times]
+        np.testing.assert_array_equal(middle, scene.bands)
+    assert abs(large.bands.mean() - scene.bands.mean()) < 1.5
+
+
+def among(truth, number):
+    """A picture in the middle of others, number x number."""
+    rows, columns = truth.scene.grid.shape
+    bands = np.tile(truth.scene.bands, (1, number, number))
+    middle = number // 2
+    for row, column in np.ndindex(number, number):
+        if (row, column) != (middle, middle):
+            other = simulate_field(1000 + 37 * row + column, SIDE).scene
+            top, left = row * rows, column * columns
+            bands[:, top : top + rows, left : left + columns] = other.bands
+    grid = truth.scene.grid.crop(-middle * columns, -middle * rows, number * columns, number * rows)
+    return replace(truth.scene, grid=grid, bands=bands, valid=np.ones(grid.shape, bool))
+
+
+SIDE = SimulationSettings(width_px=256, height_px=256)
+
+
+@pytest.fixture(scope="module")
+def wide():
+    """A field of 256 pixels in a picture of 1280."""
+    truth = simulate_field(1, SIDE)
+    return truth, among(truth, 5)
+
+
+def share(one, other):
+    """Intersection over union."""
+    return one.intersection(other).area / one.union(other).area
+
+
+def test_a_field_is_found_in_a_wide_picture_as_well_as_in_a_narrow_one(wide):
+    truth, scene = wide
+    field = extract_field(scene, lat=truth.lat, lon=truth.lon)
+    assert share(field.polygon, truth.field.polygon) > 0.97
+    assert field.crs == scene.grid.metric_crs
+    # The part that was searched is no frame: the field does not go on outside the picture.
+    assert field.quality is not None
+    assert dict(field.quality.figures)["edge_share"] == 0.0
+    assert not any("outside the picture" in one for one in field.quality.reasons)
+
+
+def test_the_narrowest_view_that_holds_points_and_outline_is_taken(wide):
+    truth, scene = wide
+    search = FieldSearch((truth.lon, truth.lat))
+    narrow = search.view(scene)
+    assert narrow.part.box[2:] == (250, 250)
+    assert search.view(scene).search is narrow.search
+    # Ground far away belongs: only the whole picture holds both.
+    far = (scene.grid.to_lonlat(60.0, 1200.0),)
+    assert search.view(scene, far).part == Part.whole(scene)
+    again = FieldSearch((truth.lon, truth.lat))
+    assert again.view(scene, far).part == Part.whole(scene)
+    # What was corrected in a wide view is not taken back to a narrow one.
+    near = scene.grid.to_lonlat(*scene.grid.from_lonlat(truth.lon, truth.lat))
+    assert search.view(scene, (*far, near)).part == Part.whole(scene)
+    assert search.view(scene).part == narrow.part
+
+
+def test_a_field_wider_than_the_first_view_is_not_cut_there():
+    truth = simulate_field(101, SimulationSettings(width_px=640, height_px=640))
+    search = prepare_field(truth.scene, lat=truth.lat, lon=truth.lon)
+    assert search.view(truth.scene).part == Part.whole(truth.scene)
+    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon, search=search)
+    assert share(field.polygon, truth.field.polygon) > 0.97
+
+
+@pytest.mark.parametrize("place", [(8.0, 8.0), (1276.0, 640.0)])
+def test_a_view_at_the_pictures_border_stays_in_it(wide, place):
+    _, scene = wide
+    search = FieldSearch(scene.grid.to_lonlat(*place))
+    part = search.view(scene).part
+    left, top, width, height = part.box
+    assert 0 <= left <= place[0] < left + width <= 1280
+    assert 0 <= top <= place[1] < top + height <= 1280
+
+
+def test_a_part_knows_where_it_lies_in_the_picture():
+    part = Part((30, 0, 50, 40), (100, 200), 5)
+    assert part.sides_inside == (True, False, True, True)
+    here = shapely.box(0, 0, 250, 200)
+    assert part.to_picture(here).bounds == (30.0, 0.0, 80.0, 40.0)
+    assert part.to_picture(part.frame_px).bounds == (0.0, 0.0, 100.0, 200.0)
+    # Along the picture's own frame an outline is not cut, along the other sides it is.
+    assert not part.cuts(shapely.box(20, 0, 200, 150), 2.0)
+    assert part.cuts(shapely.box(1, 20, 200, 150), 2.0)
+    assert part.cuts(shapely.box(20, 20, 249, 150), 2.0)
+    assert part.cuts(shapely.box(20, 20, 200, 199), 2.0)
+    assert not part.cuts(shapely.box(20, 20, 200, 150), 2.0)
+
+
+def test_no_alternative_ends_where_the_search_did(wide):
+    truth, scene = wide
+    search = FieldSearch((truth.lon, truth.lat))
+    part = search.view(scene).part
+    field = extract_field(scene, lat=truth.lat, lon=truth.lon, search=search)
+    left, top, width, height = part.box
+    sides = shapely.box(left, top, left + width, top + height).exterior.buffer(1.0)
+    for one in field.alternatives:
+        border = shapely.transform(one.polygon, scene.grid.from_metric_array).exterior
+        assert border.intersection(sides).length < 0.02 * border.length
