@@ -40,7 +40,7 @@ import torch
 from crown_network import CrownNetwork
 from crown_samples import INPUTS, Pictures, Sampler, levels, normalised
 from crown_targets import CELL_PX
-from half_precision import store_in_half
+from onnx_file import finish
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from torch import Tensor
@@ -168,7 +168,7 @@ def export(net: CrownNetwork, path: Path) -> None:
         output_names=["cells"],
         dynamic_axes={"bands": {2: "rows", 3: "cols"}, "cells": {2: "rows", 3: "cols"}},
     )
-    store_in_half(path)
+    finish(path)
 
 
 def main() -> None:

@@ -30,9 +30,9 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from half_precision import store_in_half
 from learned_with import LEARNED, learned_with
 from numpy.typing import NDArray
+from onnx_file import finish
 from outline_cases import TABLES, fold_of, labelled, simulated
 from outline_network import OutlineNet, Whole
 from outline_samples import Picture, correction, picture_of, sample
@@ -204,7 +204,7 @@ def write(net: OutlineNet, known: list[Picture], options: argparse.Namespace) ->
     whole = Whole(net, len(BANDS), SIDE_PX // ANSWER_PX).eval()
     file = LEARNED / "outline.onnx"
     torch.onnx.export(whole, (shown,), str(file), opset_version=17, dynamo=False)
-    store_in_half(file)
+    finish(file)
     facts = {
         "inputs": [*BANDS, *POINTS],
         "outputs": ["log_odds"],
