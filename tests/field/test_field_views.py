@@ -118,18 +118,42 @@ def test_the_narrowest_view_that_holds_points_and_outline_is_taken(wide):
     assert search.view(scene, far).part == Part.whole(scene)
     again = FieldSearch((truth.lon, truth.lat))
     assert again.view(scene, far).part == Part.whole(scene)
-    # What was corrected in a wide view is not taken back to a narrow one.
-    near = scene.grid.to_lonlat(*scene.grid.from_lonlat(truth.lon, truth.lat))
-    assert search.view(scene, (*far, near)).part == Part.whole(scene)
     assert search.view(scene).part == narrow.part
 
 
-def test_a_field_wider_than_the_first_view_is_not_cut_there():
-    truth = simulate_field(101, SimulationSettings(width_px=640, height_px=640))
-    search = prepare_field(truth.scene, lat=truth.lat, lon=truth.lon)
-    assert search.view(truth.scene).part == Part.whole(truth.scene)
-    field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon, search=search)
-    assert share(field.polygon, truth.field.polygon) > 0.97
+def test_what_was_corrected_in_a_wide_view_is_not_taken_back_to_a_narrow_one(wide):
+    truth, scene = wide
+    place = truth.lon, truth.lat
+    search = FieldSearch(place)
+    search.levels[(), ()] = 1
+    assert search.view(scene, (place,)).part.box[2:] == (500, 500)
+
+
+@pytest.fixture(scope="module")
+def large():
+    """A field wider than the first view."""
+    return simulate_field(101, SimulationSettings(width_px=640, height_px=640))
+
+
+@pytest.mark.parametrize("blind", ["", "_ground_goes_on", "View.cuts"])
+def test_a_field_wider_than_the_first_view_is_not_cut_there(large, blind, monkeypatch):
+    """The network's ground says so, and the outline alone would, too."""
+    if blind:
+        monkeypatch.setattr(f"geofield.field.views.{blind}", lambda *_: False)
+    search = prepare_field(large.scene, lat=large.lat, lon=large.lon)
+    assert search.view(large.scene).part == Part.whole(large.scene)
+    field = extract_field(large.scene, lat=large.lat, lon=large.lon, search=search)
+    assert share(field.polygon, large.field.polygon) > 0.97
+
+
+def test_the_end_of_a_view_is_not_the_pictures(large):
+    scene = large.scene
+    search = FieldSearch((large.lon, large.lat))
+    search.levels[(), ()] = 0
+    field = extract_field(scene, lat=large.lat, lon=large.lon, search=search)
+    assert field.area_ha < 0.8 * large.field.area_ha
+    assert field.quality is not None
+    assert dict(field.quality.figures)["edge_share"] == 0.0
 
 
 @pytest.mark.parametrize("place", [(8.0, 8.0), (1276.0, 640.0)])
