@@ -53,7 +53,7 @@ class CrownNetwork(nn.Module):
         self.up2, self.join2 = step(c, b, 1), step(b, b)
         self.up1, self.join1 = step(b, a, 1), step(a, 32)
         self.head = nn.Conv2d(32, len(OUTPUTS), 1)
-        self.encoder = Encoder(HANDED_ON)
+        self.encoder = Encoder(HANDED_ON, capped=False)
         self.known = nn.ModuleList(
             nn.Conv2d(taken, given, 1, bias=False)
             for taken, given in zip(self.encoder.channels, WIDTHS, strict=True)

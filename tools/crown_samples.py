@@ -10,7 +10,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from crown_pictures import site_of
 from crown_targets import targets
+from scipy.spatial.distance import cdist
 from standing_things import place_things
 
 INPUTS = ("red", "green", "blue", "nir", "has_nir")
@@ -20,6 +22,8 @@ SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
 BORDER_PX = 2.0
 """Crowns on the picture's border may be cut off, their centres outside."""
+SAME_PX, UNSURE_PX = 10.0, 6
+"""Nearer labels of two years are one tree; so far around one that is lacking nothing counts."""
 
 
 @dataclass
@@ -37,14 +41,13 @@ class Pictures:
         with np.load(path) as data:
             number, trees = data["trees"][:, 0].astype(int), data["trees"][:, 1:]
             bands = np.ascontiguousarray(data["bands"].transpose(0, 2, 3, 1))
-            count = len(bands)
-            return cls(
-                data["names"],
-                data["left_out"],
-                bands,
-                np.unpackbits(data["regions"], axis=-1),
-                [trees[number == i] for i in range(count)],
-            )
+            of_each = [trees[number == i] for i in range(len(bands))]
+            regions = np.unpackbits(data["regions"], axis=-1)
+            elsewhen = labelled_elsewhen(data["names"], of_each)
+            for region, lacking in zip(regions, elsewhen, strict=True):
+                for x, y in lacking:
+                    cv2.circle(region, (int(x), int(y)), UNSURE_PX, 0, -1)
+            return cls(data["names"], data["left_out"], bands, regions, of_each)
 
     @property
     def simulated(self) -> np.ndarray:
@@ -59,6 +62,24 @@ class Pictures:
         weight[self.simulated] = 0.5
         weight[self.left_out] = 0
         return weight / weight.sum()
+
+
+def labelled_elsewhen(names: np.ndarray, trees: list[np.ndarray]) -> list[np.ndarray]:
+    """Return where each picture lacks a tree that other years of its place are labelled with.
+
+    One label in nine lies nowhere near one of another year: trees come and go, but more often one
+    was overlooked.
+    """
+    places = [site_of(str(name)) for name in names]
+    out = []
+    for number, place in enumerate(places):
+        years = [] if place.startswith("simulated") else places
+        others = [trees[i][:, :2] for i, one in enumerate(years) if one == place and i != number]
+        xy = np.concatenate([np.empty((0, 2)), *others])
+        here = trees[number][:, :2]
+        near = cdist(xy, here).min(axis=1, initial=np.inf) if len(xy) else np.empty(0)
+        out.append(xy[near > SAME_PX])
+    return out
 
 
 def green_ground(bands: np.ndarray, trees: np.ndarray) -> float:
@@ -122,7 +143,7 @@ class Sampler:
         high += rng.normal(0, 0.12) * spread
         x = np.zeros((5, CROP_PX, CROP_PX), np.float32)
         kind = rng.random()
-        if kind < 0.45:
+        if kind < 0.4:
             x[:4] = normalised(image, low, high).transpose(2, 0, 1)
             x[4] = 1
         else:
