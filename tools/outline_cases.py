@@ -54,6 +54,8 @@ class Case:
     truth : Polygon
     doubtful : Polygon or None
         The other outline of a field that two were drawn of.
+    drawn : str
+        How sure the drawing was, plain, fair or doubtful; empty where that was not noted.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Case:
     y_px: float
     truth: shapely.Polygon
     doubtful: shapely.Polygon | None = None
+    drawn: str = ""
 
 
 def site_of(image: str) -> str:
@@ -97,6 +100,7 @@ def labelled() -> Iterator[Case]:
                 y,
                 polygon(row["polygon_px"]),
                 polygon(other_px) if other_px else None,
+                row.get("certainty", ""),
             )
 
 
