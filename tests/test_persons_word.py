@@ -299,3 +299,111 @@ def test_nothing_to_undo(folder: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "no earlier plan" in done.stderr
+
+
+def shrunk(table: Frame) -> Frame:
+    return table.set_geometry(table.geometry.buffer(-6), crs=table.crs)
+
+
+def test_a_drawn_outline_stands_above_the_boundary_given(
+    folder: Path, made: SimulatedField
+) -> None:
+    """The same command again, after the outline was moved: the parcels' file says nothing new."""
+    file = folder / "out/field.gpkg"
+    parcels = folder / "parcels.gpkg"
+    shrunk(gpd.read_file(file, layer="field")).assign(name="Parcel 7").to_file(parcels)
+    own = ["--boundary", parcels, "--format", "gpkg", "--overwrite"]
+    run(folder, made, *own)
+    given = plan_in(folder).field
+    assert (given.method, given.name) == ("boundary", "Parcel 7")
+    rewritten(file, "field", lambda table: table.assign(name="Mine", crop="rye"))
+    run(folder, made, *own)
+    same = plan_in(folder).field
+    assert same.polygon.equals(given.polygon)
+    assert (same.name, dict(same.own)) == ("Mine", {"crop": "rye"})
+    rewritten(file, "field", shrunk)
+    moved = plan_in(folder).field.polygon
+    told = run(folder, made, *own)
+    assert "the boundary is not used" in told
+    assert "your outline kept" in told
+    run(folder, made, *own)
+    kept = plan_in(folder).field
+    assert kept.polygon.equals(moved)
+    assert (kept.method, kept.name, dict(kept.own)) == ("drawn", "Mine", {"crop": "rye"})
+
+
+def test_an_outline_of_which_nobody_recorded_how_it_was_written(
+    folder: Path, made: SimulatedField
+) -> None:
+    """As ogr2ogr copies a GeoPackage: its tables alone."""
+    file = folder / "out/field.gpkg"
+    rewritten(file, "field", shrunk)
+    moved = plan_in(folder).field.polygon
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("DELETE FROM gpkg_metadata")
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+        assert plan_in(folder).field.polygon.equals(moved)
+
+
+def test_a_border_that_crosses_itself(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    west, south, east, north = before.geometry[1].bounds
+    bow = shapely.Polygon([(west, south), (east, north), (east, south), (west, north)])
+
+    def cross(table: Frame) -> Frame:
+        table.loc[at(table, 1), "geometry"] = bow
+        return table
+
+    rewritten(file, "obstacles", cross)
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    parts = after.geometry[[1, len(before) + 1]]
+    assert parts.is_valid.all()
+    assert parts.area.sum() == pytest.approx(shapely.make_valid(bow).area)
+    assert after["radius_m"][parts.index].isna().all()
+    assert after["status"][parts.index].tolist() == ["confirmed", "added"]
+
+
+def test_a_layer_that_is_gone_is_no_word(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
+    geofield("tracks", file, "--spacing", 6, "-o", file)
+    subprocess.run(
+        ["ogrinfo", "-q", file, "-sql", "ALTER TABLE obstacles RENAME TO trees"], check=True
+    )
+    written = file.read_bytes()
+    where = ["--lat", made.lat, "--lon", made.lon]
+    for stage in (
+        ["tracks", file, "-o", file],
+        ["obstacles", folder / "picture.tif", file, "-o", file],
+        ["field", folder / "picture.tif", *where, "-o", file, "--overwrite"],
+    ):
+        command = [sys.executable, "-m", "geofield", *map(str, stage)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        assert "The layer `obstacles`" in done.stderr
+        assert "geofield undo" in done.stderr
+    assert file.read_bytes() == written
+
+
+def test_a_region_does_not_change_a_drawn_outline(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "field", shrunk)
+    command = [sys.executable, "-m", "geofield", "field", str(folder / "picture.tif")]
+    command += ["--lat", str(made.lat), "--lon", str(made.lon), "-o", str(file), "--overwrite"]
+    done = subprocess.run([*command, "--region", "1"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no region changes it" in done.stderr
+
+
+def test_an_import_can_be_undone(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = plan_in(folder)
+    parcels = folder / "parcels.gpkg"
+    gpd.read_file(file, layer="field").to_file(parcels)
+    geofield("import", parcels, "-o", file, "--overwrite")
+    assert plan_in(folder) != before
+    geofield("undo", file)
+    assert plan_in(folder) == before

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import shapely
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError
+from geofield.errors import FieldError, ObstacleError
 from geofield.model.field import Field
 from geofield.model.review import reconcile
-from geofield.plan import Plan
+from geofield.plan import Plan, outline_digest
 from geofield.settings import Settings
+
+#: Methods of outlines that a person gave as they are, or chose.
+_GIVEN = ("boundary", "chosen")
 
 
 def with_points(settings: Settings, previous: Plan | None) -> Settings:
@@ -32,14 +37,40 @@ def points_said(settings: Settings | None) -> set[tuple[bool, tuple[float, float
     return belong | {(False, place) for place in settings.field.exclude}
 
 
+def drew_outline(previous: Plan) -> bool:
+    """Whether a person drew an earlier plan's outline, or may have: nobody recorded another."""
+    unknown = previous.evidence.outline is None and previous.field.method not in _GIVEN
+    return _drawn(previous) or unknown
+
+
 def keeps_outline(previous: Plan) -> bool:
-    """Whether an earlier plan's outline is a person's word."""
-    return previous.outline_edited or previous.field.method in ("drawn", "boundary", "chosen")
+    """Whether an earlier plan's outline stays: it is a person's word, or may be."""
+    return drew_outline(previous) or previous.field.method in _GIVEN
 
 
-def outline_changed(previous: Plan, field: Field) -> str:
+def _drawn(previous: Plan) -> bool:
+    return previous.outline_edited or previous.field.method == "drawn"
+
+
+def kept_outline(previous: Plan) -> Field:
+    """The outline of an earlier plan that a new one keeps."""
+    method = "drawn" if drew_outline(previous) else previous.field.method
+    return replace(previous.field, method=method, quality=None)
+
+
+def renamed(field: Field, previous: Plan) -> Field:
+    """A field in the place of an earlier plan's: the names and columns that a person gave stay."""
+    known = previous.field
+    if field.method == "boundary" and outline_digest(field) != previous.evidence.outline:
+        # Another parcel, whose name is its own where it has one.
+        given = field.name != field.field_id
+        return replace(field, name=field.name if given else known.name, own=known.own)
+    return replace(field, field_id=known.field_id, name=known.name, own=known.own)
+
+
+def outline_changed(previous: Plan, field: Field, *, kept: bool) -> str:
     """What became of an earlier plan's outline, in words."""
-    if keeps_outline(previous) and field.method in ("drawn", previous.field.method):
+    if kept:
         return "your outline kept"
     if previous.field.crs != field.crs:
         return "outline found anew"
@@ -48,23 +79,54 @@ def outline_changed(previous: Plan, field: Field) -> str:
     return "outline as before" if other < 1e-9 else f"outline other by {other:.1%} of its area"
 
 
-def holds(previous: Plan, *, lat: float, lon: float) -> bool:
+def of_the_same_field(previous: Plan | None, lat: float, lon: float) -> Plan | None:
+    """An earlier plan where it is of the field at a point.
+
+    Raises
+    ------
+    FieldError, ObstacleError
+        When a person's work would be lost: on another field, or in a layer that is gone.
+    """
+    if previous is None or not _holds(previous, lat=lat, lon=lon):
+        if previous is not None:
+            _refuse_to_forget(previous, lat, lon)
+        return None
+    refuse_lost_obstacles(previous)
+    return previous
+
+
+def _holds(previous: Plan, *, lat: float, lon: float) -> bool:
     """Whether an earlier plan is of the field at a point."""
     x, y = transformer(LONLAT, previous.field.crs).transform(lon, lat)
     return bool(shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)))
 
 
-def refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
+def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
     """Another field's plan may be replaced, but not a person's work on it."""
     reviewed = 0
     if previous.obstacles is not None:
         _, written = reconcile(previous.obstacles, previous.evidence.written)
         reviewed = sum(row.kept for row in written.rows) + len(written.removed)
-    if reviewed or keeps_outline(previous):
+    drawn = _drawn(previous) or previous.field.method in _GIVEN
+    if reviewed or drawn:
         work = [f"{reviewed} reviewed obstacles"] if reviewed else []
-        work += ["an outline drawn by hand"] if keeps_outline(previous) else []
+        work += ["an outline drawn by hand"] if drawn else []
         raise FieldError(
             f"The earlier plan there is of another field ({previous.field.name}; lat {lat}, lon "
             f"{lon} lies outside it) and holds {' and '.join(work)}.",
             hint="Choose another folder, or --fresh to forget that work.",
+        )
+
+
+def refuse_lost_obstacles(plan: Plan) -> None:
+    """A layer of obstacles that is gone, with a person's work in it, is a slip and no word."""
+    written = plan.evidence.written
+    if plan.obstacles is not None or written is None:
+        return
+    said = sum(row.kept for row in written.rows) + len(written.removed)
+    if said:
+        raise ObstacleError(
+            f"The layer `obstacles` of {plan.field.name} is gone, with {said} that a person "
+            "reviewed, drew or took away.",
+            hint="Give it back its name, or `geofield undo`; to have none, delete its rows alone.",
         )

@@ -7,6 +7,7 @@ what a person has edited since: a moved outline, a confirmed, rejected or added 
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,14 +20,17 @@ from pyproj import Geod
 
 from geofield import schema
 from geofield.earlier import (
-    holds,
+    drew_outline,
     keeps_outline,
+    kept_outline,
+    of_the_same_field,
     outline_changed,
     points_said,
-    refuse_to_forget,
+    refuse_lost_obstacles,
+    renamed,
     with_points,
 )
-from geofield.errors import FieldError, GeofieldError, TrackError
+from geofield.errors import FieldError, FieldWarning, GeofieldError, TrackError
 from geofield.model.evidence import Evidence
 from geofield.model.field import Field
 from geofield.model.merge import merge
@@ -74,7 +78,8 @@ def plan_field(
         An earlier plan of the same field: its outline, where a person drew it, and its
         reviewed obstacles are kept.
     boundary : Field, optional
-        The user's own outline; nothing is extracted then.
+        The user's own outline; nothing is extracted then. One that a person drew in `previous`
+        stands above it.
     progress : callable, optional
         Called with (done, total, what) at each stage.
     timings_s : mutable mapping, optional
@@ -157,27 +162,29 @@ def run_field(
         scene = picture
     else:
         scene = open_scene(picture, lat, lon, settings) if window is None else window
-    if previous is not None and not holds(previous, lat=lat, lon=lon):
-        refuse_to_forget(previous, lat, lon)
-        previous = None
+    previous = of_the_same_field(previous, lat, lon)
     told = set() if previous is None else points_said(previous.settings)
-    said = bool(points_said(settings) - told)
+    said = bool(points_said(settings) - told or regions)
     settings = with_points(settings, previous)
-    if previous is not None and boundary is None and choose and previous.field.alternatives:
+    choosing = bool(previous is not None and choose and previous.field.alternatives)
+    kept = previous is not None and not choosing and _keeps(previous, boundary, said=said)
+    if previous is not None and choose and choosing:
         field = previous.field.choose(choose)
-    elif (
-        previous is not None
-        and keeps_outline(previous)
-        and boundary is None
-        and not (previous.field.method == "chosen" and said)
-    ):
+    elif previous is not None and kept:
         if said:
             raise FieldError(
-                "The outline there was drawn by hand: it is kept, and no point changes it.",
+                "The outline there was drawn by hand: it is kept, and no "
+                f"{'region' if regions else 'point'} changes it.",
                 hint="Move the outline itself, or --fresh to have it found again.",
             )
-        kept = "drawn" if previous.outline_edited else previous.field.method
-        field = replace(previous.field, method=kept, quality=None)
+        if boundary is not None:
+            warnings.warn(
+                "The outline there was drawn by hand: it is kept, and the boundary is not used. "
+                "To have the boundary, forget the earlier plan (--fresh; in Python previous=None).",
+                FieldWarning,
+                stacklevel=2,
+            )
+        field = kept_outline(previous)
     else:
         if boundary is None:
             field, scene = _find(picture, scene, lat, lon, settings, regions)
@@ -191,10 +198,7 @@ def run_field(
             imagery_date=scene.source.date,
             licence=scene.source.licence,
         )
-        if previous is not None and boundary is None:
-            # The same field, found again: its names are the user's to keep.
-            known = previous.field
-            field = replace(field, field_id=known.field_id, name=known.name, own=known.own)
+        field = field if previous is None else renamed(field, previous)
     if name:
         field = replace(field, name=name)
     obstacles = written = None
@@ -210,8 +214,15 @@ def run_field(
         grid=scene.grid,
         evidence=Evidence((lat, lon), outline_digest(field), written=written),
         scene=scene,
-        changes=() if previous is None else (outline_changed(previous, field),),
+        changes=() if previous is None else (outline_changed(previous, field, kept=kept),),
     )
+
+
+def _keeps(previous: Plan, boundary: Field | None, *, said: bool) -> bool:
+    """Whether an earlier plan's outline stays: what was drawn stands above what was given."""
+    if boundary is not None:
+        return drew_outline(previous)
+    return keeps_outline(previous) and not (previous.field.method == "chosen" and said)
 
 
 def _find(
@@ -258,6 +269,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     """Stage 3: find obstacles; rows that a person reviewed or drew stay as they are."""
     from geofield.obstacles import detect_obstacles
 
+    refuse_lost_obstacles(plan)
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
     detected.attrs.clear()
@@ -284,6 +296,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
 def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
+    refuse_lost_obstacles(plan)
     obstacles, evidence = None, plan.evidence
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)

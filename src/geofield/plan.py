@@ -188,10 +188,14 @@ class Plan:
 
         rows = dataset.table(schema.FIELD.name)
         if len(rows) != 1:
-            raise FormatError(
-                f"A plan has one field; this file has {len(rows)}.",
-                hint="For many fields at once use `geofield tracks`.",
+            next_step = (
+                "Merge or delete rows of its layer `field`; many fields are the work of `geofield "
+                "tracks` and `geofield batch`."
+                if len(rows)
+                else "Draw the outline in its layer `field`; `geofield undo` brings back the plan "
+                "before the last run."
             )
+            raise FormatError(f"A plan has one field; this file has {len(rows)}.", hint=next_step)
         evidence = dataset.provenance.evidence
         settings = (
             from_mapping(dataset.provenance.settings) if dataset.provenance.settings else None

@@ -23,7 +23,11 @@ Examples:
 @output_option("GeoPackage to write.")
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @click.option("--name", help="The field's name.")
-@click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace a file that is there already; `geofield undo` brings it back.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 def import_(
     files: tuple[Path, ...],
@@ -44,21 +48,23 @@ def import_(
     from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged
+    from geofield.staging import staged_folder
+    from geofield.staging.generations import keep_earlier
 
     if output.suffix.lower() != ".gpkg":
         raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
     claim_file(output)
     dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
-    written = write_dataset(
-        dataset, output.parent, ["gpkg"], stem=output.stem, overwrite=overwrite, inputs=files
-    )
+    with staged_folder(output.parent, overwrite=overwrite, inputs=files) as staging:
+        keep_earlier(output, staging)
+        write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
     for note in dataset.notes:
         say(note)
     counts = {layer: len(table) for layer, table in dataset.tables.items() if len(table)}
     if as_json:
         echo_json(
             {
-                "files": [str(path) for path in written],
+                "files": [str(output)],
                 "name": dataset.name,
                 "rows": counts,
                 "taken": list(dataset.notes),

@@ -268,7 +268,8 @@ def _names(
             raise FormatError(
                 f"{raw.name}: column {id_name!r} holds {len(double)} ids more than once, such as "
                 f"{first!r} in rows {', '.join(map(str, rows[:5]))}.",
-                hint="Give each place an id of its own, or name another column: --id-column.",
+                hint="Give each place an id of its own, or name another column "
+                "(`geofield batch --id-column`).",
             )
         ids = column.take(kept).to_pylist()
     elif None not in names and len(set(names)) == len(names) > 1 and not part.any():

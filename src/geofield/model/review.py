@@ -189,11 +189,25 @@ def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     shapes = np.asarray(obstacles.geometry.array, dtype=object)
     missing = shapely.is_missing(shapes) | shapely.is_empty(shapes)
     table = obstacles[~missing] if missing.any() else obstacles
+    crossed = ~shapely.is_valid(shapes[~missing])
+    if crossed.any():
+        table = _repaired(table, crossed)
     kinds = table.dtypes
     names = [each.name for each in schema.OBSTACLES.columns if each.type in ("int", "float")]
     if all(name in kinds and kinds[name].kind in "if" for name in names):
         return table
     return schema.conform(schema.OBSTACLES, table, extras=True)
+
+
+def _repaired(obstacles: gpd.GeoDataFrame, crossed: NDArray[np.bool_]) -> gpd.GeoDataFrame:
+    """Rows whose border crosses itself made valid; further parts have the same number still."""
+    shapes = np.array(obstacles.geometry.array, dtype=object)
+    for row in np.flatnonzero(crossed):
+        parts = shapely.get_parts(shapely.make_valid(shapes[row]))
+        areas = [part for part in parts if isinstance(part, shapely.Polygon)]
+        # What has no area at all stays as it is: nobody took it away.
+        shapes[row] = shapely.MultiPolygon(areas) if areas else shapes[row]
+    return obstacles.set_geometry(shapes, crs=obstacles.crs).explode(ignore_index=True)
 
 
 def _plain_polygons(geometry: Any) -> NDArray[np.object_]:
