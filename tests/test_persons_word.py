@@ -407,3 +407,16 @@ def test_an_import_can_be_undone(folder: Path) -> None:
     assert plan_in(folder) != before
     geofield("undo", file)
     assert plan_in(folder) == before
+
+
+def test_a_status_chosen_before_stands_when_the_shape_is_changed_later(folder: Path) -> None:
+    from geofield.model.review import reconcile
+
+    plan = plan_in(folder)
+    table, written = plan.obstacles, plan.evidence.written
+    assert table is not None
+    table, written = reconcile(table.assign(status="possible"), written)
+    moved = table.set_geometry([translate(s, 1.5) for s in table.geometry], crs=table.crs)
+    after, written = reconcile(moved, written)
+    assert set(after["status"]) == {"possible"}
+    assert all(row.kept for row in written.rows)

@@ -58,8 +58,8 @@ def reconcile(
     keeps its number. A shape that was changed counts as drawn, with the radius that it has now
     (none where it is no circle any more); a typed `radius_m` or `buffer_m` gives the row the
     shape of that size. Rows that were merely `detected` or `possible` become `confirmed` by
-    such a change, unless the person chose a status. A status emptied is no word: the one that
-    was written stands.
+    such a change, unless the person chose a status, then or before. A status emptied is no word:
+    the one that was written stands.
 
     A row without a number, or with a number that another row has, was drawn: it becomes `added`
     (unless another status was chosen) and gets the next free number; a safety margin typed for
@@ -297,7 +297,8 @@ def _bring_up_to_date(
             anew.append(row)
         if found and reshaped[at]:
             former.append(before[at].shape)
-        if found and not chosen[at]:
+        # Of what a person looked at before, the status is their choice, too.
+        if found and not chosen[at] and not before[at].kept:
             rows.at["status"][row] = "confirmed"
     if anew:
         size: Any = np.nan
