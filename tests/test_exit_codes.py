@@ -189,3 +189,13 @@ def test_exit_codes(place: Place, command: str) -> None:
                 assert sorted(place.folder.iterdir()) == before, line
             if "--json" in line and code < 2:
                 json.loads(done.stdout)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
+def test_no_room_for_what_is_printed() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [GEOFIELD, "formats"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: The disk is full")

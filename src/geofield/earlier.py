@@ -39,8 +39,7 @@ def points_said(settings: Settings | None) -> set[tuple[bool, tuple[float, float
 
 def drew_outline(previous: Plan) -> bool:
     """Whether a person drew an earlier plan's outline, or may have: nobody recorded another."""
-    unknown = previous.evidence.outline is None and previous.field.method not in _GIVEN
-    return _drawn(previous) or unknown
+    return _drawn(previous) or _without_record(previous)
 
 
 def keeps_outline(previous: Plan) -> bool:
@@ -50,6 +49,11 @@ def keeps_outline(previous: Plan) -> bool:
 
 def _drawn(previous: Plan) -> bool:
     return previous.outline_edited or previous.field.method == "drawn"
+
+
+def _without_record(previous: Plan) -> bool:
+    """Whether nobody can tell what the outline was like when it was written."""
+    return previous.evidence.outline is None and previous.field.method not in _GIVEN
 
 
 def kept_outline(previous: Plan) -> Field:
@@ -70,6 +74,11 @@ def renamed(field: Field, previous: Plan) -> Field:
 
 def outline_changed(previous: Plan, field: Field, *, kept: bool) -> str:
     """What became of an earlier plan's outline, in words."""
+    if kept and not _drawn(previous) and _without_record(previous):
+        return (
+            "outline kept, for the file has lost the record of what was written (as copies made "
+            "by other programs do) and it may be yours; obstacles deleted there may be found again"
+        )
     if kept:
         return "your outline kept"
     if previous.field.crs != field.crs:

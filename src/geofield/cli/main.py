@@ -5,6 +5,7 @@ Subcommands are imported only when they run, so that ``--help`` is quick.
 
 from __future__ import annotations
 
+import errno
 import gc
 import importlib
 import os
@@ -113,6 +114,17 @@ def _end_stopped() -> NoReturn:
     sys.exit(1)
 
 
+def _end_if_known(error: Exception) -> None:
+    """End with a message where an error of no kind of our own has a plain reason."""
+    if was_stopped():
+        # A library that was calling back makes an error of its own of a stop.
+        _end_stopped()
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        place = error.filename or "what was printed has no room"
+        say_error(f"The disk is full: {place}.", "Free some space, then repeat.")
+        sys.exit(1)
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage.
 
@@ -154,8 +166,6 @@ def main(args: list[str] | None = None) -> None:
             # The reader of our output (head, less) has gone: not our failure.
             sys.stderr.close()
             sys.exit(0)
-        except Exception:
-            # A library that was calling back makes an error of its own of a stop.
-            if not was_stopped():
-                raise
-            _end_stopped()
+        except Exception as error:
+            _end_if_known(error)
+            raise
