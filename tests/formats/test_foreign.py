@@ -194,3 +194,63 @@ def test_real_parcels_there_and_back(shared, tmp_path):
                 shape_there = shape
             moved = shapely.hausdorff_distance(shape_there, theirs)
             assert moved <= max(FORMATS[name].precision_m, 1e-9) * 1.01, (name, number)
+
+
+@pytest.mark.parametrize(("names", "numbers"), [
+    (["2024 North", "2024 South"], [(1, 1), (2, 1)]),
+    (["AB 1", "Curve 1"], [(1, 1), (2, 1)]),
+    (["Swath 4", "Swath 9"], [(4, 1), (9, 1)]),
+    (["Track 7", "Track 7-2"], [(7, 1), (7, 2)]),
+    (["Track 7-2", "Track 7-2"], [(7, 1), (7, 2)]),
+    ([f"AB {10**30}", "AB 1"], [(1, 1), (2, 1)]),
+])  # fmt: skip
+def test_lines_are_one_track_only_where_their_names_say_so(tmp_path, names, numbers):
+    lines = [shapely.LineString([(500_000, y), (500_200, y)]) for y in (5_500_004, 5_500_008)]
+    segments = read_dataset(write(tmp_path / "lines.gpkg", lines, name=names)).table("segments")
+    assert list(zip(segments["track_no"], segments["segment_no"], strict=True)) == numbers
+
+
+@pytest.mark.parametrize("numbers", [[1e300, 2.0], [1.2, 1.7], [-3.0, 4.0]])
+def test_track_numbers_that_nobody_counts_with(tmp_path, numbers):
+    lines = [shapely.LineString([(500_000, y), (500_200, y)]) for y in (5_500_004, 5_500_008)]
+    path = write(tmp_path / "lines.gpkg", lines, track=numbers)
+    assert list(read_dataset(path).table("segments")["track_no"]) == [1, 2]
+
+
+def test_a_line_without_length_is_no_track(tmp_path):
+    here = (500_000, 5_500_004)
+    lines = [shapely.LineString([here, here]), shapely.LineString([here, (500_200, 5_500_004)])]
+    dataset = read_dataset(write(tmp_path / "lines.gpkg", lines))
+    assert len(dataset.table("tracks")) == 1
+    assert "lines: 1 line left out, having no length" in dataset.notes
+
+
+@pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+@pytest.mark.parametrize("columns", [
+    {"certainty": ["high", "low"]},
+    {"heading_deg": ["N", "N"]},
+    {"imagery_date": ["May 2020", "later"]},
+    {"confidence": ["high", "low"]},
+    {"radius": [0.0, 2.0], "buffer": [0.0, -5.0]},
+    {"radius": [0.0, float("inf")], "buffer": [0.0, float("inf")]},
+    {"number": [1.0, 1e30]},
+])  # fmt: skip
+def test_columns_of_another_meaning_are_passed_over(tmp_path, columns):
+    shapes = [BOX, shapely.Point(500_100, 5_500_050)]
+    dataset = read_dataset(write(tmp_path / "field.gpkg", shapes, **columns))
+    write_dataset(dataset, tmp_path / "out", ["gpkg"])
+    back = read_dataset(tmp_path / "out" / "field.gpkg")
+    assert back.table("field").geometry.iloc[0].equals(BOX)
+    assert list(back.table("obstacles")["obstacle_no"]) == [1]
+    radius_m = 2.0 / 0.9996
+    assert back.table("obstacles").area.iloc[0] == pytest.approx(3.14 * radius_m**2, rel=0.01)
+
+
+def test_collections_of_collections_are_taken_apart(tmp_path):
+    ponds = shapely.multipolygons([shapely.box(*p, p[0] + 5, p[1] + 5) for p in
+                                   [(500_010, 5_500_010), (500_050, 5_500_010)]])  # fmt: skip
+    trees = shapely.multipoints([(500_100, 5_500_050), (500_120, 5_500_050)])
+    both = shapely.geometrycollections([ponds, shapely.geometrycollections([trees])])
+    with pytest.warns(FormatWarning, match="2 obstacle points have no radius"):
+        dataset = read_dataset(write(tmp_path / "field.gpkg", [BOX, both]))
+    assert len(dataset.table("obstacles")) == 4

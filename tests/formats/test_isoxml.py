@@ -164,3 +164,49 @@ def test_a_boundary_with_two_exterior_rings_is_two_outlines(tmp_path):
     )
     with pytest.raises(FormatError, match="holds 2 outlines"):
         read_dataset(tmp_path)
+
+
+RING = [(10.0, 50.0), (10.004, 50.0), (10.004, 50.003), (10.0, 50.003), (10.0, 50.0)]
+BOW = [(10.001, 50.001), (10.002, 50.002), (10.002, 50.001), (10.001, 50.002), (10.001, 50.001)]
+
+
+def task_data(folder, *inside):
+    (folder / "TASKDATA.XML").write_text(
+        '<ISO11783_TaskData VersionMajor="4" VersionMinor="3" DataTransferOrigin="1">'
+        f'<PFD A="PFD1" C="One" D="1">{"".join(inside)}</PFD></ISO11783_TaskData>'
+    )
+    return folder
+
+
+def polygon(kind, *rings):
+    lines = [
+        f'<LSG A="{1 if number == 0 else 2}">'
+        + "".join(f'<PNT A="2" C="{lat}" D="{lon}"/>' for lon, lat in ring)
+        + "</LSG>"
+        for number, ring in enumerate(rings)
+    ]
+    return f'<PLN A="{kind}">{"".join(lines)}</PLN>'
+
+
+def test_trees_of_one_name_are_all_there(tmp_path):
+    trees = [f'<PNT A="5" B="Tree" C="50.001" D="{lon}"/>' for lon in (10.001, 10.002, 10.003)]
+    dataset = read_dataset(task_data(tmp_path, polygon(1, RING), *trees))
+    assert list(dataset.table("obstacles")["obstacle_no"]) == [1, 2, 3]
+
+
+def test_rings_that_cross_themselves_are_repaired(tmp_path):
+    dataset = read_dataset(task_data(tmp_path, polygon(1, RING, BOW), polygon(6, BOW)))
+    assert dataset.table("field").geometry.is_valid.all()
+    assert len(dataset.table("obstacles")) == 2
+
+
+@pytest.mark.parametrize(("pattern", "kind"), [
+    ('C="2" G="north"', 6), ('C="2" G="nan"', 6), ('C="4" H="wide"', 8), ('C="4" H="inf"', 8),
+])  # fmt: skip
+def test_figures_of_guidance_that_are_none(tmp_path, pattern, kind):
+    line = f'<LSG A="5"><PNT A="{kind}" C="50.001" D="10.001"/></LSG>'
+    group = f'<GGP A="GGP1"><GPN A="GPN1" {pattern}>{line}</GPN></GGP>'
+    task_data(tmp_path, polygon(1, RING), group)
+    with pytest.raises(FormatError, match="no number"):
+        read_dataset(tmp_path)
+    assert any(each.level == "error" for each in validate_file(tmp_path))

@@ -41,6 +41,8 @@ _BUFFER = ("buffer_m", "buffer")
 NUMBER_COLUMNS = ("obstacle_no", "obst_no", "number", "no")
 _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
+#: Larger numbers are none that anybody counts with, nor exact in all programs.
+_LARGEST = 2**53
 
 
 def column_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> Any:
@@ -74,9 +76,9 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     polygon = shapely.orient_polygons(shapely.force_2d(frame.geometry.iloc[0]))
     ids = column_like(frame, ID_COLUMNS)
     data: dict[str, Any] = {
-        column.name: [frame[column.name].iloc[0]]
+        column.name: [_value(frame, column)]
         for column in schema.FIELD.columns
-        if column.name in frame.columns and pd.notna(frame[column.name].iloc[0])
+        if column.name in frame.columns
     }
     field = Field(polygon, crs)
     data |= {
@@ -85,8 +87,21 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
         "area_ha": [field.area_ha],
         "perimeter_m": [field.perimeter_m],
     }
-    data.setdefault("method", ["boundary"])
+    if data.get("method", [None]) == [None]:
+        data["method"] = ["boundary"]
     return schema.table(schema.FIELD, data, [polygon], crs)
+
+
+def _value(frame: gpd.GeoDataFrame, column: schema.Column) -> Any:
+    """What the first row says in a column of the schema; None for what is not of its type."""
+    if column.type == "float":
+        return float(numbers_like(frame, (column.name,))[0])
+    if frame[column.name].isna().iloc[0]:
+        return None
+    text = str(frame[column.name].iloc[0])
+    if column.type == "date":
+        return text[:10] if re.match(r"\d{4}-\d{2}-\d{2}", text) else None
+    return text
 
 
 def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
@@ -99,7 +114,8 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     count = len(geometry)
     radius, margin = numbers_like(frame, _RADIUS), numbers_like(frame, _BUFFER)
     is_point = shapely.get_type_id(geometry) == shapely.GeometryType.POINT.value
-    unsized = is_point & ~(radius > 0)
+    radius[~(np.isfinite(radius) & (radius > 0))] = np.nan
+    unsized = is_point & np.isnan(radius)
     if unsized.any():
         warnings.warn(
             f"{path.name}: {int(unsized.sum())} obstacle points have no radius; they are circles "
@@ -108,7 +124,15 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
             stacklevel=2,
         )
         radius[unsized] = POINT_RADIUS_M
-    margin = np.where(np.isnan(margin), 0.0, margin)
+    wrong = (margin < 0) | np.isinf(margin)
+    if wrong.any():
+        warnings.warn(
+            f"{path.name}: {int(wrong.sum())} safety margins are negative or infinite; they count "
+            "as 0 m. Correct them.",
+            FormatWarning,
+            stacklevel=2,
+        )
+    margin = np.where(wrong | np.isnan(margin), 0.0, margin)
     centre = shapely.centroid(geometry)
     x, y = shapely.get_x(centre), shapely.get_y(centre)
     if is_point.any():
@@ -117,9 +141,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         )
     lon, lat = transformer(crs, LONLAT).transform(x, y)
     data: dict[str, Any] = {
-        name: frame[name].to_list()
-        for name in ("confidence", "x_px", "y_px", "radius_px")
-        if name in frame.columns
+        name: numbers_like(frame, (name,)) for name in ("confidence", "x_px", "y_px", "radius_px")
     }
     data |= {
         "obstacle_no": _whole_numbers(numbers_like(frame, NUMBER_COLUMNS)),
@@ -142,15 +164,10 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     """
     geometry = shapely.force_2d(frame.geometry.to_numpy())
     geometry = np.array([shapely.LineString(line.coords) for line in geometry], dtype=object)
-    track = numbers_like(frame, _TRACK)
-    if np.isnan(track).any():
-        track = _numbers_in_names(frame)
-    segment = numbers_like(frame, _SEGMENT)
-    if np.isnan(segment).any():
-        segment = pd.Series(track).groupby(track).cumcount().to_numpy() + 1
+    track, segment = _line_numbers(frame)
     values = {
-        "track_no": track.astype(int),
-        "segment_no": np.asarray(segment).astype(int),
+        "track_no": track,
+        "segment_no": segment,
         "length_m": ground_lengths_m(geometry, crs),
     }
     table = schema.table(schema.SEGMENTS, values, geometry, crs)
@@ -173,20 +190,48 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     return schema.table(schema.TRACKS, data, shapes, crs), segments
 
 
-def _numbers_in_names(frame: gpd.GeoDataFrame) -> np.ndarray:
-    """Track numbers from names such as ``Track 7``, where all rows have one; else 1, 2, ..."""
+def _line_numbers(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Track and segment of each line: by columns, else by names, else 1, 2, ..."""
+    track, segment = numbers_like(frame, _TRACK), numbers_like(frame, _SEGMENT)
+    if not _countable(track).all():
+        track, segment = _numbers_in_names(frame)
+    pairs = np.column_stack([track, segment])
+    if not _countable(segment).all() or len(np.unique(pairs, axis=0)) < len(pairs):
+        segment = pd.Series(track).groupby(track).cumcount().to_numpy() + 1
+    return track.astype(np.int64), np.asarray(segment).astype(np.int64)
+
+
+def _numbers_in_names(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Tracks and segments of names such as ``Track 7-2``, as geofield writes them, in all rows.
+
+    Other names give the tracks' numbers where each has its own, as in ``AB 7``.
+    """
     names = column_like(frame, NAME_COLUMNS)
-    if names is not None:
-        found = [re.search(r"\d+", str(name)) for name in names]
-        if all(found):
-            return np.array([float(match.group()) for match in found if match])
-    return np.arange(1, len(frame) + 1, dtype=float)
+    texts = [""] * len(frame) if names is None else [str(name) for name in names]
+    one_each = np.ones(len(frame))
+    own = [re.fullmatch(r"Track (\d+)(?:-(\d+))?", text) for text in texts]
+    if all(own):
+        found = [(float(match[1]), float(match[2] or 1)) for match in own if match]
+        track, segment = np.array(found).T
+        if _countable(track).all():
+            return track, segment
+    numbers = [re.search(r"\d+", text) for text in texts]
+    if all(numbers):
+        track = np.array([float(match[0]) for match in numbers if match])
+        if _countable(track).all() and len(np.unique(track)) == len(track):
+            return track, one_each
+    return np.arange(1, len(frame) + 1, dtype=float), one_each
+
+
+def _countable(values: np.ndarray) -> Any:
+    """Which numbers are whole, and not too large to count with."""
+    return (values == np.round(values)) & (values >= 0) & (values <= _LARGEST)
 
 
 def _whole_numbers(values: np.ndarray) -> list[int]:
     """Obstacle numbers: those of the file where they are whole; the next free ones for others."""
     numbers: list[int] = []
-    whole = np.isfinite(values) & (values == np.round(values))
+    whole = _countable(values)
     free = int(np.max(values, where=whole, initial=0)) + 1
     taken: set[int] = set()
     for value, good in zip(values, whole, strict=True):

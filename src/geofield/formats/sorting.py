@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,7 +122,8 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
     standing = [*(part.frame for part in points), *inside]
     if standing and "obstacles" not in tables:
         tables["obstacles"] = obstacle_table(_repaired(_joined(standing), path), metric, path)
-    lines = _without_asides([part for part in parts if part.kind == "LineString"], tables, notes)
+    lines = [part for part in parts if part.kind == "LineString"]
+    lines = _with_length(_without_asides(lines, tables, notes), notes)
     if lines and "tracks" not in tables:
         notes += [part.told(len(part.frame), "taken as guidance") for part in lines]
         drawn = _joined([part.frame for part in lines])
@@ -133,7 +134,11 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
 
 
 def _parts(layer: RawLayer) -> list[_Part]:
-    frame = layer.frame.explode(index_parts=False, ignore_index=True)
+    frame = layer.frame
+    # A collection may hold multi-part shapes, or collections.
+    while frame.geom_type.str.startswith(("Multi", "GeometryCollection")).any():
+        frame = frame.explode(index_parts=False, ignore_index=True)
+        frame = frame[~frame.geometry.is_empty]
     kinds = frame.geom_type.replace("LinearRing", "LineString")
     return [
         _Part(layer.name, kind, frame[kinds == kind])
@@ -152,6 +157,18 @@ def _without_asides(parts: list[_Part], tables: dict[str, Any], notes: list[str]
         if part.aside:
             notes.append(part.told(len(part.frame), "left out, by the layer's name"))
     return rest
+
+
+def _with_length(parts: list[_Part], notes: list[str]) -> list[_Part]:
+    """The parts without lines that begin and end in one place."""
+    kept = []
+    for part in parts:
+        long = part.frame.length > 0
+        if not long.all():
+            notes.append(part.told(int((~long).sum()), "left out, having no length"))
+        if long.any():
+            kept.append(replace(part, frame=part.frame[long]))
+    return kept
 
 
 def _outlines(

@@ -156,5 +156,6 @@ def _check_pattern(pattern: ET.Element) -> Iterator[Finding]:
     if pattern.get("C") == "1" and kinds != ["6", "7"]:
         yield Finding("error", where, "an AB line is a point 6, then a 7")
     heading = pattern.get("G")
-    if heading is not None and not 0 <= float(heading) <= 360:
+    number = None if heading is None else re.fullmatch(r"\d{1,3}(\.\d+)?", heading)
+    if heading is not None and (number is None or float(heading) > 360):
         yield Finding("error", where, f"the heading is {heading}")

@@ -6,7 +6,7 @@ through the field. A pivot has a centre and a radius: it is an arc or a circle.
 
 from __future__ import annotations
 
-import re
+import math
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -25,7 +25,6 @@ from geofield.formats.isoxml.codes import (
 )
 
 _GEOD = Geod(ellps="WGS84")
-_NUMBERS = re.compile(r"^Track (\d+)(?:-(\d+))?$")
 #: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
 _ARC_STEP_DEG = 1.0
 #: Half the length of an A+ line where there is no field to draw it through, metres.
@@ -50,11 +49,11 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
                 continue
             notes += [f"guidance {name!r}: {note}"] if note else []
             into = rows if pattern.get("E", REPEAT_NONE) == REPEAT_NONE else repeated
-            into.append(_row(name, shape))
+            into.append({"name": name, "geometry": shape})
     for line in field.findall("LSG"):
         shape = _polyline(line)
         if line.get("A") == LineType.GUIDANCE and shape is not None:
-            rows.append(_row(line.get("B") or "", shape))
+            rows.append({"name": line.get("B") or "", "geometry": shape})
     if rows and repeated:
         names = ", ".join(row["name"] for row in repeated[:3])
         notes.append(f"{len(repeated)} lines to be repeated left out, others being there: {names}")
@@ -62,7 +61,7 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
 
 
 def position(point: ET.Element) -> tuple[float, float]:
-    """Longitude and latitude of a PNT."""
+    """Longitude and latitude of a PNT, degrees."""
     try:
         return float(point.get("D", "")), float(point.get("C", ""))
     except ValueError as error:
@@ -71,14 +70,15 @@ def position(point: ET.Element) -> tuple[float, float]:
         ) from error
 
 
-def _row(name: str, shape: Any) -> dict[str, Any]:
-    match = _NUMBERS.match(name)
-    return {
-        "name": name,
-        "track_no": None if match is None else int(match.group(1)),
-        "segment_no": None if match is None else int(match.group(2) or 1),
-        "geometry": shape,
-    }
+def _number(attribute: str, text: str) -> float:
+    """A figure of a guidance pattern."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise FormatError(f"A guidance pattern (GPN) has {attribute}={text!r}, which is no number.")
+    return number
 
 
 def _pattern_line(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[Any, str]:
@@ -103,12 +103,13 @@ def _through(line: ET.Element, heading: str | None, outline: Any) -> tuple[Any, 
     if not points or heading is None:
         return None, "an A+ line without a point or heading"
     lon, lat = position(points[0])
+    heading_deg = _number("G", heading)
     reach_m = _REACH_M
     if not outline.is_empty:
         corners = shapely.get_coordinates(outline)
         start = np.full(len(corners), lon), np.full(len(corners), lat)
         reach_m = float(np.max(_GEOD.inv(*start, corners[:, 0], corners[:, 1])[2]))
-    ends = [_GEOD.fwd(lon, lat, float(heading) + turn, reach_m)[:2] for turn in (180.0, 0.0)]
+    ends = [_GEOD.fwd(lon, lat, heading_deg + turn, reach_m)[:2] for turn in (180.0, 0.0)]
     whole = shapely.LineString([ends[0], (lon, lat), ends[1]])
     parts = shapely.get_parts(shapely.intersection(whole, outline))
     inside = [part for part in parts if part.geom_type == "LineString"]
@@ -132,7 +133,7 @@ def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
             azimuths.append(azimuth)
             distances.append(distance)
     # H is in millimetres; without it the first point lies on the arc.
-    radius_m = float(pattern.get("H", "0")) / 1000.0 or (distances[0] if distances else 0.0)
+    radius_m = _number("H", pattern.get("H", "0")) / 1000.0 or (distances[0] if distances else 0.0)
     if radius_m <= 0.0:
         return None, "a pivot without a radius"
     start, turn = (azimuths[0] if azimuths else 0.0), 360.0

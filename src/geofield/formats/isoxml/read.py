@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import shapely
 
+from geofield.crossings import mended
 from geofield.errors import FormatError, SeveralFieldsError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
@@ -54,7 +55,7 @@ def read(path: Path) -> Dataset:
     field = fields[0]
     _unwrap(field)
     boundaries = list(_boundaries(field))
-    outline = shapely.union_all([row["geometry"] for row in boundaries])
+    outline = shapely.union_all([_sound(row["geometry"]) for row in boundaries])
     lines, lines_told = guidance_lines(field, outline)
     layers = {
         "boundary": boundaries,
@@ -121,35 +122,41 @@ def _told(field: ET.Element) -> Iterable[str]:
 
 
 def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
-    """Obstacle polygons, and obstacle points where no polygon has the same number."""
-    points = {
-        point.get("B", f"#{index}"): point
-        for index, point in enumerate(field.findall("PNT"))
+    """Obstacle polygons, and obstacle points that lie in none of the same name or number."""
+    points = [
+        (point.get("B", ""), shapely.Point(position(point)))
+        for point in field.findall("PNT")
         if point.get("A") == PointType.OBSTACLE
-    }
+    ]
     holes = [
-        shapely.Polygon(ring) for part in shapely.get_parts(outline) for ring in part.interiors
+        shapely.Polygon(ring)
+        for part in shapely.get_parts(outline)
+        if part.geom_type == "Polygon"
+        for ring in part.interiors
     ]
     for element in field.findall("PLN"):
         if element.get("A") not in _STANDING:
             continue
         name = element.get("B", "")
         inside = {name, *(f"Obstacle {number}" for number in re.findall(r"\d+", name))}
-        here = [points.pop(each) for each in inside & points.keys()]
         for shape in _polygons(element):
             if any(_same(shape, hole) for hole in holes):
                 continue
+            ground = _sound(shape)
+            here = [each for each in points if each[0] in inside and ground.covers(each[1])]
+            points = [each for each in points if each not in here]
             yield {
                 "obstacle_no": _number_in(name),
                 "kind": "tree" if here else "other",
                 "geometry": shape,
             }
-    for name, point in points.items():
-        yield {
-            "obstacle_no": _number_in(name),
-            "kind": "tree",
-            "geometry": shapely.Point(position(point)),
-        }
+    for name, point in points:
+        yield {"obstacle_no": _number_in(name), "kind": "tree", "geometry": point}
+
+
+def _sound(shape: Any) -> Any:
+    """A shape to compare with, of one that may cross itself."""
+    return shape if shape.is_valid else mended(shape)
 
 
 def _number_in(name: str) -> int | None:
@@ -161,7 +168,9 @@ def _number_in(name: str) -> int | None:
 def _same(shape: Any, hole: Any) -> bool:
     """Whether an obstacle is there for readers that pass over the holes of a boundary."""
     return bool(
-        shapely.intersects(shape, hole)
+        shape.is_valid
+        and hole.is_valid
+        and shapely.intersects(shape, hole)
         and shapely.symmetric_difference(shape, hole).area < _SAME_AREA * hole.area
     )
 
