@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 import sqlite3
 
 import numpy as np
+import pandas as pd
 import pyogrio
 import pytest
 import shapely
@@ -240,3 +242,54 @@ def test_edits_that_qgis_has_saved_but_not_folded_in_are_read(dataset, tmp_path)
         assert list(back["status"])[:2] == ["rejected", "confirmed"]
     finally:
         other.close()
+
+
+LIST = [["operational", "organic"]]
+
+
+@pytest.mark.parametrize("name", ["gpkg", "shapefile", "kml", "fiboa", "turtle"])
+@pytest.mark.parametrize("column", [
+    {"id": [5]}, {"category": LIST}, {"tags": LIST}, {"history": [{"crop": "rye"}]},
+    {"determination:datetime": ["soon"]}, {"sown": [pd.Timestamp("2026-03-01")]},
+    {"waits": [pd.Timedelta("2h")]}, {"yield": [np.inf]}, {"size": np.array([3], dtype="uint8")},
+], ids=str)  # fmt: skip
+def test_a_users_column_of_any_name_and_type(dataset, tmp_path, name, column):
+    field = dataset.tables["field"].assign(**{key: pd.Series(v) for key, v in column.items()})
+    owned = dataclasses.replace(dataset, tables={**dataset.tables, "field": field})
+    for path in write_dataset(owned, tmp_path, [name]):
+        if path.suffix == ".geojson" and name == "fiboa":
+            (one,) = json.loads(path.read_text(), parse_constant=pytest.fail)["features"]
+            assert one["id"] == field["field_id"].iloc[0]
+            assert one["properties"]["category"] == ["operational"]
+
+
+def test_long_numbers_and_names_of_placemarks_survive_kml(dataset, tmp_path):
+    """A 32-bit number in KML would be cut to 2147483647; GDAL has columns of its own there."""
+    own = {"parcel": 3210000123, "crop_no": 7, "id": "A5", "description": "wet", "begin": "May"}
+    field = dataset.tables["field"].assign(**own)
+    write_dataset(
+        dataclasses.replace(dataset, tables={**dataset.tables, "field": field}), tmp_path, ["kml"]
+    )
+    back = read_dataset(tmp_path / "field.kml").table("field").iloc[0]
+    assert {name: back[name] for name in own} == own | {"parcel": "3210000123"}
+
+
+def test_text_that_a_shapefile_cuts_is_told(dataset, tmp_path):
+    field = dataset.tables["field"].assign(remark="long " * 60)
+    long = dataclasses.replace(dataset, tables={**dataset.tables, "field": field})
+    with pytest.warns(FormatWarning, match="cut text at 254 bytes: column 'remark'"):
+        write_dataset(long, tmp_path, ["shapefile"], tell_drops=False)
+
+
+def test_a_strangers_plan_names_no_picture_elsewhere(dataset, tmp_path):
+    secret = tmp_path / "secret.tif"
+    secret.write_bytes(b"not for others")
+    write_dataset(dataset, tmp_path / "plan", ["gpkg"])
+    path = tmp_path / "plan" / "field.gpkg"
+    for place in ("../secret.tif", str(secret)):
+        with sqlite3.connect(path) as connection:
+            (text,) = connection.execute("SELECT metadata FROM gpkg_metadata").fetchone()
+            said = json.dumps(json.loads(text) | {"scene": place})
+            connection.execute("UPDATE gpkg_metadata SET metadata = ?", (said,))
+        connection.close()
+        assert read_dataset(path).scene_path is None

@@ -52,10 +52,9 @@ def test_an_input_is_never_an_output(dataset, tmp_path):
 
 
 def test_one_failing_format_leaves_nothing(dataset, tmp_path):
-    bad = dataset.tables["obstacles"].copy()
-    bad.loc[0, "kind"] = "é" * 128
-    broken = dataclasses.replace(dataset, tables={**dataset.tables, "obstacles": bad})
-    with pytest.raises(FormatError, match=r"'kind' has 256 bytes, 254 fit"):
+    bad = dataset.tables["field"].assign(name="é" * 128)
+    broken = dataclasses.replace(dataset, tables={**dataset.tables, "field": bad})
+    with pytest.raises(FormatError, match=r"'name' has 256 bytes, 254 fit"):
         write_dataset(broken, tmp_path / "out", ["gpkg", "shapefile"])
     assert not (tmp_path / "out").exists()
 

@@ -12,6 +12,7 @@ from xml.etree import ElementTree as ET
 import fiona
 import geopandas as gpd
 import numpy as np
+import pandas as pd
 import pyogrio
 import pytest
 import shapely
@@ -229,3 +230,36 @@ def test_map_scene_and_report_are_products_like_others(tmp_path, simulated, simu
     )
     assert done.returncode == 1
     assert "There is no picture" in done.stderr
+
+
+def test_what_a_person_edited_is_what_others_read(plan_file, tmp_path):
+    """A moved row tells its new place, a drawn one has a number, place and status."""
+    edited = tmp_path / "field.gpkg"
+    edited.write_bytes(plan_file.read_bytes())
+    table = gpd.read_file(edited, layer="obstacles")
+    there = table.geometry.iloc[0].centroid
+    table.loc[0, "geometry"] = shapely.affinity.translate(table.geometry.iloc[0], 7.0, 3.0)
+    table.loc[1, "status"] = " Rejected"
+    pond = shapely.box(X0 + 90, Y0 + 10, X0 + 96, Y0 + 14)
+    drawn = gpd.GeoDataFrame({"status": [None]}, geometry=[pond], crs=UTM)
+    pd.concat([table, drawn]).to_file(edited, layer="obstacles", driver="GPKG")
+    outline = gpd.read_file(edited, layer="field")
+    outline.geometry = outline.buffer(10.0, join_style="mitre")
+    outline.to_file(edited, layer="field", driver="GPKG")
+    done = geofield(
+        "export", edited, "-f", "csv,gpx,geojson,report,html", "--out", tmp_path / "out"
+    )
+    assert done.returncode == 0, done.stderr
+    rows = pd.read_csv(tmp_path / "out" / "csv" / "obstacles.csv").set_index("obstacle_no")
+    x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(rows["lon"], rows["lat"])
+    assert np.hypot(x[0] - there.x - 7.0, y[0] - there.y - 3.0) < 0.001
+    assert np.hypot(x[4] - X0 - 93, y[4] - Y0 - 12) < 0.001
+    assert list(rows["status"]) == ["confirmed", "rejected", "rejected", "added", "added"]
+    waypoints = ET.parse(tmp_path / "out" / "field.gpx").getroot().iter(f"{GPX}wpt")
+    assert [each.findtext(f"{GPX}name") for each in waypoints] == [
+        f"Obstacle {number}" for number in (1, 4, 5)
+    ]
+    field = gpd.read_file(tmp_path / "out" / "geojson" / "field.geojson").to_crs(UTM)
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["field"]["area_ha"] == pytest.approx(field.area.iloc[0] / 1e4, rel=2e-3)
+    assert field["area_ha"].iloc[0] == pytest.approx(report["field"]["area_ha"], abs=1e-4)

@@ -11,8 +11,11 @@ _ALL = tuple(layer.name for layer in schema.LAYERS if not layer.working)
 _MAP = ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns")
 _ORIGIN = Drop("settings and evidence", "provenance")
 
+_PASSED = Drop("obstacles that tracks run through", "passed")
+
 _TERMINAL_DROPS = (
-    Drop("rejected obstacles and the status, radius and confidence of the others", "obstacles"),
+    _PASSED,
+    Drop("the status, radius and confidence of obstacles", "obstacles"),
     _ORIGIN,
 )
 
@@ -148,10 +151,11 @@ CATALOGUE: tuple[Format, ...] = (
         "gpx",
         "GPX 1.1",
         ("{stem}.gpx",),
-        ("tracks", "segments"),
+        ("obstacles", "tracks", "segments"),
         "geofield.formats.gpx:write",
         suffixes=(".gpx",),
         drops=(
+            _PASSED,
             Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
             _ORIGIN,
         ),
@@ -163,7 +167,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("csv/track_points.csv", "csv/obstacles.csv"),
         ("track_points", "obstacles"),
         "geofield.formats.tables_csv:write",
-        drops=(_ORIGIN,),
+        drops=(Drop("the outlines of obstacles that are not round", "polygons"), _ORIGIN),
     ),
     Format(
         "fiboa",
@@ -182,6 +186,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.dxf:write",
         suffixes=(".dxf",),
         drops=(
+            _PASSED,
             Drop("names, numbers and statuses", "field"),
             _ORIGIN,
         ),

@@ -8,14 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import shapely
-
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning
+from geofield.formats.edited import made_whole
 from geofield.formats.many import distinct, field_ids, joined
 from geofield.formats.names import safe_name
 from geofield.formats.registry import FORMATS, Format, format_named
 from geofield.model import Dataset
+from geofield.model.obstacles import active
 from geofield.staging import staged_folder
 
 
@@ -44,7 +44,7 @@ def write_datasets(
 
     Either all products come into place or none; previous ones stay as they were until then.
     Formats that hold several fields get all of them; of the others each field has its own
-    products, named after it or in a folder that is.
+    products, named after it or in a folder that is. What a person changed is made whole first.
 
     Parameters
     ----------
@@ -90,6 +90,7 @@ def write_datasets(
     if len(datasets) > 1:
         datasets = distinct(datasets)
         field_ids(datasets)
+    datasets = [made_whole(each) for each in datasets]
     target = Path(folder)
     written: list[Path] = []
     with staged_folder(target, overwrite=overwrite, inputs=inputs) as staging:
@@ -156,17 +157,15 @@ def dropped(dataset: Dataset, into: Format, *, together: bool = False) -> list[s
 def _present(dataset: Dataset, when: str) -> bool:
     if when == "provenance":
         return bool(dataset.provenance.settings or dataset.provenance.evidence)
-    if when == "holes":
-        return bool((shapely.get_num_interior_rings(dataset.table("field").geometry) > 0).any())
+    obstacles = dataset.table(schema.OBSTACLES.name)
     if when == "polygons":
-        obstacles = dataset.table("obstacles")
-        return bool((obstacles["radius_m"].isna()).any())
+        return bool(obstacles["radius_m"].isna().any())
+    if when == "passed":
+        return len(active(obstacles)) < len(obstacles)
     layer, _, column = when.partition(".")
-    if not dataset.has(layer):
-        return False
     if not column:
-        return True
-    return layer in dataset.tables and bool(dataset.tables[layer][column].notna().any())
+        return dataset.has(layer)
+    return bool(dataset.table(layer)[column].notna().any())
 
 
 def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -68,12 +69,23 @@ def _properties(row: Mapping[str, Any], shape: Any, dataset: Dataset) -> dict[st
     }
     if not pd.isna(date):
         properties["determination:datetime"] = f"{str(date)[:10]}T00:00:00Z"
+    # A user's column of the same name takes no word of fiboa's another meaning.
+    known = {*properties, "determination:datetime", "geometry", "bbox", "schemas"}
     for name in schema.own_columns(schema.FIELD, dataset.table(schema.FIELD.name)):
-        value = row[name]
-        if not pd.isna(value):
-            # Plain numbers and texts: numpy's own types are not JSON.
-            properties[str(name)] = getattr(value, "item", lambda v=value: v)()
+        value = _plain(row[name])
+        if value is not None:
+            properties[f"own_{name}" if name in known else str(name)] = value
     return properties
+
+
+def _plain(value: Any) -> Any:
+    """A number, truth or text that JSON has; None for a missing value."""
+    if pd.isna(value):
+        return None
+    plain = getattr(value, "item", lambda: value)()
+    if isinstance(plain, float) and not math.isfinite(plain):
+        return None
+    return plain if isinstance(plain, bool | int | float | str) else str(value)
 
 
 def _write_geojson(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:

@@ -29,8 +29,8 @@ class Drop:
         For people: "the confidence of obstacles".
     when : str
         Which datasets have it: a layer (``gaps``), a column with values
-        (``obstacles.confidence``), ``provenance``, ``holes`` (of the field) or
-        ``polygons`` (obstacles that are not circles).
+        (``obstacles.confidence``), ``provenance``, ``polygons`` (obstacles that are not
+        circles) or ``passed`` (obstacles that are not driven around).
     """
 
     words: str

@@ -106,8 +106,10 @@ def scene_beside(path: Path) -> Path | None:
 
 
 def _scene(record: origin.Origin | None, path: Path) -> Path | None:
-    scene = None if record is None or record.scene is None else path.parent / record.scene
-    return scene if scene is not None and scene.exists() else None
+    # A name alone: a stranger's file leads to no other folder.
+    name = None if record is None else Path(str(record.scene or "")).name
+    scene = path.parent / name if name else None
+    return scene if scene is not None and scene.is_file() else None
 
 
 @contextmanager

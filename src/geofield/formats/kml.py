@@ -48,10 +48,10 @@ _STYLES: dict[str, tuple[str, float, str | None]] = {
         for status, look in theme.STATUS.items()
     },
 }
-#: What GDAL makes of a placemark besides its own columns.
+#: What GDAL makes of a placemark; a column of the same name has a 2 behind it.
 _DRIVER_COLUMNS = [
     *("id", "Name", "description", "timestamp", "begin", "end", "altitudeMode", "tessellate"),
-    *("extrude", "visibility", "drawOrder", "icon", "snippet"),
+    *("extrude", "visibility", "drawOrder", "icon"),
 ]
 
 
@@ -84,11 +84,11 @@ def read(path: Path) -> Dataset:
     layers = []
     for name in layer_names(path):
         frame = read_vector(path, name)
-        # The driver calls a column `name` that stands beside the placemark's own `name2`.
-        named = "name2" if "name2" in frame.columns else "Name"
-        if named in frame.columns:
-            frame = frame.rename(columns={named: "name"})
-        layers.append(RawLayer(name, frame.drop(columns=_DRIVER_COLUMNS, errors="ignore")))
+        columns = {f"{each}2": each for each in _DRIVER_COLUMNS} | {"name2": "name"}
+        if "name2" not in frame.columns:
+            frame = frame.rename(columns={"Name": "name"})
+        frame = frame.drop(columns=_DRIVER_COLUMNS, errors="ignore").rename(columns=columns)
+        layers.append(RawLayer(name, frame))
     return read_foreign(layers, path)
 
 
@@ -98,7 +98,7 @@ def _schema(layer: Layer, datasets: Sequence[Dataset]) -> ET.Element:
     for each in datasets:
         table = each.table(layer.name)
         for name in schema.own_columns(layer, table):
-            kind = {"i": "int", "u": "int", "f": "double"}.get(table[name].dtype.kind, "string")
+            kind = _own_type(table[name])
             if found.setdefault(str(name), (kind, str(name)))[0] != kind:
                 found[str(name)] = ("string", str(name))
     fields = (
@@ -108,16 +108,19 @@ def _schema(layer: Layer, datasets: Sequence[Dataset]) -> ET.Element:
     return node("Schema", {"name": layer.name, "id": f"schema_{layer.name}"}, *fields)
 
 
+def _own_type(values: pd.Series[Any]) -> str:
+    """The type of a user's column; KML's whole numbers have 32 bits, longer ones are text."""
+    kind = values.dtype.kind
+    if kind in "iu":
+        return "int" if (values.abs() < 2**31).fillna(value=True).all() else "string"
+    return "double" if kind == "f" else "string"
+
+
 def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
     """Obstacles look as their status says."""
     if layer.name != schema.OBSTACLES.name:
         return layer.name
-    status = _status(row)
-    return f"obstacles_{status if status in theme.STATUS else 'added'}"
-
-
-def _status(row: Mapping[str, Any]) -> str:
-    return str(row.get("status")).strip().lower()
+    return f"obstacles_{row['status']}"
 
 
 def _style(name: str, colour: str, width: float, fill: str | None) -> ET.Element:
@@ -155,9 +158,9 @@ def row_name(layer: Layer, row: Mapping[str, Any]) -> str:
     if layer.name == schema.GAPS.name:
         return f"Gap {row['gap_no']} of track {row['track_no']}"
     if layer.name == schema.OBSTACLES.name:
-        number = row["obstacle_no"]
-        name = "Obstacle" if pd.isna(number) else f"Obstacle {number}"
-        return f"{name} ({_status(row)})" if _status(row) in schema.NOT_AVOIDED else name
+        status = row["status"]
+        told = f" ({status})" if status in schema.NOT_AVOIDED else ""
+        return f"Obstacle {row['obstacle_no']}{told}"
     return f"Track {row['track_no']}"
 
 

@@ -8,6 +8,7 @@ is a row to guess them from.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from shapely.geometry import mapping
 
 from geofield import schema
 from geofield.crs import LONLAT
-from geofield.errors import FormatError
+from geofield.errors import FormatError, FormatWarning
 from geofield.formats.antimeridian import split
 from geofield.formats.arrow import disk_hint, exact_geometry, to_lonlat
 from geofield.model import Dataset
@@ -105,7 +106,15 @@ def _own(series: Any) -> Column:
     kind = kinds.get(series.dtype.kind, "str")
     if kind != "str":
         return kind, list(series)
-    return kind, [None if pd.isna(value) else _cut(str(value)) for value in series]
+    texts = [None if pd.isna(value) else str(value) for value in series]
+    long = [text for text in texts if text is not None and len(text.encode()) > TEXT_BYTES]
+    if long:
+        warnings.warn(
+            f"Shapefiles cut text at {TEXT_BYTES} bytes: column {series.name!r} has longer ones.",
+            FormatWarning,
+            stacklevel=2,
+        )
+    return kind, [None if text is None else _cut(text) for text in texts]
 
 
 def identified(layer: ShapefileLayer, dataset: Dataset) -> ShapefileLayer:

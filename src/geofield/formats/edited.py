@@ -1,0 +1,109 @@
+"""What a person changed in a plan's tables, made whole before other formats tell of it.
+
+In an editor a shape moves, and the columns that say where it is and how large stay as they were;
+a drawn row has a shape and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import shapely
+
+from geofield import schema
+from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
+from geofield.formats.many import Joined
+from geofield.model import Dataset
+from geofield.model.evidence import Evidence
+from geofield.model.review import reconcile
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: Formats round coordinates: an area or length that differs by less is that of the shape, share.
+_SAME = 1e-5
+#: The same of positions, degrees: two centimetres.
+_SAME_DEG = 2e-7
+
+
+def made_whole(dataset: Dataset) -> Dataset:
+    """A dataset of which numbers, statuses, sizes and positions fit the shapes.
+
+    Obstacles are understood as a re-run understands them (`geofield.model.review.reconcile`),
+    against the record that the dataset carries; tables of several fields stay as they are.
+
+    Raises
+    ------
+    ObstacleError
+        When a radius or safety margin is negative or infinite.
+    """
+    if isinstance(dataset, Joined):
+        return dataset
+    tables = {name: _plain(table, name) for name, table in dataset.tables.items()}
+    if dataset.has(schema.OBSTACLES.name):
+        obstacles = tables[schema.OBSTACLES.name]
+        tables[schema.OBSTACLES.name] = _understood(obstacles, dataset)
+    if dataset.has(schema.FIELD.name):
+        tables[schema.FIELD.name] = _measured(tables[schema.FIELD.name], dataset)
+    return replace(dataset, tables=tables)
+
+
+def _understood(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
+    shapes = np.asarray(obstacles.geometry.to_numpy(), dtype=object)
+    if (shapely.get_dimensions(shapes) != 2).any() or shapely.is_empty(shapes).any():
+        return obstacles  # writers refuse it, with the row
+    written = Evidence.from_json(dataset.provenance.evidence).written
+    if written is None and _is_whole(obstacles, dataset):
+        return obstacles
+    return reconcile(obstacles, written, dataset.grid)[0]
+
+
+def _is_whole(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> bool:
+    """Whether every row has a number, a status, and the position of its shape."""
+    centres = shapely.get_coordinates(shapely.centroid(obstacles.geometry.to_numpy()))
+    lonlat = np.column_stack(transformer(dataset.crs, LONLAT).transform(*centres.T))
+    told = obstacles[["lon", "lat"]].to_numpy(dtype="float64", na_value=np.nan)
+    return bool(
+        obstacles["obstacle_no"].notna().all()
+        and obstacles["status"].isin(schema.STATUSES).all()
+        and np.allclose(told, lonlat, rtol=0.0, atol=_SAME_DEG)
+    )
+
+
+def _measured(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
+    """The outline with its own area and length, where a person moved it."""
+    shapes = np.asarray(field.geometry.to_numpy(), dtype=object)
+    rings = shapely.get_exterior_ring(shapely.get_geometry(shapes, 0))
+    now = {
+        "area_ha": ground_areas_m2(shapes, dataset.crs) / 10_000.0,
+        "perimeter_m": ground_lengths_m(rings, dataset.crs),
+    }
+    for name, values in now.items():
+        told = field[name].to_numpy(dtype="float64", na_value=np.nan)
+        if not np.allclose(told, values, rtol=_SAME, atol=0.0):
+            field = field.assign(**{name: values})
+    return field
+
+
+def _plain(table: gpd.GeoDataFrame, layer: str) -> gpd.GeoDataFrame:
+    """A table in which the user's own lists, objects and time spans are text, as files have it."""
+    text = {}
+    for name in schema.own_columns(schema.layer(layer), table):
+        values = table[name]
+        if values.dtype.kind == "m":
+            text[name] = values.astype("string")
+        elif values.dtype == object and not values.map(pd.api.types.is_scalar).all():
+            text[name] = values.map(_as_text)
+    return table.assign(**text) if text else table
+
+
+def _as_text(value: Any) -> Any:
+    """JSON of a list or object; other values as they are."""
+    if pd.api.types.is_scalar(value):
+        return value
+    plain = value.tolist() if isinstance(value, np.ndarray) else value
+    return json.dumps(plain, ensure_ascii=False, default=str)
