@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 from formats_compare import assert_same_table
@@ -15,8 +16,10 @@ from formats_plan import NAME, make_dataset
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.formats import FORMATS, read_dataset, validate_file, write_dataset
+from geofield.formats.antimeridian import joined, split
 from geofield.formats.names import cut_name
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
@@ -216,3 +219,10 @@ def test_options_for_one_format_alone(dataset, tmp_path):
     assert list((tmp_path / "shapefile").glob("*_guidancepath.shp"))
     with pytest.raises(FormatError, match="Did you mean 'profile'"):
         write_dataset(dataset, tmp_path / "x", ["shapefile"], options={"shapefile": {"profil": 1}})
+
+
+def test_what_ends_just_behind_the_180th_meridian_ends_there_again():
+    """Half a millionth of a degree is five centimetres."""
+    line = shapely.LineString([(179.9999, -17.0), (-179.9999995, -17.0)])
+    (back,) = joined(split(np.array([line])), LONLAT)
+    assert shapely.get_coordinates(back)[-1][0] == pytest.approx(180.0000005, abs=1e-9)

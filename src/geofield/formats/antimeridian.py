@@ -18,8 +18,8 @@ from pyproj import CRS
 _WIDEST_DEG = 180.0
 _EAST = shapely.box(0.0, -90.0, 180.0, 90.0)
 _WEST = shapely.box(180.0, -90.0, 360.0, 90.0)
-#: Cut edges may differ in their last digits, degrees: less than 0.1 mm, but not of rounded files.
-_SNAP_DEG = 1e-6
+#: Cut edges may differ in their last digits, degrees: by a centimetre, as of seven decimals.
+_SNAP_DEG = 1.1e-7
 
 
 def unwrapped(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
