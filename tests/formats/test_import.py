@@ -152,3 +152,19 @@ def test_rings_of_two_points_are_left_out_and_that_is_said(tmp_path):
     found, said, _ = imported(tmp_path, tmp_path / "two.geojson")
     assert found["rows"] == {"field": 1}
     assert "1 without a shape that can be" in said
+
+
+@pytest.mark.parametrize("name", ["A.GEOJSON", "A.PARQUET", "A.FGB", "A.SHP"])
+def test_folders_of_files_in_capitals(tmp_path, name):
+    """As sticks with old file systems have them."""
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    frame = gpd.GeoDataFrame(geometry=[BOX], crs="EPSG:32633")
+    if name.endswith("PARQUET"):
+        frame.to_parquet(folder / name)
+    else:
+        suffix = name[1:].lower()
+        frame.to_file(folder / f"a{suffix}")
+        for part in list(folder.iterdir()):
+            part.rename(folder / part.name.upper())
+    assert len(read_dataset(folder).table("field")) == 1

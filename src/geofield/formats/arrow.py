@@ -148,11 +148,10 @@ def arrow_table(
     *,
     lonlat: bool = False,
     geometry_name: str = "geom",
-    extras: bool = True,
 ) -> pa.Table:
     """A layer's table as Arrow, geometry as WKB in the last column.
 
-    `lonlat` reprojects to WGS 84; without `extras` only the schema's columns are there.
+    The user's own columns stand behind those of the schema; `lonlat` reprojects to WGS 84.
     """
     import pyarrow as pa
 
@@ -160,13 +159,12 @@ def arrow_table(
     if lonlat and len(geometry):
         geometry = split(to_lonlat(geometry, CRS(table.crs)))
     columns = {column.name: arrow_values(column, table[column.name]) for column in of.columns}
-    if extras:
-        columns |= {name: _extra_values(table[name]) for name in schema.own_columns(of, table)}
+    columns |= {name: _own_values(table[name]) for name in schema.own_columns(of, table)}
     columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
     return pa.table(columns)
 
 
-def _extra_values(series: Any) -> pa.Array:
+def _own_values(series: Any) -> pa.Array:
     import pandas as pd
     import pyarrow as pa
 

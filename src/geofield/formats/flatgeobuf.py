@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.formats.arrow import write_layer
-from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_vector
 from geofield.formats.origin import lineage
 from geofield.model import Dataset
 
@@ -27,5 +27,5 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
 
 def read(path: Path) -> Dataset:
     """The dataset in a FlatGeobuf file, or in all of a folder."""
-    files = sorted(path.glob("*.fgb")) if path.is_dir() else [path]
+    files = files_in(path, ".fgb")
     return read_foreign([RawLayer(file.stem, read_vector(file)) for file in files], path)

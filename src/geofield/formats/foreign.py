@@ -27,7 +27,7 @@ from geofield.strangers import check_vector
 if TYPE_CHECKING:
     import geopandas as gpd
 
-__all__ = ["RawLayer", "layer_names", "read_foreign", "read_vector"]
+__all__ = ["RawLayer", "files_in", "layer_names", "read_foreign", "read_vector"]
 
 
 #: Of GDAL's opening a file that has no layer, of dates that are none, of systems in pieces.
@@ -96,6 +96,13 @@ def _mended(path: Path, layer: str | None) -> Any:
         stacklevel=4,
     )
     return frame
+
+
+def files_in(path: Path, *suffixes: str) -> list[Path]:
+    """A file alone, or all files of a folder with one of the suffixes (lower case)."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
 
 
 def layer_names(path: Path) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 from pyproj import CRS
 
 from geofield.formats.arrow import write_layer
-from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_vector
 from geofield.formats.origin import lineage
 from geofield.model import Dataset
 
@@ -27,5 +27,5 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
 
 def read(path: Path, *, crs: CRS | None = None) -> Dataset:
     """The dataset in a GeoJSON file, or in all GeoJSON files of a folder."""
-    files = sorted(path.glob("*.*json")) if path.is_dir() else [path]
+    files = files_in(path, ".geojson", ".json")
     return read_foreign([RawLayer(file.stem, read_vector(file)) for file in files], path, crs=crs)

@@ -20,7 +20,7 @@ from geofield.crs import parse_crs
 from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.arrow import layer_batches
-from geofield.formats.foreign import RawLayer, read_foreign
+from geofield.formats.foreign import RawLayer, files_in, read_foreign
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -105,9 +105,8 @@ def read(path: Path) -> Dataset:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     layers, record = [], None
-    for file in files:
+    for file in files_in(path, ".parquet"):
         try:
             text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
             frame = gpd.read_parquet(file)

@@ -110,10 +110,10 @@ def _schema(layer: Layer, datasets: Sequence[Dataset]) -> ET.Element:
 
 def _own_type(values: pd.Series[Any]) -> str:
     """The type of a user's column; KML's whole numbers have 32 bits, longer ones are text."""
-    kind = values.dtype.kind
-    if kind in "iu":
-        return "int" if (values.abs() < 2**31).fillna(value=True).all() else "string"
-    return "double" if kind == "f" else "string"
+    kind = schema.own_type(values)
+    if kind == "int" and (values.abs() >= 2**31).any():
+        return "string"
+    return _TYPES[kind]
 
 
 def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from pyproj import CRS
 
 from geofield.errors import FormatError
-from geofield.formats.foreign import RawLayer, read_foreign, read_vector
+from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_vector
 from geofield.formats.many import last_imagery_day, owner_of
 from geofield.formats.shapefile_layer import (
     ShapefileLayer,
@@ -55,8 +55,7 @@ def write(
 
 def read(path: Path, *, crs: CRS | None = None) -> Dataset:
     """The dataset in a Shapefile, or in all Shapefiles of a folder."""
-    files = sorted(path.glob("*.[sS][hH][pP]")) if path.is_dir() else [path]
-    return read_foreign([_raw(file) for file in files], path, crs=crs)
+    return read_foreign([_raw(file) for file in files_in(path, ".shp")], path, crs=crs)
 
 
 def _raw(file: Path) -> RawLayer:

@@ -102,8 +102,7 @@ def _short(name: str, taken: Iterable[str]) -> str:
 
 def _own(series: Any) -> Column:
     """A user's own column: whole numbers, numbers, or what can be read as text."""
-    kinds: dict[str, schema.ColumnType] = {"i": "int", "u": "int", "f": "float"}
-    kind = kinds.get(series.dtype.kind, "str")
+    kind = schema.own_type(series)
     if kind != "str":
         return kind, list(series)
     texts = [None if pd.isna(value) else str(value) for value in series]

@@ -26,7 +26,7 @@ from geofield.schema.layers import (
     layer,
 )
 from geofield.schema.meanings import meaning, unit_in_words
-from geofield.schema.tables import conform, empty, own_columns, table
+from geofield.schema.tables import conform, empty, own_columns, own_type, table
 
 __all__ = [
     "ALTERNATIVES",
@@ -54,6 +54,7 @@ __all__ = [
     "layer",
     "meaning",
     "own_columns",
+    "own_type",
     "table",
     "unit_in_words",
 ]

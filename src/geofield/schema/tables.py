@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from geofield.errors import FormatError
-from geofield.schema.columns import Layer
+from geofield.schema.columns import ColumnType, Layer
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    import pandas as pd
     from pyproj import CRS
 
 
@@ -58,6 +59,12 @@ def own_columns(of: Layer, frame: gpd.GeoDataFrame) -> list[str]:
     """The columns that the user added to a layer."""
     known = {*of.column_names, frame.geometry.name, "geometry", "fid"}
     return [name for name in frame.columns if name not in known]
+
+
+def own_type(values: pd.Series[Any]) -> ColumnType:
+    """What the values of a user's column are: whole numbers, numbers, or else text."""
+    kinds: dict[str, ColumnType] = {"i": "int", "u": "int", "f": "float"}
+    return kinds.get(values.dtype.kind, "str")
 
 
 def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.GeoDataFrame:

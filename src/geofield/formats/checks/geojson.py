@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import shapely
 
+from geofield.formats.foreign import files_in
 from geofield.formats.validation import Finding
 
 
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a GeoJSON file, or in all of a folder."""
-    for file in sorted(path.glob("*.*json")) if path.is_dir() else [path]:
+    for file in files_in(path, ".geojson", ".json"):
         yield from _check_file(file)
 
 

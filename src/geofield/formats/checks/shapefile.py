@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from geofield.formats.foreign import files_in
 from geofield.formats.validation import Finding
 
 _PARTS = {
@@ -18,7 +19,7 @@ _SHAPE_FILE_CODE = b"\x00\x00\x27\x0a"
 
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a Shapefile, or in all of a folder."""
-    for file in sorted(path.glob("*.[sS][hH][pP]")) if path.is_dir() else [path]:
+    for file in files_in(path, ".shp"):
         beside = {other.name.lower() for other in file.parent.iterdir()}
         for suffix, (level, what) in _PARTS.items():
             if f"{file.stem}{suffix}".lower() not in beside:
