@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -16,7 +17,7 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-from formats_plan import UTM, X0, Y0, make_dataset
+from formats_plan import NAME, UTM, X0, Y0, make_dataset
 from pyproj import CRS, Transformer
 
 from geofield import theme
@@ -263,3 +264,27 @@ def test_what_a_person_edited_is_what_others_read(plan_file, tmp_path):
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report["field"]["area_ha"] == pytest.approx(field.area.iloc[0] / 1e4, rel=2e-3)
     assert field["area_ha"].iloc[0] == pytest.approx(report["field"]["area_ha"], abs=1e-4)
+
+
+def test_a_name_and_id_that_a_person_emptied(plan_file, tmp_path):
+    edited = tmp_path / "field.gpkg"
+    edited.write_bytes(plan_file.read_bytes())
+    outline = gpd.read_file(edited, layer="field").assign(name=None, field_id=None)
+    outline.to_file(edited, layer="field", driver="GPKG")
+    done = geofield("export", edited, "-f", "kml,fiboa", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    names = ET.parse(tmp_path / "out" / "field.kml").getroot().iter(f"{KML}Placemark")
+    assert next(names).findtext(f"{KML}name") == NAME
+    fiboa = json.loads((tmp_path / "out" / "fiboa" / "field.geojson").read_text())
+    assert re.fullmatch(r"35\.\d+N33\.\d+E", fiboa["features"][0]["id"])
+
+
+def test_whose_a_field_is_comes_back_from_a_shapefile(plan_file, tmp_path):
+    owned = tmp_path / "field.gpkg"
+    owned.write_bytes(plan_file.read_bytes())
+    outline = gpd.read_file(owned, layer="field").assign(customer="M\u00fcller & S\u00f6hne")
+    outline.to_file(owned, layer="field", driver="GPKG")
+    done = geofield("export", owned, "-f", "shapefile", "--farm", "Ost", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    back = read_dataset(tmp_path / "out" / "shapefile").table("field").iloc[0]
+    assert (back["customer"], back["farm"]) == ("M\u00fcller & S\u00f6hne", "Ost")

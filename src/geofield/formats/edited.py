@@ -17,7 +17,7 @@ import shapely
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
 from geofield.formats.many import Joined
-from geofield.model import Dataset
+from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
 from geofield.model.review import reconcile
 
@@ -31,7 +31,7 @@ _SAME_DEG = 2e-7
 
 
 def made_whole(dataset: Dataset) -> Dataset:
-    """A dataset of which numbers, statuses, sizes and positions fit the shapes.
+    """A dataset of which names, numbers, statuses, sizes and positions fit the shapes.
 
     Obstacles are understood as a re-run understands them (`geofield.model.review.reconcile`),
     against the record that the dataset carries; tables of several fields stay as they are.
@@ -48,7 +48,7 @@ def made_whole(dataset: Dataset) -> Dataset:
         obstacles = tables[schema.OBSTACLES.name]
         tables[schema.OBSTACLES.name] = _understood(obstacles, dataset)
     if dataset.has(schema.FIELD.name):
-        tables[schema.FIELD.name] = _measured(tables[schema.FIELD.name], dataset)
+        tables[schema.FIELD.name] = _measured(_named(tables[schema.FIELD.name], dataset), dataset)
     return replace(dataset, tables=tables)
 
 
@@ -59,7 +59,8 @@ def _understood(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFra
     written = Evidence.from_json(dataset.provenance.evidence).written
     if written is None and _is_whole(obstacles, dataset):
         return obstacles
-    return reconcile(obstacles, written, dataset.grid)[0]
+    whole = reconcile(obstacles, written, dataset.grid)[0]
+    return whole.assign(kind=whole["kind"].where(whole["kind"].notna(), "other"))
 
 
 def _is_whole(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> bool:
@@ -72,6 +73,21 @@ def _is_whole(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> bool:
         and obstacles["status"].isin(schema.STATUSES).all()
         and np.allclose(told, lonlat, rtol=0.0, atol=_SAME_DEG)
     )
+
+
+def _named(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
+    """The outline with a name and an id, where a person emptied them."""
+    for name in ("name", "field_id"):
+        missing = field[name].isna()
+        if missing.any():
+            shapes = shapely.get_geometry(field.geometry[missing].to_numpy(), 0)
+            texts = field[name].to_numpy(dtype=object, copy=True)
+            texts[missing] = [
+                dataset.name if name == "name" else Field(shape, dataset.crs).field_id
+                for shape in shapes
+            ]
+            field = field.assign(**{name: texts})
+    return field
 
 
 def _measured(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:

@@ -22,6 +22,9 @@ from geofield.formats.shapefile_profiles import GENERIC, PROFILES
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
+#: The user's columns by those that the generic profile makes of them.
+_OWNER = {"CLIENT": "customer", "FARM": "farm"}
+
 
 def write(
     datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
@@ -70,5 +73,7 @@ def _raw(file: Path) -> RawLayer:
     back = {column.shapefile: column.name for column in layer.columns}
     if not set(frame.columns) >= set(back):
         return RawLayer(file.stem, frame)
-    frame = frame.drop(columns=[c for c in ("CLIENT", "FARM", "FIELD") if c in frame.columns])
-    return RawLayer(layer.name, frame.rename(columns=back))
+    # Whose the field is stood in the user's own columns, or was said for the export.
+    back |= {name: own for name, own in _OWNER.items() if name in frame and frame[name].any()}
+    frame = frame.rename(columns=back).drop(columns=[*_OWNER, "FIELD"], errors="ignore")
+    return RawLayer(layer.name, frame)
