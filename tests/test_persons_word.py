@@ -421,3 +421,62 @@ def test_a_status_chosen_before_stands_when_the_shape_is_changed_later(folder: P
     after, written = reconcile(moved, written)
     assert set(after["status"]) == {"possible"}
     assert all(row.kept for row in written.rows)
+
+
+def test_obstacles_of_several_parts(folder: Path, made: SimulatedField) -> None:
+    """What an editor merged: the parts stay as they are, neither grown again nor made round."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    assert before["buffer_m"][2] > 0
+    beside = shapely.box(0, 0, 4, 2)
+    west, south, *_ = before.geometry[2].bounds
+    both = shapely.MultiPolygon([before.geometry[2], translate(beside, west - 9, south)])
+
+    def merge(table: Frame) -> Frame:
+        table.loc[at(table, 2), "geometry"] = both
+        return table
+
+    rewritten(file, "obstacles", merge)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    assert len(after) == len(before) + 1
+    assert after.geometry[2].equals_exact(before.geometry[2], 1e-6)
+    added = after.loc[len(before) + 1]
+    assert added.geometry.area == pytest.approx(8.0)
+    assert (added["status"], added["buffer_m"]) == ("added", before["buffer_m"][2])
+    assert np.isnan(added["radius_m"])
+
+
+def test_columns_in_another_case_are_the_same(folder: Path, made: SimulatedField) -> None:
+    """For SQL `STATUS` is `status`; some programs write all names in capitals."""
+    file = folder / "out/field.gpkg"
+
+    def capitals(table: Frame) -> Frame:
+        table.loc[at(table, 3), "status"] = "rejected"
+        table["Note"] = "mine"
+        return table.rename(columns={n: n.upper() for n in ("status", "radius_m", "obstacle_no")})
+
+    rewritten(file, "obstacles", capitals)
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    assert after["status"][3] == "rejected"
+    assert set(after["Note"]) == {"mine"}
+    assert "STATUS" not in after
+
+
+def test_an_empty_column_stays(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+
+    def emptied(table: Frame) -> Frame:
+        return table.assign(
+            crop=pd.array([None], "string"), dose=[np.nan], sown=pd.to_datetime([None])
+        )
+
+    rewritten(file, "field", emptied)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+    table = gpd.read_file(file, layer="field")
+    assert table[["crop", "dose", "sown"]].isna().all(axis=None)
+    assert (table["dose"].dtype.kind, table["sown"].dtype.kind) == ("f", "M")
+    assert plan_in(folder) == plan_in(folder)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 import shapely
 
 from geofield import schema
@@ -52,13 +54,17 @@ def field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[s
         imagery=text("imagery"),
         imagery_date=text("imagery_date") or None,
         licence=text("licence"),
-        own=tuple(
-            (name, rows[name].iloc[0])
-            for name in schema.own_columns(schema.FIELD, rows)
-            if rows[name].notna().iloc[0]
-        ),
+        own=tuple((name, _own(rows[name])) for name in schema.own_columns(schema.FIELD, rows)),
         alternatives=_alternatives(dataset.tables.get(schema.ALTERNATIVES.name)),
     )
+
+
+def _own(values: pd.Series[Any]) -> Any:
+    """A value of the user's own; a missing one is of its column's type, and equal to itself."""
+    value = values.iloc[0]
+    if not values.isna().iloc[0]:
+        return value
+    return math.nan if values.dtype.kind in "iuf" else pd.NaT if values.dtype.kind == "M" else None
 
 
 def _alternatives(rows: gpd.GeoDataFrame | None) -> tuple[Alternative, ...]:

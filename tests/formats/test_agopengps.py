@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 
 import geopandas as gpd
 import numpy as np
@@ -114,8 +115,6 @@ def test_no_fault_by_the_rules(folder):
 
 
 def test_wrong_headings_are_found(folder, tmp_path):
-    import shutil
-
     broken = tmp_path / "Field"
     shutil.copytree(folder, broken)
     content = lines(broken / "Boundary.txt")
@@ -138,6 +137,15 @@ def test_a_folder_without_the_file_says_so(tmp_path):
     (tmp_path / "Boundary.txt").write_text("$Boundary\n")
     with pytest.raises(FormatError, match="0 AgOpenGPS fields"):
         read_dataset(tmp_path)
+
+
+def test_a_count_below_zero_is_refused(folder, tmp_path):
+    broken = tmp_path / "Field"
+    shutil.copytree(folder, broken)
+    track = ["A", "0", "0,0", "0,10", "0", "2", "True", "-8"]
+    (broken / "TrackLines.txt").write_text("\r\n".join(["$TrackLines", *track]))
+    with pytest.raises(FormatError, match="track 1"):
+        read_dataset(broken)
 
 
 @given(st.floats(-70, 70), st.floats(-179, 179), st.floats(-3000, 3000), st.floats(-3000, 3000))

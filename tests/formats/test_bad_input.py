@@ -223,6 +223,20 @@ def test_text_where_numbers_belong(dataset, tmp_path):
         read_dataset(tmp_path / "field.gpkg")
 
 
+@pytest.mark.parametrize(("name", "column"), [
+    ("gpkg", "Name"), ("gpkg", "geom"), ("geojson", "Name"), ("flatgeobuf", "Name"),
+    ("geoparquet", "bbox"),
+])  # fmt: skip
+def test_a_persons_column_beside_one_of_ours_like_it(dataset, tmp_path, name, column):
+    field = dataset.tables["field"].assign(**{column: "theirs"})
+    tables = {**dataset.tables, "field": field}
+    write_dataset(dataclasses.replace(dataset, tables=tables), tmp_path, [name])
+    path = tmp_path / "field.gpkg" if name == "gpkg" else tmp_path / name
+    back = read_dataset(path).table("field")
+    assert back["name"].iloc[0] == field["name"].iloc[0]
+    assert back[f"{column}_2"].iloc[0] == "theirs"
+
+
 def test_edits_that_qgis_has_saved_but_not_folded_in_are_read(dataset, tmp_path):
     """While QGIS is open, what a person saved lies in the write-ahead log beside the file."""
     write_dataset(dataset, tmp_path, ["gpkg"])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -23,6 +23,7 @@ from geofield import schema
 from geofield.crs import LONLAT, authority_name, reproject
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import split
+from geofield.formats.names import unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -148,10 +149,13 @@ def arrow_table(
     *,
     lonlat: bool = False,
     geometry_name: str = "geom",
+    reserved: Iterable[str] = (),
 ) -> pa.Table:
     """A layer's table as Arrow, geometry as WKB in the last column.
 
-    The user's own columns stand behind those of the schema; `lonlat` reprojects to WGS 84.
+    The user's own columns stand behind those of the schema; one with a name of the schema in
+    large or small letters, or with a `reserved` one, has a number behind it. `lonlat` reprojects
+    to WGS 84.
     """
     import pyarrow as pa
 
@@ -159,7 +163,10 @@ def arrow_table(
     if lonlat and len(geometry):
         geometry = split(to_lonlat(geometry, CRS(table.crs)))
     columns = {column.name: arrow_values(column, table[column.name]) for column in of.columns}
-    columns |= {name: _own_values(table[name]) for name in schema.own_columns(of, table)}
+    taken = {*columns, geometry_name, *reserved}
+    for name in schema.own_columns(of, table):
+        # A person's `Name` is not our `name`, but GDAL and SQLite take one for the other.
+        columns[unlike(str(name), taken, "_")] = _own_values(table[name])
     columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
     return pa.table(columns)
 

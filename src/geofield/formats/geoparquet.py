@@ -37,7 +37,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     for layer in dataset.layers():
         path = folder / "geoparquet" / f"{layer.name}.parquet"
         path.parent.mkdir(exist_ok=True)
-        batches = layer_batches(dataset, layer, geometry_name=GEOMETRY)
+        batches = layer_batches(dataset, layer, geometry_name=GEOMETRY, reserved=("bbox",))
         record = {_ORIGIN_KEY: origin.to_json(dataset)}
         write_geoparquet(path, batches, dataset.crs, [layer.geometry], record)
         written.append(path)

@@ -125,7 +125,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             f"{path.name}: layer {of.name!r} is no longer in {crs.name}.",
             hint="Export the layer in the CRS of the other layers, then repeat.",
         )
-    frame = frame.set_crs(crs, allow_override=True)
+    frame = _as_spelled(of, frame.set_crs(crs, allow_override=True))
     absent = frame.geometry.isna() | frame.geometry.is_empty
     if absent.any():
         warnings.warn(
@@ -140,17 +140,24 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     return schema.conform(of, frame, extras=True)
 
 
+def _as_spelled(of: schema.Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The layer's columns as it spells them: for SQL, and so for editors, case is no difference."""
+    known = {name.lower(): name for name in of.column_names if name not in frame.columns}
+    names = {name: known[str(name).lower()] for name in frame if str(name).lower() in known}
+    return frame.rename(columns=names) if names else frame
+
+
 def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """Obstacles of several parts as several obstacles; the further parts have no number yet."""
+    """Obstacles of several parts as several obstacles; the further parts have the number still.
+
+    What they are of is known by it: a size in the row is that of the whole, and none to draw
+    the part by.
+    """
     import shapely
 
     if not (shapely.get_num_geometries(frame.geometry.to_numpy()) > 1).any():
         return frame
-    apart = frame.explode(index_parts=False, ignore_index=False)
-    further = apart.index.duplicated()
-    numbers = apart["obstacle_no"].astype("Int64")
-    numbers[further] = None
-    return apart.assign(obstacle_no=numbers).reset_index(drop=True)
+    return frame.explode(index_parts=False, ignore_index=True)
 
 
 def _origin(path: Path) -> origin.Origin | None:

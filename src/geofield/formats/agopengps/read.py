@@ -147,11 +147,14 @@ def _lines(folder: Path) -> list[tuple[str, np.ndarray]]:
     try:
         while position < len(lines):
             name, _, start, end, _, mode, _, count = lines[position : position + 8]
-            points = [_numbers(row)[:2] for row in lines[position + 8 : position + 8 + int(count)]]
+            end_row = position + 8 + int(count)
+            if not position + 8 <= end_row <= len(lines):
+                raise ValueError
+            points = [_numbers(row)[:2] for row in lines[position + 8 : end_row]]
             if int(mode) != _CURVE or len(points) < 2:
                 points = [_numbers(start)[:2], _numbers(end)[:2]]
             found.append((name, np.array(points)))
-            position += 8 + int(count)
+            position = end_row
     except ValueError as error:
         raise FormatError(f"{path} breaks off or is damaged in track {len(found) + 1}.") from error
     return found
