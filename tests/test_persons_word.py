@@ -16,6 +16,7 @@ from typing import TypeAlias
 import geopandas as gpd
 import numpy as np
 import pandas as pd
+import pyogrio
 import pytest
 import shapely
 from shapely.affinity import translate
@@ -480,3 +481,72 @@ def test_an_empty_column_stays(folder: Path, made: SimulatedField) -> None:
     assert table[["crop", "dose", "sown"]].isna().all(axis=None)
     assert (table["dose"].dtype.kind, table["sown"].dtype.kind) == ("f", "M")
     assert plan_in(folder) == plan_in(folder)
+
+
+def test_what_a_person_keeps_beside_the_plan(folder: Path, made: SimulatedField) -> None:
+    """Layers, tables, styles and projects of theirs in the plan's file outlive every stage."""
+    file = folder / "out/field.gpkg"
+    shape = plan_in(folder).field.polygon
+    places = [shape.centroid, shape.representative_point()]
+    lonlat = gpd.GeoDataFrame(
+        {"what": ["stone", "é"]}, geometry=places, crs=plan_in(folder).field.crs
+    )
+    lonlat.to_crs("EPSG:3035").to_file(file, layer='my "stones"', driver="GPKG")
+    pyogrio.write_dataframe(pd.DataFrame({"day": [1, 2, 3]}), file, layer="diary", driver="GPKG")
+    with closing(sqlite3.connect(file)) as connection, connection:
+        for layer, name, default in (
+            ("obstacles", "Mine", 1),
+            ('my "stones"', "S", 1),
+            ("field", "F", 0),
+        ):
+            connection.execute(
+                "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
+                "f_geometry_column, styleName, styleQML, useAsDefault) "
+                "VALUES ('', '', ?, 'geom', ?, '<qgis/>', ?)",
+                (layer, name, default),
+            )
+        connection.execute(
+            "UPDATE layer_styles SET useAsDefault = styleName = 'Mine' "
+            "WHERE f_table_name = 'obstacles'"
+        )
+        connection.execute("INSERT INTO qgis_projects VALUES ('harvest', x'00', x'01')")
+    before = dump(file)
+    told = run(folder, made, "--overwrite")
+    assert "is not geofield's and takes no part in the plan" in told
+    geofield("tracks", file, "--spacing", 5, "-o", file)
+    assert dump(file) == before
+    stones = gpd.read_file(file, layer='my "stones"', bbox=tuple(lonlat.to_crs(3035).total_bounds))
+    assert stones["what"].tolist() == ["stone", "é"]
+    # Other programs can go on with them: the index and its triggers are there.
+    pyogrio.write_dataframe(lonlat.to_crs(3035), file, layer='my "stones"', append=True)
+    assert len(gpd.read_file(file, layer='my "stones"')) == 4
+    with closing(sqlite3.connect(file)) as connection:
+        styles = connection.execute(
+            "SELECT f_table_name, styleName, useAsDefault FROM layer_styles "
+            "WHERE f_table_name IN ('field', 'obstacles', 'my \"stones\"') ORDER BY 1, 2"
+        ).fetchall()
+        assert connection.execute("SELECT name FROM qgis_projects").fetchall() == [
+            ("field",),
+            ("harvest",),
+        ]
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert not connection.execute("PRAGMA foreign_key_check").fetchall()
+    assert styles == [
+        ("field", "F", 0), ("field", "Field", 1), ('my "stones"', "S", 1),
+        ("obstacles", "Mine", 1), ("obstacles", "Obstacles", 0),
+    ]  # fmt: skip
+
+
+def dump(file: Path) -> dict[str, list[object]]:
+    """All that a file holds beside the plan."""
+    registers = ("contents", "extensions", "geometry_columns", "ogr_contents")
+    theirs = "WHERE table_name IN ('diary', 'my \"stones\"')"
+    with closing(sqlite3.connect(file)) as connection:
+        found = {
+            table: connection.execute(f'SELECT * FROM "{table}"').fetchall()
+            for table in ('my ""stones""', "diary", 'rtree_my ""stones""_geom')
+        }
+        for register in registers:
+            query = f"SELECT * FROM gpkg_{register} {theirs} ORDER BY 1"
+            found[register] = connection.execute(query).fetchall()
+    return found

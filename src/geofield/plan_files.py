@@ -25,10 +25,12 @@ def save_plan(
     """Write a plan as one GeoPackage.
 
     `output` may be `read_from`, the GeoPackage that the plan was read from: a stage that adds to a
-    file replaces it in one step. `overwrite` allows to replace another. The project shows the
-    `picture`, by default that which belongs to `read_from`.
+    file replaces it in one step. `overwrite` allows to replace another. What a person keeps in the
+    replaced file beside its plan comes along. The project shows the `picture`, by default that
+    which belongs to `read_from`.
     """
     from geofield.formats import write_dataset
+    from geofield.formats.gpkg_guests import bring_guests
     from geofield.formats.gpkg_read import scene_beside
 
     if output.suffix.lower() != ".gpkg":
@@ -44,5 +46,7 @@ def save_plan(
         # The project goes on showing the picture that lies there.
         dataset = replace(dataset, scene_path=picture)
     with staged_folder(output.parent, overwrite=overwrite or same) as staging:
-        keep_earlier(output, staging)
+        earlier = keep_earlier(output, staging)
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
+        if earlier is not None:
+            bring_guests(earlier, staging / output.name)

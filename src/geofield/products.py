@@ -19,6 +19,7 @@ from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
+from geofield.formats.gpkg_guests import bring_guests
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.staging import staged_folder
@@ -55,8 +56,7 @@ def write_products(
     ):
         written: list[Path] = []
         shown = {"scene": scene}
-        if "gpkg" in asked:
-            keep_earlier(folder / PLAN_FILE, staging)
+        earlier = keep_earlier(folder / PLAN_FILE, staging) if "gpkg" in asked else None
         if scene is not None:
             written += write_scene(dataset, staging, stem="", options=shown)
             dataset = replace(dataset, scene_path=written[0])
@@ -67,6 +67,8 @@ def write_products(
         written += write_dataset(
             dataset, staging, asked, overwrite=True, options=options, tell_drops=not told
         )
+        if earlier is not None:
+            bring_guests(earlier, staging / PLAN_FILE)
         written += drawn.result()
         facts = {"timings_s": timings_s or {}, "formats": asked, "changes": changes}
         written += write_report(dataset, staging, stem="", options=facts)

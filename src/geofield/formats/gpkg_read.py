@@ -49,7 +49,7 @@ def read(path: Path) -> Dataset:
     for name in layers:
         if name not in known:
             warnings.warn(
-                f"{path.name}: layer {name!r} is not geofield's and is left out.",
+                f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",
                 FormatWarning,
                 stacklevel=2,
             )

@@ -18,13 +18,16 @@ def earlier_of(plan_file: Path) -> Path:
     return plan_file.with_name(plan_file.name + SUFFIX)
 
 
-def keep_earlier(plan_file: Path, staging: Path) -> None:
+def keep_earlier(plan_file: Path, staging: Path) -> Path | None:
     """Put the plan that is there into a staging folder, under its name as the earlier one.
 
-    It comes into place together with what replaces it.
+    It comes into place together with what replaces it. Returns the copy, None without a plan.
     """
-    if plan_file.is_file():
-        copy_whole(plan_file, staging / earlier_of(plan_file).name)
+    if not plan_file.is_file():
+        return None
+    earlier = staging / earlier_of(plan_file).name
+    copy_whole(plan_file, earlier)
+    return earlier
 
 
 def undo(plan_file: Path) -> None:

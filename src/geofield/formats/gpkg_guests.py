@@ -1,0 +1,176 @@
+"""What a person keeps in a plan's GeoPackage beside the plan: layers, tables, styles, projects.
+
+A plan is written as a new file. What in the file before it is not geofield's comes along as it
+was, row for row and byte for byte.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import warnings
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from geofield import schema
+from geofield.errors import FormatWarning
+
+_OURS = {layer.name for layer in schema.LAYERS} | {"layer_styles"}
+#: Tables of the standard and of GDAL in which a layer has rows, and the column of its name.
+_REGISTERS = {
+    "gpkg_contents": "table_name",
+    "gpkg_geometry_columns": "table_name",
+    "gpkg_extensions": "table_name",
+    "gpkg_ogr_contents": "table_name",
+    "gpkg_data_columns": "table_name",
+}
+
+
+def bring_guests(earlier: Path, plan_file: Path) -> None:
+    """Copy what is not geofield's from an earlier plan's file into the new one.
+
+    Layers with features or attributes alone come with their reference system, index and triggers;
+    styles and projects where the new file has none of the name. A style that a person made the
+    default of a layer stays so. Files that are no plan bring nothing.
+
+    Warns
+    -----
+    FormatWarning
+        With the names of layers that cannot come along.
+    """
+    with closing(sqlite3.connect(plan_file, isolation_level=None, uri=True)) as connection:
+        connection.execute("PRAGMA synchronous = OFF")
+        connection.execute("ATTACH ? AS old", (f"{earlier.absolute().as_uri()}?mode=ro",))
+        try:
+            contents = dict(
+                connection.execute("SELECT table_name, data_type FROM old.gpkg_contents")
+            )
+        except sqlite3.DatabaseError:
+            return  # not a GeoPackage
+        if schema.FIELD.name not in contents:
+            return
+        left = []
+        for name in sorted(contents.keys() - _OURS):
+            connection.execute("BEGIN")
+            try:
+                _bring_layer(connection, name, contents[name])
+                connection.execute("COMMIT")
+            except sqlite3.DatabaseError:
+                connection.execute("ROLLBACK")
+                left.append(name)
+        _bring_styles(connection)
+        _bring_projects(connection)
+    if left:
+        warnings.warn(
+            f"{plan_file.name}: {', '.join(left)} could not be taken along from the file before. "
+            f"{earlier.name} still has it.",
+            FormatWarning,
+            stacklevel=2,
+        )
+
+
+def _bring_layer(connection: sqlite3.Connection, name: str, kind: str) -> None:
+    """One layer with all that belongs to it; an error of SQLite's where that cannot be."""
+    if kind not in ("features", "attributes"):
+        raise sqlite3.DatabaseError(f"{kind} of {name}")
+    _bring_system(connection, name)
+    _create(connection, "type IN ('table', 'view') AND name = ?", name)
+    if not _is_view(connection, name):
+        _fill(connection, name)
+    for index in _indexes(connection, name):
+        _create(connection, "type = 'table' AND name = ?", index)
+        _fill(connection, index)
+    _create(connection, "type IN ('index', 'trigger') AND tbl_name = ?", name)
+    for register, column in _REGISTERS.items():
+        if _has(connection, "old", register) and _has(connection, "main", register):
+            # Triggers may have counted the rows already.
+            connection.execute(f'DELETE FROM main."{register}" WHERE {column} = ?', (name,))  # noqa: S608
+            _fill(connection, register, f"WHERE {column} = ?", name)
+
+
+def _bring_system(connection: sqlite3.Connection, name: str) -> None:
+    """The layer's reference system, where the new file lacks it."""
+    query = (
+        "SELECT upper(organization), organization_coordsys_id, definition "
+        "FROM {}.gpkg_spatial_ref_sys WHERE srs_id = ?"
+    )
+    for (number,) in connection.execute(
+        "SELECT srs_id FROM old.gpkg_contents WHERE table_name = ? AND srs_id IS NOT NULL", (name,)
+    ).fetchall():
+        old, new = (
+            connection.execute(query.format(of), (number,)).fetchone() for of in ("old", "main")
+        )
+        if new is None:
+            _fill(connection, "gpkg_spatial_ref_sys", "WHERE srs_id = ?", number)
+        elif old[:2] != new[:2] or (old[0] not in ("EPSG", "NONE") and old != new):
+            raise sqlite3.DatabaseError(f"another reference system has the number {number}")
+
+
+def _indexes(connection: sqlite3.Connection, name: str) -> Iterator[str]:
+    """The spatial indexes of a layer."""
+    for (column,) in connection.execute(
+        "SELECT column_name FROM old.gpkg_geometry_columns WHERE table_name = ?", (name,)
+    ).fetchall():
+        if _has(connection, "old", f"rtree_{name}_{column}"):
+            yield f"rtree_{name}_{column}"
+
+
+def _bring_styles(connection: sqlite3.Connection) -> None:
+    """Styles of other names than those here; a default one makes the one here none."""
+    if not _has(connection, "old", "layer_styles"):
+        return
+    new = "(SELECT coalesce(f_table_name, '') || '/' || styleName FROM main.layer_styles)"
+    mine = f"WHERE coalesce(f_table_name, '') || '/' || styleName NOT IN {new}"
+    mine += " AND f_table_name IN (SELECT table_name FROM main.gpkg_contents)"
+    connection.execute("BEGIN")
+    connection.execute(
+        "UPDATE main.layer_styles SET useAsDefault = 0 WHERE f_table_name IN "  # noqa: S608
+        f"(SELECT f_table_name FROM old.layer_styles {mine} AND useAsDefault)"
+    )
+    _fill(connection, "layer_styles", mine, without="id")
+    connection.execute("COMMIT")
+
+
+def _bring_projects(connection: sqlite3.Connection) -> None:
+    if _has(connection, "old", "qgis_projects"):
+        new = "(SELECT name FROM main.qgis_projects)"
+        _fill(connection, "qgis_projects", f"WHERE name NOT IN {new}")
+
+
+def _create(connection: sqlite3.Connection, which: str, name: str) -> None:
+    """Make anew what the earlier file's schema says."""
+    for (text,) in connection.execute(
+        f"SELECT sql FROM old.sqlite_master WHERE {which} AND sql IS NOT NULL ORDER BY rowid",  # noqa: S608
+        (name,),
+    ).fetchall():
+        connection.execute(text)
+
+
+def _fill(
+    connection: sqlite3.Connection, table: str, where: str = "", *values: object, without: str = ""
+) -> None:
+    """Copy rows, the columns that both files' tables have."""
+    one, other = (
+        [row[1] for row in connection.execute(f"PRAGMA {of}.table_info({_quoted(table)})")]
+        for of in ("main", "old")
+    )
+    columns = ", ".join(_quoted(name) for name in one if name in other and name != without)
+    connection.execute(
+        f"INSERT INTO main.{_quoted(table)} ({columns}) "  # noqa: S608
+        f"SELECT {columns} FROM old.{_quoted(table)} {where}",
+        values,
+    )
+
+
+def _has(connection: sqlite3.Connection, of: str, name: str) -> bool:
+    query = f"SELECT 1 FROM {of}.sqlite_master WHERE type IN ('table', 'view') AND name = ?"  # noqa: S608
+    return connection.execute(query, (name,)).fetchone() is not None
+
+
+def _is_view(connection: sqlite3.Connection, name: str) -> bool:
+    query = "SELECT type FROM old.sqlite_master WHERE name = ?"
+    return bool(connection.execute(query, (name,)).fetchone() == ("view",))
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
