@@ -1,5 +1,7 @@
 """Evaluation: one-to-one matching and the figures that follow from it."""
 
+import json
+
 import geopandas as gpd
 import numpy as np
 import pytest
@@ -124,6 +126,23 @@ def test_reliability_of_honest_and_boastful_confidences(tmp_path):
     assert error < 0.02
     with Image.open(tmp_path / "reliability.png") as picture:
         assert picture.size == (580, 580)
+
+
+def test_a_reviewed_plan_is_a_truth(tmp_path, capsys):
+    """Of its layers the obstacles are meant, and what a person rejected is none."""
+    from geofield.cli import main
+
+    plan = gf.read_plan("sample_data/field_1.gpkg")
+    status = ["rejected", "possible", *["confirmed"] * (len(plan.obstacles) - 2)]
+    file = tmp_path / "reviewed.gpkg"
+    plan.to_dataset().tables["field"].to_file(file, layer="field")
+    plan.obstacles.assign(status=status).to_file(file, layer="obstacles")
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", "sample_data/field_1.gpkg", str(file), "--json"])
+    assert end.value.code == 0
+    figures = json.loads(capsys.readouterr().out)
+    count = len(plan.obstacles)
+    assert (figures["hits"], figures["truth"], figures["detected"]) == (count - 2, count - 2, count)
 
 
 def test_the_command_prints_figures_and_draws(tmp_path, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -550,3 +551,18 @@ def dump(file: Path) -> dict[str, list[object]]:
             query = f"SELECT * FROM gpkg_{register} {theirs} ORDER BY 1"
             found[register] = connection.execute(query).fetchall()
     return found
+
+
+def test_a_drawn_row_is_seen_before_anything_runs_again(folder: Path) -> None:
+    """In a notebook: the plan as it is in the file, with an obstacle that has a shape alone."""
+    file = folder / "out/field.gpkg"
+    pole = gpd.GeoDataFrame(
+        geometry=[plan_in(folder).field.polygon.representative_point().buffer(1.0)],
+        crs=plan_in(folder).field.crs,
+    )
+    rewritten(file, "obstacles", lambda table: pd.concat([table, pole]))
+    plan = plan_in(folder)
+    page = plan.explore().save(folder / "plan.html").read_text()
+    assert re.search(r'"status": ?"added"', page)
+    found = plan.to_graph().query("SELECT ?o { ?o a gf:Obstacle }")
+    assert len(found) == len(rows(plan))

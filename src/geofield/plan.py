@@ -305,9 +305,10 @@ class Plan:
         points : bool
             Track points, too.
         """
+        from geofield.formats.edited import made_whole
         from geofield.formats.rdf.write import to_graph
 
-        return to_graph(self.to_dataset(), {"base_iri": base_iri, "points": points})
+        return to_graph(made_whole(self.to_dataset()), {"base_iri": base_iri, "points": points})
 
     def explore(self, *, height_px: int = 560) -> PlanPage:
         """The plan as an interactive map in a notebook; works without a network.
@@ -324,9 +325,10 @@ class Plan:
         PlanPage
             Shows itself; `save` writes it as a file that opens in any browser.
         """
+        from geofield.formats.edited import made_whole
         from geofield.web.html import PlanPage, document
 
-        return PlanPage(document(self.to_dataset(), self.scene), height_px)
+        return PlanPage(document(made_whole(self.to_dataset()), self.scene), height_px)
 
     def _field_rows(self) -> Rows:
         from geofield.tracks.direction import find_baseline

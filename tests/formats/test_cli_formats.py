@@ -97,6 +97,19 @@ def test_validate_finds_a_track_through_a_tree(tmp_path):
     assert "runs through obstacle 3" in done.output
 
 
+def test_validate_finds_what_was_drawn_and_what_is_empty(tmp_path):
+    dataset = make_dataset()
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    file = tmp_path / "field.gpkg"
+    drawn = dataset.tables["obstacles"].iloc[[2]][["geometry"]]
+    drawn.to_file(file, layer="obstacles", driver="GPKG")
+    done = CliRunner().invoke(validate, [str(file)])
+    assert "runs through an obstacle that was drawn" in done.output
+    dataset.tables["field"].iloc[:0].to_file(file, layer="field", driver="GPKG")
+    done = CliRunner().invoke(validate, [str(file)])
+    assert "error: field: no row has an outline" in done.output
+
+
 def test_import_says_when_the_crs_is_in_doubt(tmp_path):
     import geopandas as gpd
     import shapely

@@ -29,7 +29,9 @@ Example (on the project's own sample):
     help="Distance between centres within which a detection is a hit, metres.",
 )
 @click.option("--layer", default="obstacles", show_default=True, help="Layer of DETECTED.")
-@click.option("--truth-layer", help="Layer of TRUTH; its first one when not given.")
+@click.option(
+    "--truth-layer", help="Layer of TRUTH; when not given `obstacles`, else its first one."
+)
 @click.option(
     "--driving",
     is_flag=True,
@@ -55,7 +57,8 @@ def evaluate(
 ) -> None:
     """Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.
 
-    Matching is one to one. Prints precision, recall, F1 and the error of the radii with
+    TRUTH may be a plan that a person reviewed: what they rejected is no true obstacle. Matching is
+    one to one. Prints precision, recall, F1 and the error of the radii with
     95 % intervals. With --driving also how many true obstacles the plan's tracks run through,
     within 2 m of their centres, what ground false ones cost, and how many the confidences say
     stand among those that are merely possible.

@@ -67,7 +67,8 @@ def evaluate(
         Obstacles as :func:`geofield.detect_obstacles` returns them; rejected ones are left out.
     truth : GeoDataFrame, or mapping of picture name to GeoDataFrame
         Points, boxes or polygons; a column ``radius_m``, where there is one, or the radius of
-        the circle of a polygon's area is the true radius.
+        the circle of a polygon's area is the true radius. Of a reviewed plan's obstacles those
+        that are rejected or merely possible are no truths.
     distance_m : float
         Between centres, on the ground.
     area : shapely geometry, or mapping of picture name to one, optional
@@ -89,6 +90,7 @@ def evaluate(
     """
     found = detected if isinstance(detected, Mapping) else {"": detected}
     true = truth if isinstance(truth, Mapping) else {"": truth}
+    true = {name: active(table) for name, table in true.items()}
     missing = sorted(set(found) ^ set(true))
     if missing:
         raise ObstacleError(f"Picture {missing[0]!r} has detections or a truth, but not both.")

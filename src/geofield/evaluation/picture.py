@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from geofield import schema
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation
 from geofield.evaluation.scores import reliability
@@ -32,7 +33,7 @@ def read_obstacles(
     ----------
     path : path
     layer : str, optional
-        The first layer when not given or when the file has one layer only.
+        When not given or when the file has one layer only: `obstacles`, else the first one.
     metric : bool
         Reproject to the UTM zone where the file is in degrees.
 
@@ -57,7 +58,8 @@ def read_obstacles(
                     f"{path.name} has no layer {layer!r}.", hint=f"Layers: {', '.join(layers)}."
                 )
             layer = None
-        frame = gpd.read_file(path, layer=layer or layers[0])
+        usual = schema.OBSTACLES.name if schema.OBSTACLES.name in layers else layers[0]
+        frame = gpd.read_file(path, layer=layer or usual)
     except pyogrio.errors.DataSourceError as error:
         raise ObstacleError(f"{path.name} cannot be read: {error}.") from None
     if frame.crs is None:
@@ -95,7 +97,7 @@ def draw_matches(
     detected = active(detected)
     match = next(iter(result.matches.values()))
     crs = detected.crs
-    truth = truth.to_crs(crs)
+    truth = active(truth).to_crs(crs)
     if scene is not None:
         scale = max(min(_SIDE_PX / max(scene.grid.shape), 4.0), 0.05)
         size = (round(scene.grid.width_px * scale), round(scene.grid.height_px * scale))

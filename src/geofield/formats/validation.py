@@ -6,9 +6,10 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import pandas as pd
 import shapely
 
 from geofield import schema
@@ -101,6 +102,8 @@ def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[F
     for name, table in dataset.tables.items():
         layer = schema.layer(name)
         yield from _check_rows(layer, table)
+    if schema.FIELD.name in dataset.tables and not len(dataset.table(schema.FIELD.name)):
+        yield Finding("error", schema.FIELD.name, "no row has an outline")
     if with_segments:
         yield from _check_obstacles(dataset)
         yield from _check_tracks(dataset)
@@ -155,9 +158,13 @@ def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
         yield Finding(
             "error",
             f"segments, track {row['track_no']}, segment {row['segment_no']}",
-            f"runs through obstacle {kept['obstacle_no'].iloc[int(obstacle)]}: plan the tracks "
+            f"runs through {_obstacle(kept['obstacle_no'].iloc[int(obstacle)])}: plan the tracks "
             "again (geofield tracks)",
         )
+
+
+def _obstacle(number: Any) -> str:
+    return "an obstacle that was drawn" if pd.isna(number) else f"obstacle {number}"
 
 
 def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
