@@ -105,6 +105,8 @@ BROKEN = {
     "route step of unknown kind": (P + "/route/1", "gf:RouteStep", r'stepKind "work"', 'stepKind "fly"',
                                    "not allowed"),
     "sequence twice": (P + "/route/2", "gf:RouteStep", r"gf:sequence 2", "gf:sequence 1", "same sequence"),
+    "route step before a lost one": (P + "/route/1", "gf:RouteStep", r"(gf:nextStep <\S+)2>", r"\g<1>999>",
+                                     "no gf:RouteStep"),
     "turn that fits perhaps": (P + "/turn/1", "gf:Turn", r'gf:fits true', 'gf:fits "perhaps"^^xsd:boolean',
                                "no xsd:boolean"),
     "turn to a lost track": (P + "/turn/1", "gf:Turn", r"(gf:toTrack <\S+)2>", r"\g<1>77>", "no gf:Track"),

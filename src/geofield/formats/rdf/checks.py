@@ -13,9 +13,9 @@ from pyproj import CRS
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
 from geofield.formats.rdf.geosparql import geometry_of
-from geofield.formats.rdf.graph import Graph
+from geofield.formats.rdf.graph import Graph, ontology
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
-from geofield.formats.rdf.namespaces import GML, STUDY_POINT
+from geofield.formats.rdf.namespaces import GML, STUDY_POINT, compact
 from geofield.formats.rdf.parse import Problem
 from geofield.formats.rdf.scope import tracks_of
 
@@ -25,13 +25,12 @@ _FAR_DEG = 0.1
 _NEAR_DEG = 0.001
 #: A geometry in the metric CRS may differ from the same in CRS84 by this.
 _SAME_PLACE_M = 1.0
-#: Links and the class of what they point to.
+#: Links and the class of what they point to, where the ontology does not name one class as range.
 _LINKS = {
-    "gf:onTrack": "gf:Track", "gf:onSegment": "gf:Segment", "gf:causedBy": "gf:Obstacle",
-    "gf:fromTrack": "gf:Track", "gf:toTrack": "gf:Track", "gf:inField": "gf:Field",
-    "gf:inSurvey": "gf:Survey", "gf:basedOn": "gf:Survey", "geo:hasGeometry": "geo:Geometry",
+    "gf:causedBy": "gf:Obstacle",
+    "geo:hasGeometry": "geo:Geometry",
     "geo:hasDefaultGeometry": "geo:Geometry",
-}  # fmt: skip
+}
 _AXES = "In CRS84 the longitude comes first."
 
 Bounds = tuple[float, float, float, float]
@@ -86,9 +85,13 @@ def _dangling(graph: Graph) -> Iterator[Problem]:
     present = {each.cls: set(graph.of_type(*classes(each))) for each in layer_maps()}
     present["gf:Field"] = set(graph.of_type("gf:Field"))
     present["geo:Geometry"] = set(graph.column("geo:asWKT"))
-    for name, cls in _LINKS.items():
+    ranges = {name: compact(cls) for name, cls in ontology().pairs("rdfs:range")}
+    for name, cls in (ranges | _LINKS).items():
+        # Things of a class that the file has none of may be in another file.
+        if not present.get(cls) and cls != "geo:Geometry":
+            continue
         for iri, target in dict.fromkeys(graph.pairs(name)):
-            if target not in present[cls] and (present[cls] or cls == "geo:Geometry"):
+            if target not in present[cls]:
                 message = f"Points to <{target}>, which is no {cls} of this file."
                 yield Problem(message, f"<{iri}>", rule="dangling-link")
 
