@@ -566,3 +566,19 @@ def test_a_drawn_row_is_seen_before_anything_runs_again(folder: Path) -> None:
     assert re.search(r'"status": ?"added"', page)
     found = plan.to_graph().query("SELECT ?o { ?o a gf:Obstacle }")
     assert len(found) == len(rows(plan))
+
+
+def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    geofield("tracks", file, "--headland", 7, "--direction", 20, "-o", file)
+    told = geofield("tracks", file, "--direction", 50, "-o", file)
+    assert "As the plan was made: --spacing 6, --headland 7\n" in told
+    tracks = plan_in(folder).tracks
+    assert tracks is not None
+    assert tracks.spacing_m == 6
+    assert tracks.heading_deg == pytest.approx(50)
+    assert tracks.headland is not None
+    geofield("obstacles", folder / "picture.tif", file, "--buffer", 2.5, "-o", file)
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert "As the plan was made: --buffer 2.5\n" in told
+    assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}

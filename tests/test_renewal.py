@@ -53,6 +53,9 @@ def test_a_stage_says_what_is_older_and_one_command_renews_it(out: Path) -> None
     assert report["tracks"]["tracks"] == len(tracks)
     assert set(report["formats"]) == {"gpkg", "geojson", "shapefile", "rdf"}
     assert "Older" not in geofield("export", plan, "-f", "kml", "--out", out).stderr
+    # What lies there is of the folder's own plan, not of another one beside it.
+    assert "Older" not in geofield("tracks", plan, "--spacing", 9, "-o", out / "wide.gpkg").stderr
+    assert json.loads(geofield("refresh", out / "wide.gpkg", "--json").stdout)["files"] == []
 
 
 def test_what_a_run_did_not_write_again_is_told(

@@ -16,6 +16,7 @@ from geofield.settings import (
     DirectionName,
     FormatName,
     Settings,
+    as_before,
     from_mapping,
     load_settings,
     with_values,
@@ -269,3 +270,33 @@ def test_wrong_machines_are_named(said: dict[str, Any], message: str) -> None:
     Path("geofield.toml").write_text("[machines.sprayer]\nwidht_m = 3\n")
     with pytest.raises(SettingsError, match="Did you mean 'width_m'"):
         load_settings()
+
+
+EARLIER = {"width_m": 6, "headland_passes": 2, "ab_lonlat": (33, 35, 33.001, 35)}
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ({}, {"spacing_m": 6, "headland_m": 12, "ab_lonlat": (33, 35, 33.001, 35)}),
+        ({"spacing_m": 5}, {"spacing_m": 5, "headland_m": 10, "width_m": 6}),
+        ({"direction": "45"}, {"direction": "45", "ab_lonlat": None, "spacing_m": 6}),
+        ({"headland_m": 3}, {"headland_m": 3, "headland_passes": None}),
+        ({"machine": {"width_m": 4}}, {"spacing_m": 4, "width_m": 4, "headland_m": 8}),
+        ({"width_m": 3, "overlap_m": 0.5}, {"spacing_m": 2.5, "headland_m": 5}),
+    ],
+)
+def test_a_stage_on_a_plan_begins_with_its_settings(
+    said: dict[str, Any], expected: dict[str, Any]
+) -> None:
+    earlier = load_settings(None, {"tracks": EARLIER})
+    now = as_before(load_settings(None, {"tracks": said}), earlier, "tracks").tracks
+    assert {name: getattr(now, name) for name in expected} == expected
+
+
+def test_a_place_to_pass_through_gives_way_to_an_offset() -> None:
+    earlier = load_settings(None, {"tracks": {"through_lonlat": (33, 35)}})
+    now = as_before(load_settings(None, {"tracks": {"offset_m": 1}}), earlier, "tracks").tracks
+    assert (now.offset_m, now.through_lonlat) == (1, None)
+    both = as_before(load_settings(None, {"obstacles": {"buffer_m": 3}}), earlier, "obstacles")
+    assert (both.obstacles.buffer_m, both.tracks.through_lonlat) == (3, None)

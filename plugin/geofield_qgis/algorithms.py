@@ -150,7 +150,7 @@ class ObstaclesAlgorithm(GeofieldAlgorithm):
     """The obstacles in a field whose outline is known."""
 
     identifier, title, section, command = "obstacles", "Find the obstacles", STAGES, "obstacles"
-    own = GeofieldAlgorithm.own | {"imagery", "plan_file", "output"}
+    own = GeofieldAlgorithm.own | {"imagery", "plan_file", "output", "defaults"}
     makes_plan = True
 
     def add_inputs(self) -> None:
@@ -163,7 +163,8 @@ class ObstaclesAlgorithm(GeofieldAlgorithm):
         """See GeofieldAlgorithm."""
         words, environment = self.picture_words(values, context)
         output = self.parameterAsString(values, "OUTPUT", context)
-        return [*words, self.plan_path(values, context), "-o", output], environment
+        # What the dialog shows holds.
+        return [*words, self.plan_path(values, context), "-o", output, "--defaults"], environment
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""
@@ -174,7 +175,7 @@ class TracksAlgorithm(GeofieldAlgorithm):
     """Tracks on any polygons, or on a plan with all that a person changed in it."""
 
     identifier, title, section, command = "tracks", "Plan the tracks", STAGES, "tracks"
-    own = GeofieldAlgorithm.own | {"file", "output", "obstacle_file", "crs", "each"}
+    own = GeofieldAlgorithm.own | {"file", "output", "obstacle_file", "crs", "each", "defaults"}
     makes_plan = True
 
     def add_inputs(self) -> None:
@@ -205,7 +206,8 @@ class TracksAlgorithm(GeofieldAlgorithm):
         )
         output = self.parameterAsString(values, "OUTPUT", context)
         Path(output).mkdir(parents=True, exist_ok=True)
-        return [*words, "-o", output, "--each", *obstacles, "--json"], {}
+        # What the dialog shows holds, not what a plan was made with.
+        return [*words, "-o", output, "--each", *obstacles, "--defaults", "--json"], {}
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from geofield.formats import FORMATS, Format, read_dataset, write_dataset
 from geofield.formats.gpkg_read import scene_beside
-from geofield.products import write_report
+from geofield.products import PLAN_FILE, write_report
 from geofield.staging import staged_folder
 
 #: What is no product of the plan, but the plan itself and what it was made from.
@@ -20,7 +20,8 @@ _STUDY_MARK = b"www.DLC.org/Obstacle#"
 def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     """The products of a plan that lie in its folder, by format.
 
-    They carry its name, or one that all plans give alike.
+    They carry its name, or one that all plans give alike: those are of the main job's plan where
+    it lies there, too.
     """
     found = {}
     for each in FORMATS.values():
@@ -65,7 +66,11 @@ def renew(plan_file: Path) -> list[Path]:
 
 
 def _files(of: Format, plan_file: Path) -> Iterator[Path]:
+    main = plan_file.with_name(PLAN_FILE)
+    of_another = plan_file.name != PLAN_FILE and main.is_file()
     for pattern in of.files:
+        if of_another and "{stem}" not in pattern:
+            continue
         for placeholder, text in (("{stem}", plan_file.stem), ("<layer>", "*"), ("<name>", "*")):
             pattern = pattern.replace(placeholder, text)  # noqa: PLW2901
         yield from (file for file in plan_file.parent.glob(pattern) if file.is_file())

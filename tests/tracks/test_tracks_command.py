@@ -68,7 +68,9 @@ def test_one_polygon_with_trees(tmp_path: Path) -> None:
     report = run(out, "--spacing", "8", "--direction", "30", "-o", out)
     (row,) = report["fields"]
     assert row["heading_deg"] == pytest.approx(30.0)
-    assert "turn_count" not in row
+    assert row["turn_count"] > 0
+    report = run(out, "--spacing", "8", "--defaults", "-o", out)
+    assert "turn_count" not in report["fields"][0]
 
 
 def test_many_polygons_make_many_plans(tmp_path: Path) -> None:

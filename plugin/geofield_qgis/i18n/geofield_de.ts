@@ -1284,6 +1284,16 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.py" />
+      <source>Defaults</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Begin with the default settings, not with those that the plan was made with.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.json" />
       <source>Replace another file than the one that was read.</source>
       <translation type="unfinished" />
@@ -1575,7 +1585,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Replace a file that is there already.</source>
+      <source>Replace a file that is there already; `geofield undo` brings it back.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1610,7 +1620,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Layer of TRUTH; its first one when not given.</source>
+      <source>Layer of TRUTH; when not given `obstacles`, else its first one.</source>
       <translation type="unfinished" />
     </message>
     <message>

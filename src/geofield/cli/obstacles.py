@@ -10,7 +10,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import OLD_FILE, claim_file, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import stage_options
+from geofield.cli.options import continued, defaults_option, stage_options
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ Examples (on the project's own sample):
 @click.argument("imagery", type=click.Path(path_type=str))
 @click.argument("plan_file", metavar="FIELD.gpkg", type=OLD_FILE)
 @output_option("GeoPackage to write; may be the one that was read.")
+@defaults_option
 @click.option("--overwrite", is_flag=True, help="Replace another file than the one that was read.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
 @stage_options("obstacles")
@@ -35,6 +36,7 @@ def obstacles(
     imagery: str,
     plan_file: Path,
     output: Path,
+    defaults: bool,
     overwrite: bool,
     as_json: bool,
     settings: Settings,
@@ -42,8 +44,9 @@ def obstacles(
     """Find the obstacles in a field.
 
     IMAGERY is the picture that the field was found in. Rows that a person confirmed,
-    rejected or drew in FIELD.gpkg stay as they are; the tracks are removed, for they no
-    longer fit: run `geofield tracks` next.
+    rejected or drew in FIELD.gpkg stay as they are; the settings that it was made with hold where
+    you say nothing else. The tracks are removed, for they no longer fit: run `geofield tracks`
+    next.
     """
     from geofield.pipeline import run_obstacles, scene_of_plan
     from geofield.plan import read_plan
@@ -51,6 +54,8 @@ def obstacles(
 
     claim_file(output)
     plan = read_plan(plan_file)
+    if not defaults:
+        settings = continued(settings, plan.settings, "obstacles")
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
     save_plan(plan, output, read_from=plan_file, overwrite=overwrite)
     table = plan.obstacles

@@ -16,7 +16,8 @@ from typing import Any, Literal, TypeVar
 import click
 from pydantic.fields import FieldInfo
 
-from geofield.settings import LonLat, Settings, Stage, load_settings, option_named
+from geofield.cli.console import say
+from geofield.settings import LonLat, Settings, Stage, as_before, load_settings, option_named
 from geofield.wording import nearest
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -27,6 +28,11 @@ acknowledge_option = click.option(
     "--acknowledge-terms",
     is_flag=True,
     help="You have permission to derive geodata, though the source's terms forbid it.",
+)
+defaults_option = click.option(
+    "--defaults",
+    is_flag=True,
+    help="Begin with the default settings, not with those that the plan was made with.",
 )
 name_option = click.option("--name", help="The field's name; its place when not given.")
 
@@ -108,6 +114,31 @@ def stage_options(
         return settings_option(command)
 
     return add
+
+
+def continued(settings: Settings, earlier: Settings | None, section: Stage) -> Settings:
+    """Settings of a stage that runs again on a plan (`as_before`); tells what holds from then."""
+    settings, said = as_before(settings, earlier, section), getattr(settings, section)
+    now = getattr(settings, section)
+    # What follows from another setting is not told beside it.
+    follows = (
+        {"spacing_m": now.width_m, "headland_m": now.headland_passes} if section == "tracks" else {}
+    )
+    told = [
+        f"{option_named(name, field)} {_as_typed(value)}".removesuffix(" True")
+        for name, field in type(now).model_fields.items()
+        if name not in said.model_fields_set
+        and (value := getattr(now, name)) != field.get_default()
+        and follows.get(name) is None
+    ]
+    if told:
+        say(f"As the plan was made: {', '.join(told)}")
+    return settings
+
+
+def _as_typed(value: Any) -> str:
+    parts = value if isinstance(value, tuple) else (value,)
+    return ",".join(f"{part:g}" if type(part) is float else str(part) for part in parts)
 
 
 def section_values(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

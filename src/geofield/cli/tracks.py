@@ -11,7 +11,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import OLD_PATH, PATH, claim_file, claim_folder, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import name_option, stage_options
+from geofield.cli.options import continued, defaults_option, name_option, stage_options
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ Examples (the first two on the project's own sample):
 )
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @name_option
+@defaults_option
 @click.option("--overwrite", is_flag=True, help="Replace files that are there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 @stage_options("tracks", imagery=False)
@@ -57,6 +58,7 @@ def tracks(
     obstacle_file: Path | None,
     crs: str | None,
     name: str | None,
+    defaults: bool,
     overwrite: bool,
     as_json: bool,
     settings: Settings,
@@ -64,16 +66,18 @@ def tracks(
     """Plan the tracks of one or many fields.
 
     FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with
-    all that a person changed; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...),
-    each of which is a field. Their columns come along, and those named like settings (spacing_m,
-    heading_deg, ...) hold for their field.
+    all that a person changed, and whose settings hold where you say nothing else; or any file of
+    polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field. Their columns come
+    along, and those named like settings (spacing_m, heading_deg, ...) hold for their field.
     """
     from geofield.cli.many_tracks import Wanted, file_name, line_of, of_many, parcels_in
     from geofield.farm.work import Job
 
     (claim_file if output.suffix else claim_folder)(output)
-    job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     plan = _own_plan(file)
+    if plan is not None and not defaults:
+        settings = continued(settings, plan.settings, "tracks")
+    job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     places = None if plan is not None else parcels_in(file, settings, crs)
     several = places is not None and len(places) > 1
     if name and several:

@@ -8,7 +8,7 @@ arguments of its stage, so that each figure is described once, here.
 from geofield.settings.export import ExportSettings, FormatName
 from geofield.settings.field import FieldSettings
 from geofield.settings.imagery import FetchSettings, ImagerySettings, SourceSettings
-from geofield.settings.load import from_mapping, load_settings, with_values
+from geofield.settings.load import as_before, from_mapping, load_settings, with_values
 from geofield.settings.machines import Machine
 from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import LonLat
@@ -30,6 +30,7 @@ __all__ = [
     "SourceSettings",
     "Stage",
     "TrackSettings",
+    "as_before",
     "from_mapping",
     "load_settings",
     "option_named",

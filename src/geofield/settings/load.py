@@ -15,7 +15,7 @@ from geofield.settings.explain import explained
 from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
 from geofield.settings.section import nearest
 from geofield.settings.tracks import said_over
-from geofield.settings.whole import SECTIONS, Settings, names_of
+from geofield.settings.whole import SECTIONS, Settings, Stage, names_of
 
 
 def load_settings(
@@ -128,6 +128,35 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
     except ValidationError as error:
         raise SettingsError(explained(error)) from None
     return settings.model_copy(update=sections)
+
+
+def as_before(settings: Settings, earlier: Settings | None, section: Stage) -> Settings:
+    """Settings of a stage that runs again on a plan: what nobody says now is as it was then.
+
+    Parameters
+    ----------
+    settings : Settings
+        As they were loaded; what a file, the environment or the caller says holds.
+    earlier : Settings or None
+        Of the plan.
+    section : str
+        Of the stage.
+    """
+    if earlier is None:
+        return settings
+    now = getattr(settings, section)
+    said = {name: getattr(now, name) for name in now.model_fields_set}
+    known = dict(getattr(earlier, section))
+    if section != "tracks":
+        values = known | said
+    else:
+        if said.get("machine") is not None:
+            known = {name: value for name, value in known.items() if name not in MACHINE_VALUES}
+        values = said_over(known, said)
+    try:
+        return settings.model_copy(update={section: type(now)(**values)})
+    except ValidationError as error:
+        raise SettingsError(explained(error)) from None
 
 
 def from_mapping(values: Mapping[str, Any]) -> Settings:

@@ -13,6 +13,10 @@ from geofield.settings.section import NonNegative, Section
 DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_turns"]
 
 
+#: Two ways to say where the first track lies.
+_PLACED = ("offset_m", "through_lonlat"), ("through_lonlat", "offset_m")
+
+
 def _direction(value: str) -> str:
     """A way to find the direction, or a heading in degrees."""
     names = get_args(DirectionName)
@@ -126,9 +130,13 @@ class TrackSettings(Section):
 def said_over(earlier: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
     """Settings of the tracks with what was said later: what follows from it is left out.
 
-    A spacing that was said before does not stand against a working width that is said now.
+    A spacing that was said before does not stand against a working width that is said now, nor an
+    A-B line against a direction, nor a place to pass through against an offset.
     """
     kept = dict(earlier)
+    for later, before in (("direction", "ab_lonlat"), *_PLACED):
+        if said.get(later) is not None and before not in said:
+            kept.pop(before, None)
     if "spacing_m" not in said and not said.keys().isdisjoint(("width_m", "overlap_m")):
         kept.pop("spacing_m", None)
     if "headland_m" not in said and (kept | dict(said)).get("headland_passes") is not None:
