@@ -582,3 +582,20 @@ def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
     told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
     assert "As the plan was made: --buffer 2.5\n" in told
     assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}
+
+
+def test_what_was_thought_of_an_outline_that_was_moved_is_not_told_again(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(
+        file,
+        "field",
+        lambda table: table.assign(doubts="something").set_geometry(
+            [translate(table.geometry.iloc[0], 4, 0)], crs=table.crs
+        ),
+    )
+    geofield("export", file, "-f", "geojson,report", "--out", folder / "x")
+    row = gpd.read_file(folder / "x/geojson/field.geojson").iloc[0]
+    assert row["method"] == "drawn"
+    assert row[["certainty", "doubts"]].isna().all()
+    report = json.loads((folder / "x/report.json").read_text())
+    assert report["field"]["certainty"] is None

@@ -8,9 +8,10 @@ import shapely
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FieldError, ObstacleError
+from geofield.model.evidence import outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
-from geofield.plan import Plan, outline_digest
+from geofield.plan import Plan
 from geofield.settings import Settings
 
 #: Methods of outlines that a person gave as they are, or chose.
@@ -65,7 +66,8 @@ def kept_outline(previous: Plan) -> Field:
 def renamed(field: Field, previous: Plan) -> Field:
     """A field in the place of an earlier plan's: the names and columns that a person gave stay."""
     known = previous.field
-    if field.method == "boundary" and outline_digest(field) != previous.evidence.outline:
+    same = outline_digest(field.polygon) == outline_digest(known.polygon)
+    if field.method == "boundary" and not same:
         # Another parcel, whose name is its own where it has one.
         given = field.name != field.field_id
         return replace(field, name=field.name if given else known.name, own=known.own)

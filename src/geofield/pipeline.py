@@ -31,14 +31,14 @@ from geofield.earlier import (
     with_points,
 )
 from geofield.errors import FieldError, FieldWarning, GeofieldError, TrackError
-from geofield.model.evidence import Evidence
+from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
 from geofield.model.written import Written
-from geofield.plan import Plan, outline_digest
+from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 
 #: Called with (done, total, what).
@@ -212,7 +212,7 @@ def run_field(
         settings=settings,
         source=scene.source,
         grid=scene.grid,
-        evidence=Evidence((lat, lon), outline_digest(field), written=written),
+        evidence=Evidence((lat, lon), outline_digest(field.polygon), written=written),
         scene=scene,
         changes=() if previous is None else (outline_changed(previous, field, kept=kept),),
     )
@@ -303,7 +303,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         evidence = replace(evidence, written=written)
     tracks = tracks_of_plan(replace(plan, field=field, obstacles=obstacles), settings)
     if field is not plan.field:
-        evidence = replace(evidence, outline=outline_digest(field))
+        evidence = replace(evidence, outline=outline_digest(field.polygon))
     return replace(
         plan,
         field=field,

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import shapely
 
 from geofield import __version__, schema
 from geofield.crs import ground_scale_of
@@ -20,7 +17,7 @@ from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence
 from geofield.model.field import Field
-from geofield.model.frame import along_frame, outside_in_words
+from geofield.model.frame import with_outside
 from geofield.model.rows import Rows
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
@@ -139,19 +136,16 @@ class Plan:
     @property
     def outline_edited(self) -> bool:
         """Whether a person moved the outline since a stage wrote it."""
-        recorded = self.evidence.outline
-        return recorded is not None and recorded != outline_digest(self.field)
+        return self.evidence.moved(self.field.polygon)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the outline, in words; that it goes on outside is always told."""
         one = self.field
         told = () if self.outline_edited else one.doubts
-        along = [] if one.method == "boundary" else along_frame(one.polygon, one.crs, self.grid)
-        if not along or any("outside the picture" in reason for reason in told):
+        if one.method == "boundary":
             return told
-        share = sum(line.length for line in along) / one.polygon.exterior.length
-        return (*told, outside_in_words(share))
+        return with_outside(told, one.polygon, one.crs, self.grid)
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
@@ -376,9 +370,3 @@ def read_plan(path: str | Path) -> Plan:
     from geofield.formats import read_dataset
 
     return Plan.from_dataset(read_dataset(Path(path)))
-
-
-def outline_digest(one: Field) -> str:
-    """A fingerprint of an outline, to tell whether a person has moved it since."""
-    ring = shapely.normalize(one.polygon)
-    return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()

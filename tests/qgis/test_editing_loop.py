@@ -10,7 +10,7 @@ from formats_plan import ORIGIN, make_dataset
 from geofield.cli.tracks import tracks
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Field, Provenance
-from geofield.plan import outline_digest
+from geofield.model.evidence import outline_digest
 
 
 def placed(*xy):
@@ -37,7 +37,7 @@ def plan_file(tmp_path):
             {name: dataset.tables[name] for name in ("field", "obstacles")},
             dataset.crs,
             dataset.name,
-            Provenance(evidence={"field": {"outline_sha256": outline_digest(outline)}}),
+            Provenance(evidence={"field": {"outline_sha256": outline_digest(outline.polygon)}}),
             dataset.grid,
         ),
         tmp_path,

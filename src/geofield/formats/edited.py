@@ -19,6 +19,7 @@ from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
 from geofield.formats.many import Joined
 from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
+from geofield.model.frame import with_outside
 from geofield.model.review import reconcile
 
 if TYPE_CHECKING:
@@ -48,7 +49,8 @@ def made_whole(dataset: Dataset) -> Dataset:
         obstacles = tables[schema.OBSTACLES.name]
         tables[schema.OBSTACLES.name] = _understood(obstacles, dataset)
     if dataset.has(schema.FIELD.name):
-        tables[schema.FIELD.name] = _measured(_named(tables[schema.FIELD.name], dataset), dataset)
+        field = _measured(_named(tables[schema.FIELD.name], dataset), dataset)
+        tables[schema.FIELD.name] = _judged(field, dataset)
     return replace(dataset, tables=tables)
 
 
@@ -103,6 +105,15 @@ def _measured(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
         if not np.allclose(told, values, rtol=_SAME, atol=0.0):
             field = field.assign(**{name: values})
     return field
+
+
+def _judged(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
+    """The outline without what was thought of the one that a person replaced."""
+    parts = shapely.get_parts(field.geometry.to_numpy())
+    if len(parts) != 1 or not Evidence.from_json(dataset.provenance.evidence).moved(parts[0]):
+        return field
+    doubts = "; ".join(with_outside((), parts[0], dataset.crs, dataset.grid))
+    return field.assign(method="drawn", certainty=np.nan, doubts=doubts or None)
 
 
 def _plain(table: gpd.GeoDataFrame, layer: str) -> gpd.GeoDataFrame:

@@ -5,9 +5,12 @@ In files it is plain JSON; here, and only here, stand the names under which it i
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+import shapely
 
 from geofield.model.field import Field, FieldQuality
 from geofield.model.written import Written
@@ -25,6 +28,10 @@ class Evidence:
     detection: Mapping[str, Any] = field(default_factory=dict)
     #: The obstacles as the last stage left them; None where nobody recorded them.
     written: Written | None = None
+
+    def moved(self, outline: shapely.Polygon) -> bool:
+        """Whether a person moved an outline since a stage wrote it; not, where nobody knows."""
+        return self.outline is not None and self.outline != outline_digest(outline)
 
     def to_json(self, of: Field, tracks: Mapping[str, Any] | None) -> dict[str, Any]:
         """Plain JSON values, with those of the field's quality and of the tracks."""
@@ -53,6 +60,12 @@ class Evidence:
             dict(value.get("obstacles", {})),
             None if written is None else Written.from_json(written),
         )
+
+
+def outline_digest(outline: shapely.Polygon) -> str:
+    """A fingerprint of an outline, to tell whether a person has moved it since."""
+    ring = shapely.normalize(outline)
+    return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
 
 
 def quality_from_json(value: Mapping[str, Any]) -> FieldQuality | None:

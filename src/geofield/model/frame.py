@@ -31,6 +31,17 @@ def along_frame(polygon: Polygon, crs: CRS, grid: Grid | None) -> list[LineStrin
     return [line for line in shapely.get_parts(along) if shapely.length(line) > 2 * near]
 
 
+def with_outside(
+    doubts: tuple[str, ...], polygon: Polygon, crs: CRS, grid: Grid | None
+) -> tuple[str, ...]:
+    """Doubts of an outline, and that it goes on outside the picture where it does."""
+    along = along_frame(polygon, crs, grid)
+    if not along or any("outside the picture" in reason for reason in doubts):
+        return doubts
+    share = sum(line.length for line in along) / polygon.exterior.length
+    return (*doubts, outside_in_words(share))
+
+
 def outside_in_words(share: float) -> str:
     """What speaks against an outline of which a share is the picture's frame."""
     text = f"{share:.0%}" if share >= 0.01 else "a part"

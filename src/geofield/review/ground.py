@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
-from geofield.plan import outline_digest
+from geofield.model.evidence import outline_digest
 from geofield.review.commands import Command, EditError
 from geofield.settings import Settings
 
@@ -75,7 +75,9 @@ class Ground:
             plan,
             field=found,
             settings=settings.model_copy(update={"field": said}),
-            evidence=replace(plan.evidence, outline=outline_digest(found), point=(lat0, lon0)),
+            evidence=replace(
+                plan.evidence, outline=outline_digest(found.polygon), point=(lat0, lon0)
+            ),
         )
 
     def _point(self, plan: Plan) -> tuple[float, float]:
