@@ -599,3 +599,27 @@ def test_what_was_thought_of_an_outline_that_was_moved_is_not_told_again(folder:
     assert row[["certainty", "doubts"]].isna().all()
     report = json.loads((folder / "x/report.json").read_text())
     assert report["field"]["certainty"] is None
+
+
+def test_what_was_confirmed_and_moved_later_is_not_found_where_it_was(
+    folder: Path, made: SimulatedField
+) -> None:
+    file = folder / "out/field.gpkg"
+    count = len(rows(plan_in(folder)))
+
+    def confirmed(table: Frame) -> Frame:
+        table.loc[at(table, 4), "status"] = "confirmed"
+        return table
+
+    def moved(table: Frame) -> Frame:
+        table.loc[at(table, 4), "geometry"] = translate(
+            table.loc[at(table, 4), "geometry"].iloc[0], 14, 9
+        )
+        return table
+
+    rewritten(file, "obstacles", confirmed)
+    run(folder, made, "--overwrite")
+    rewritten(file, "obstacles", moved)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+        assert len(rows(plan_in(folder))) == count

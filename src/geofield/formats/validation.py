@@ -80,7 +80,7 @@ def validate_file(path: Path | str) -> list[Finding]:
             return findings
         return [*findings, Finding("error", place.name, str(error))]
     findings += [
-        Finding("warning", place.name, str(each.message))
+        Finding("warning", place.name, str(each.message).removeprefix(f"{place.name}: "))
         for each in caught
         if issubclass(each.category, FormatWarning)
     ]

@@ -268,7 +268,7 @@ def _bring_up_to_date(
 ) -> tuple[NDArray[np.bool_], list[PlainShape]]:
     """Make shape, sizes and status of the known rows what a person's changes say.
 
-    Returns which rows were changed, and the former shapes of detections that were drawn anew.
+    Returns which rows were changed, and the former shapes of what was found there and drawn anew.
     """
     changed = np.zeros(len(rows), dtype=bool)
     if not len(known):
@@ -295,7 +295,7 @@ def _bring_up_to_date(
                 rows.crs, reshaped=bool(reshaped[at]), resized=bool(resized[at]),
             )  # fmt: skip
             anew.append(row)
-        if found and reshaped[at]:
+        if reshaped[at] and before[at].status != "added":
             former.append(before[at].shape)
         # Of what a person looked at before, the status is their choice, too.
         if found and not chosen[at] and not before[at].kept:
