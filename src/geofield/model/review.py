@@ -31,10 +31,12 @@ from geofield.model.obstacles import (
     still_round,
 )
 from geofield.model.written import (
+    MOVED_M,
     PlainShape,
     Written,
     WrittenRow,
     fitted_circles,
+    from_earlier_version,
     matches,
     same_shapes,
     shapes_of_plain,
@@ -43,8 +45,6 @@ from geofield.model.written import (
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: A row whose recorded position and polygon are farther apart was moved by a person, metres.
-_MOVED_M = 0.02
 #: A typed length that differs by more than this from the written one, metres.
 _TYPED_M = 1e-4
 
@@ -154,34 +154,6 @@ class _Rows:
         names = schema.own_columns(schema.OBSTACLES, self.frame)
         own = {name: self.frame[name].array[rows] for name in names}
         return schema.table(schema.OBSTACLES, columns, self.shapes[rows], self.frame.crs, own)
-
-
-def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:
-    """The record of a table that was written without one.
-
-    Detected circles are known by their own columns; of other rows nobody can tell what was
-    changed.
-    """
-    radius = floats(obstacles, "radius_m")
-    total = radius + np.nan_to_num(floats(obstacles, "buffer_m"))
-    number = obstacles["obstacle_no"]
-    told = (
-        (obstacles["status"] == "detected").to_numpy(bool)
-        & (number.notna() & ~number.duplicated()).to_numpy(bool)
-        & np.isfinite(total + floats(obstacles, "lat") + floats(obstacles, "lon"))
-    )
-    if not told.any():
-        return Written()
-    table = obstacles[told]
-    x, y = transformer(LONLAT, CRS(table.crs)).transform(
-        table["lon"].to_numpy(), table["lat"].to_numpy()
-    )
-    circles = circle_polygons(x, y, total[told], CRS(table.crs))
-    drawn = np.asarray(table.geometry.to_numpy(), dtype=object)
-    # The columns are rounded in some formats: what is near enough is as it was.
-    near = shapely.hausdorff_distance(drawn, circles) <= 2 * _MOVED_M
-    shapes = np.where(near, drawn, circles)
-    return Written.of(table.set_geometry(shapes, crs=table.crs), np.zeros(len(table), bool))
 
 
 def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -404,7 +376,7 @@ def _place(rows: _Rows, grid: Grid | None) -> None:
     x, y = shapely.get_coordinates(shapely.centroid(rows.shapes)).T
     at = rows.at
     recorded = transformer(LONLAT, rows.crs).transform(at["lon"], at["lat"])
-    moved = ~(np.hypot(x - recorded[0], y - recorded[1]) <= _MOVED_M)
+    moved = ~(np.hypot(x - recorded[0], y - recorded[1]) <= MOVED_M)
     if not moved.any():
         return
     x, y = x[moved], y[moved]

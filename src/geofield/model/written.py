@@ -15,8 +15,8 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
-from geofield.crs import reproject, transformer
-from geofield.model.obstacles import QUARTER_SEGMENTS, floats, still_round
+from geofield.crs import LONLAT, reproject, transformer
+from geofield.model.obstacles import QUARTER_SEGMENTS, circle_polygons, floats, still_round
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 #: A shape farther than this from the one that was written was changed by a person, metres.
 #: Editors and formats that keep the coordinates stay far below it.
 SAME_M = 0.001
+#: A row whose recorded position and polygon are farther apart was moved by a person, metres.
+MOVED_M = 0.02
 _DECIMALS = 4
 _WORDS = ("kind", "status")
 
@@ -100,6 +102,34 @@ class Written:
             ),
             tuple(_unlisted(shape) for shape in value["removed"]),
         )
+
+
+def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:
+    """The record of a table that was written without one.
+
+    Detected circles are known by their own columns; of other rows nobody can tell what was
+    changed.
+    """
+    radius = floats(obstacles, "radius_m")
+    total = radius + np.nan_to_num(floats(obstacles, "buffer_m"))
+    number = obstacles["obstacle_no"]
+    told = (
+        (obstacles["status"] == "detected").to_numpy(bool)
+        & (number.notna() & ~number.duplicated()).to_numpy(bool)
+        & np.isfinite(total + floats(obstacles, "lat") + floats(obstacles, "lon"))
+    )
+    if not told.any():
+        return Written()
+    table = obstacles[told]
+    x, y = transformer(LONLAT, CRS(table.crs)).transform(
+        table["lon"].to_numpy(), table["lat"].to_numpy()
+    )
+    circles = circle_polygons(x, y, total[told], CRS(table.crs))
+    drawn = np.asarray(table.geometry.to_numpy(), dtype=object)
+    # The columns are rounded in some formats: what is near enough is as it was.
+    near = shapely.hausdorff_distance(drawn, circles) <= 2 * MOVED_M
+    shapes = np.where(near, drawn, circles)
+    return Written.of(table.set_geometry(shapes, crs=table.crs), np.zeros(len(table), bool))
 
 
 def plain(geometry: Any) -> list[PlainShape]:
