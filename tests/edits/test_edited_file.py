@@ -1,0 +1,195 @@
+"""What a person did to a plan's file: what is kept, brought back, understood and refused."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import geopandas as gpd
+import pandas as pd
+import pyogrio
+import pytest
+from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
+
+from geofield.simulate import SimulatedField
+
+
+def test_one_generation_back(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    first = plan_in(folder)
+    rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
+    geofield("tracks", file, "--spacing", 9, "-o", file)
+    assert plan_in(folder).tracks != first.tracks
+    geofield("undo", file)
+    # As the person left it, before the tracks were planned again.
+    assert 6 not in rows(plan_in(folder)).index
+    assert plan_in(folder).settings == first.settings
+    geofield("undo", file)
+    later = plan_in(folder)
+    assert later.settings is not None
+    assert later.settings.tracks.spacing_m == 9
+    run(folder, made, "--overwrite")
+    assert 6 not in rows(plan_in(folder)).index
+    geofield("undo", file)
+    assert plan_in(folder) == later
+
+
+def test_nothing_to_undo(folder: Path) -> None:
+    command = [sys.executable, "-m", "geofield", "undo", str(folder / "out/field.gpkg")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no earlier plan" in done.stderr
+
+
+def test_a_layer_that_is_gone_is_no_word(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
+    geofield("tracks", file, "--spacing", 6, "-o", file)
+    subprocess.run(
+        ["ogrinfo", "-q", file, "-sql", "ALTER TABLE obstacles RENAME TO trees"], check=True
+    )
+    written = file.read_bytes()
+    where = ["--lat", made.lat, "--lon", made.lon]
+    for stage in (
+        ["tracks", file, "-o", file],
+        ["obstacles", folder / "picture.tif", file, "-o", file],
+        ["field", folder / "picture.tif", *where, "-o", file, "--overwrite"],
+    ):
+        command = [sys.executable, "-m", "geofield", *map(str, stage)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        assert "The layer `obstacles`" in done.stderr
+        assert "geofield undo" in done.stderr
+    assert file.read_bytes() == written
+
+
+def test_an_import_can_be_undone(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = plan_in(folder)
+    parcels = folder / "parcels.gpkg"
+    gpd.read_file(file, layer="field").to_file(parcels)
+    geofield("import", parcels, "-o", file, "--overwrite")
+    assert plan_in(folder) != before
+    geofield("undo", file)
+    assert plan_in(folder) == before
+
+
+def test_columns_in_another_case_are_the_same(folder: Path, made: SimulatedField) -> None:
+    """For SQL `STATUS` is `status`; some programs write all names in capitals."""
+    file = folder / "out/field.gpkg"
+
+    def capitals(table: Frame) -> Frame:
+        table.loc[at(table, 3), "status"] = "rejected"
+        table["Note"] = "mine"
+        return table.rename(columns={n: n.upper() for n in ("status", "radius_m", "obstacle_no")})
+
+    rewritten(file, "obstacles", capitals)
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    assert after["status"][3] == "rejected"
+    assert set(after["Note"]) == {"mine"}
+    assert "STATUS" not in after
+
+
+def test_what_a_person_keeps_beside_the_plan(folder: Path, made: SimulatedField) -> None:
+    """Layers, tables, styles and projects of theirs in the plan's file outlive every stage."""
+    file = folder / "out/field.gpkg"
+    shape = plan_in(folder).field.polygon
+    places = [shape.centroid, shape.representative_point()]
+    lonlat = gpd.GeoDataFrame(
+        {"what": ["stone", "é"]}, geometry=places, crs=plan_in(folder).field.crs
+    )
+    lonlat.to_crs("EPSG:3035").to_file(file, layer='my "stones"', driver="GPKG")
+    pyogrio.write_dataframe(pd.DataFrame({"day": [1, 2, 3]}), file, layer="diary", driver="GPKG")
+    with closing(sqlite3.connect(file)) as connection, connection:
+        for layer, name, default in (
+            ("obstacles", "Mine", 1),
+            ('my "stones"', "S", 1),
+            ("field", "F", 0),
+        ):
+            connection.execute(
+                "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
+                "f_geometry_column, styleName, styleQML, useAsDefault) "
+                "VALUES ('', '', ?, 'geom', ?, '<qgis/>', ?)",
+                (layer, name, default),
+            )
+        connection.execute(
+            "UPDATE layer_styles SET useAsDefault = styleName = 'Mine' "
+            "WHERE f_table_name = 'obstacles'"
+        )
+        connection.execute("INSERT INTO qgis_projects VALUES ('harvest', x'00', x'01')")
+    before = dump(file)
+    told = run(folder, made, "--overwrite")
+    assert "is not geofield's and takes no part in the plan" in told
+    geofield("tracks", file, "--spacing", 5, "-o", file)
+    assert dump(file) == before
+    stones = gpd.read_file(file, layer='my "stones"', bbox=tuple(lonlat.to_crs(3035).total_bounds))
+    assert stones["what"].tolist() == ["stone", "é"]
+    # Other programs can go on with them: the index and its triggers are there.
+    pyogrio.write_dataframe(lonlat.to_crs(3035), file, layer='my "stones"', append=True)
+    assert len(gpd.read_file(file, layer='my "stones"')) == 4
+    with closing(sqlite3.connect(file)) as connection:
+        styles = connection.execute(
+            "SELECT f_table_name, styleName, useAsDefault FROM layer_styles "
+            "WHERE f_table_name IN ('field', 'obstacles', 'my \"stones\"') ORDER BY 1, 2"
+        ).fetchall()
+        assert connection.execute("SELECT name FROM qgis_projects").fetchall() == [
+            ("field",),
+            ("harvest",),
+        ]
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert not connection.execute("PRAGMA foreign_key_check").fetchall()
+    assert styles == [
+        ("field", "F", 0), ("field", "Field", 1), ('my "stones"', "S", 1),
+        ("obstacles", "Mine", 1), ("obstacles", "Obstacles", 0),
+    ]  # fmt: skip
+
+
+def dump(file: Path) -> dict[str, list[object]]:
+    """All that a file holds beside the plan."""
+    registers = ("contents", "extensions", "geometry_columns", "ogr_contents")
+    theirs = "WHERE table_name IN ('diary', 'my \"stones\"')"
+    with closing(sqlite3.connect(file)) as connection:
+        found = {
+            table: connection.execute(f'SELECT * FROM "{table}"').fetchall()
+            for table in ('my ""stones""', "diary", 'rtree_my ""stones""_geom')
+        }
+        for register in registers:
+            query = f"SELECT * FROM gpkg_{register} {theirs} ORDER BY 1"
+            found[register] = connection.execute(query).fetchall()
+    return found
+
+
+def test_a_drawn_row_is_seen_before_anything_runs_again(folder: Path) -> None:
+    """In a notebook: the plan as it is in the file, with an obstacle that has a shape alone."""
+    file = folder / "out/field.gpkg"
+    pole = gpd.GeoDataFrame(
+        geometry=[plan_in(folder).field.polygon.representative_point().buffer(1.0)],
+        crs=plan_in(folder).field.crs,
+    )
+    rewritten(file, "obstacles", lambda table: pd.concat([table, pole]))
+    plan = plan_in(folder)
+    page = plan.explore().save(folder / "plan.html").read_text()
+    assert re.search(r'"status": ?"added"', page)
+    found = plan.to_graph().query("SELECT ?o { ?o a gf:Obstacle }")
+    assert len(found) == len(rows(plan))
+
+
+def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    geofield("tracks", file, "--headland", 7, "--direction", 20, "-o", file)
+    told = geofield("tracks", file, "--direction", 50, "-o", file)
+    assert "As the plan was made: --spacing 6, --headland 7\n" in told
+    tracks = plan_in(folder).tracks
+    assert tracks is not None
+    assert tracks.spacing_m == 6
+    assert tracks.heading_deg == pytest.approx(50)
+    assert tracks.headland is not None
+    geofield("obstacles", folder / "picture.tif", file, "--buffer", 2.5, "-o", file)
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert "As the plan was made: --buffer 2.5\n" in told
+    assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}

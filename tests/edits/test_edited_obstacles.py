@@ -1,0 +1,294 @@
+"""What a person changed in the obstacles stands, whatever program they used and runs next."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
+from shapely.affinity import translate
+
+from geofield.crs import ground_scale_of
+from geofield.simulate import SimulatedField
+
+
+def rearranged(table: Frame) -> Frame:
+    """The same shapes as some editors leave them: in parts, turned, begun elsewhere."""
+
+    def other(shape: shapely.Polygon) -> shapely.MultiPolygon:
+        ring = shape.exterior.coords[:-1]
+        turned = [*ring[7:], *ring[:7]][::-1]
+        return shapely.MultiPolygon([shapely.Polygon(turned, [r.coords for r in shape.interiors])])
+
+    columns = [*reversed([name for name in table if name != "geometry"]), "geometry"]
+    return table.set_geometry([other(s) for s in table.geometry], crs=table.crs)[columns]
+
+
+def edited(table: Frame) -> Frame:
+    """Every kind of edit, each on a row of its own."""
+    table = table[~at(table, 6)].copy()
+    shapes = dict(zip(table["obstacle_no"], table.geometry, strict=True))
+    table.loc[at(table, 1), "geometry"] = shapes[1].buffer(3)
+    table.loc[at(table, 2), "geometry"] = translate(shapes[2], 1.5, 0)
+    table.loc[at(table, 3), "status"] = " Confirmed"
+    table.loc[at(table, 4), "radius_m"] += 2
+    table.loc[at(table, 5), "buffer_m"] = 4.0
+    table.loc[at(table, 7), "kind"] = "Other"
+    table.loc[at(table, 8), "geometry"] = translate(shapes[8], 12, 9)
+    table.loc[at(table, 9), "status"] = "possible"
+    table["note"] = [f"row {n}" for n in table["obstacle_no"]]
+    table["visits"] = np.arange(len(table))
+    return table
+
+
+def check(before: Frame, after: Frame) -> None:
+    """All of :func:`edited` is still there."""
+    area = after.geometry.area
+    assert area[1] == pytest.approx(before.geometry[1].buffer(3).area, rel=1e-6)
+    assert after["radius_m"][1] == pytest.approx(before["radius_m"][1] + 3, abs=0.01)
+    shift = after.geometry[2].centroid.distance(before.geometry[2].centroid)
+    assert shift == pytest.approx(1.5, abs=1e-6)
+    assert area[4] == pytest.approx(
+        before.geometry.area[4]
+        * ((before["radius_m"][4] + 2 + before["buffer_m"][4]) ** 2)
+        / ((before["radius_m"][4] + before["buffer_m"][4]) ** 2),
+        rel=1e-4,
+    )
+    assert after["radius_m"][4] == pytest.approx(before["radius_m"][4] + 2)
+    assert after["buffer_m"][5] == 4.0
+    assert area[5] > before.geometry.area[5] * 1.5
+    assert 6 not in after.index
+    assert not after.geometry.intersects(before.geometry[6].centroid).any()
+    assert after["kind"][7] == "other"
+    shift = after.geometry[8].centroid.distance(before.geometry[8].centroid)
+    assert shift == pytest.approx(15, abs=1e-6)
+    assert not after.geometry.intersects(before.geometry[8].centroid).any()
+    words = dict.fromkeys((1, 2, 3, 4, 5, 7, 8), "confirmed") | {9: "possible"}
+    assert after["status"][list(words)].to_dict() == words
+    for number in words:
+        assert after["confidence"][number] == before["confidence"][number]
+    assert after["lon"][2] != before["lon"][2]
+    kept = [number for number in before.index if number != 6]
+    assert after["note"][kept].tolist() == [f"row {number}" for number in kept]
+    assert after["visits"][kept].tolist() == list(range(len(kept)))
+
+
+@pytest.mark.parametrize("arrange", [lambda table: table, rearranged], ids=["plain", "rearranged"])
+def test_every_edit_survives_every_stage(
+    folder: Path, made: SimulatedField, arrange: Callable[[Frame], Frame]
+) -> None:
+    before = rows(plan_in(folder))
+    assert len(before) >= 10
+    file = folder / "out/field.gpkg"
+    rewritten(file, "obstacles", lambda table: arrange(edited(table)))
+    rewritten(
+        file, "field", lambda table: table.assign(name="Long meadow", crop=["rye"], soil=[41])
+    )
+    told = run(folder, made, "--overwrite")
+    once = plan_in(folder)
+    count = len(before)
+    said = f"outline as before; 8 obstacles of yours kept, {count - 9} found again, "
+    assert said + "2 you took away not taken up again" in told
+    assert len(json.loads((folder / "out/report.json").read_text())["changes"]) == 2
+    check(before, rows(once))
+    assert once.field.name == "Long meadow"
+    geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    check(before, rows(plan_in(folder)))
+    geofield("tracks", file, "--spacing", 6, "-o", file)
+    twice = plan_in(folder)
+    check(before, rows(twice))
+    run(folder, made, "--overwrite")
+    again = plan_in(folder)
+    pd.testing.assert_frame_equal(rows(again), rows(once), rtol=0, atol=1e-9)
+    for name in ("obstacles", "field"):
+        types = gpd.read_file(file, layer=name).dtypes
+        assert types["visits" if name == "obstacles" else "soil"].kind == "i"
+    field = gpd.read_file(file, layer="field").iloc[0]
+    assert (field["name"], field["crop"], field["soil"]) == ("Long meadow", "rye", 41)
+
+
+def test_only_edited_rows_are_a_persons_word(folder: Path, made: SimulatedField) -> None:
+    before = plan_in(folder)
+    rewritten(folder / "out/field.gpkg", "obstacles", rearranged)
+    run(folder, made, "--overwrite")
+    after = plan_in(folder)
+    assert set(rows(after)["status"]) <= {"detected", "possible"}
+    assert rows(after).equals(rows(before))
+
+
+def test_a_word_in_the_table_alone(folder: Path, made: SimulatedField) -> None:
+    """As a database client writes it, with no geometry at hand."""
+    before = rows(plan_in(folder))
+    with closing(sqlite3.connect(folder / "out/field.gpkg")) as connection, connection:
+        # GeoPackage's triggers ask every client for these.
+        for function in ("IsEmpty", "MinX", "MaxX", "MinY", "MaxY"):
+            connection.create_function(f"ST_{function}", 1, lambda shape: 0)
+        for change in (
+            "status = 'REJECTED' WHERE obstacle_no = 1",
+            "status = NULL WHERE obstacle_no = 2",
+            "status = 'maybe' WHERE obstacle_no = 3",
+            "radius_m = 7 WHERE obstacle_no = 4",
+        ):
+            connection.execute(f"UPDATE obstacles SET {change}")
+    told = run(folder, made, "--overwrite")
+    assert "'maybe' is none of detected" in told
+    after = rows(plan_in(folder))
+    assert after["status"][[1, 2, 3, 4]].tolist() == [
+        "rejected",
+        "detected",
+        "detected",
+        "confirmed",
+    ]
+    assert after["radius_m"][4] == 7
+    assert len(after) == len(before)
+
+
+def test_deleting_and_drawing_there_again(folder: Path, made: SimulatedField) -> None:
+    before = rows(plan_in(folder))
+    file = folder / "out/field.gpkg"
+    rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
+    run(folder, made, "--overwrite")
+    assert len(plan_in(folder).obstacles) == len(before) - 1
+    drawn = before.geometry[6].buffer(1, cap_style="square").envelope
+
+    def draw(table: Frame) -> Frame:
+        row = Frame({"buffer_m": [2.0]}, geometry=[drawn], crs=table.crs)
+        return pd.concat([table, row], ignore_index=True)
+
+    rewritten(file, "obstacles", draw)
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    (new,) = after[after["status"] == "added"].to_dict("records")
+    # The safety margin that was typed grows what was drawn.
+    grown = drawn.buffer(2 * ground_scale_of(drawn, after.crs), quad_segs=8)
+    assert new["geometry"].area == pytest.approx(grown.area, rel=1e-6)
+    assert new["geometry"].symmetric_difference(grown).area < 0.01
+    assert len(after) == len(before)
+
+
+def test_previous_in_python(folder: Path, made: SimulatedField) -> None:
+    from geofield.pipeline import plan_field
+
+    plan = plan_in(folder)
+    before = rows(plan)
+    assert plan.obstacles is not None
+    plan.obstacles.loc[0, "geometry"] = plan.obstacles.geometry[0].buffer(3)
+    plan = replace(plan, obstacles=plan.obstacles.drop(index=1))
+    again = plan_field(
+        made.scene, lat=made.lat, lon=made.lon, settings=plan.settings, previous=plan
+    )
+    after = rows(again)
+    assert after.geometry[1].area == pytest.approx(before.geometry[1].buffer(3).area, rel=1e-6)
+    assert 2 not in after.index
+
+
+def test_a_plan_without_a_record_of_what_was_written(folder: Path, made: SimulatedField) -> None:
+    """As the version before wrote it: detected circles tell by themselves what was changed."""
+    before = rows(plan_in(folder))
+    file = folder / "out/field.gpkg"
+
+    def enlarge(table: Frame) -> Frame:
+        table.loc[at(table, 1), "geometry"] = table.geometry[at(table, 1)].buffer(3)
+        return table
+
+    rewritten(file, "obstacles", enlarge)
+    with closing(sqlite3.connect(file)) as connection, connection:
+        done = connection.execute(
+            "UPDATE gpkg_metadata SET metadata = json_remove(metadata, '$.evidence.written')"
+        )
+        assert done.rowcount == 1
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    assert after.geometry[1].area == pytest.approx(before.geometry[1].buffer(3).area, rel=1e-6)
+    assert after["status"].tolist() == ["confirmed", *before["status"].tolist()[1:]]
+
+
+def test_a_border_that_crosses_itself(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    west, south, east, north = before.geometry[1].bounds
+    bow = shapely.Polygon([(west, south), (east, north), (east, south), (west, north)])
+
+    def cross(table: Frame) -> Frame:
+        table.loc[at(table, 1), "geometry"] = bow
+        return table
+
+    rewritten(file, "obstacles", cross)
+    run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    parts = after.geometry[[1, len(before) + 1]]
+    assert parts.is_valid.all()
+    assert parts.area.sum() == pytest.approx(shapely.make_valid(bow).area)
+    assert after["radius_m"][parts.index].isna().all()
+    assert after["status"][parts.index].tolist() == ["confirmed", "added"]
+
+
+def test_a_status_chosen_before_stands_when_the_shape_is_changed_later(folder: Path) -> None:
+    from geofield.model.review import reconcile
+
+    plan = plan_in(folder)
+    table, written = plan.obstacles, plan.evidence.written
+    assert table is not None
+    table, written = reconcile(table.assign(status="possible"), written)
+    moved = table.set_geometry([translate(s, 1.5) for s in table.geometry], crs=table.crs)
+    after, written = reconcile(moved, written)
+    assert set(after["status"]) == {"possible"}
+    assert all(row.kept for row in written.rows)
+
+
+def test_obstacles_of_several_parts(folder: Path, made: SimulatedField) -> None:
+    """What an editor merged: the parts stay as they are, neither grown again nor made round."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    assert before["buffer_m"][2] > 0
+    beside = shapely.box(0, 0, 4, 2)
+    west, south, *_ = before.geometry[2].bounds
+    both = shapely.MultiPolygon([before.geometry[2], translate(beside, west - 9, south)])
+
+    def merge(table: Frame) -> Frame:
+        table.loc[at(table, 2), "geometry"] = both
+        return table
+
+    rewritten(file, "obstacles", merge)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+    after = rows(plan_in(folder))
+    assert len(after) == len(before) + 1
+    assert after.geometry[2].equals_exact(before.geometry[2], 1e-6)
+    added = after.loc[len(before) + 1]
+    assert added.geometry.area == pytest.approx(8.0)
+    assert (added["status"], added["buffer_m"]) == ("added", before["buffer_m"][2])
+    assert np.isnan(added["radius_m"])
+
+
+def test_what_was_confirmed_and_moved_later_is_not_found_where_it_was(
+    folder: Path, made: SimulatedField
+) -> None:
+    file = folder / "out/field.gpkg"
+    count = len(rows(plan_in(folder)))
+
+    def confirmed(table: Frame) -> Frame:
+        table.loc[at(table, 4), "status"] = "confirmed"
+        return table
+
+    def moved(table: Frame) -> Frame:
+        table.loc[at(table, 4), "geometry"] = translate(
+            table.loc[at(table, 4), "geometry"].iloc[0], 14, 9
+        )
+        return table
+
+    rewritten(file, "obstacles", confirmed)
+    run(folder, made, "--overwrite")
+    rewritten(file, "obstacles", moved)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+        assert len(rows(plan_in(folder))) == count

@@ -1,0 +1,104 @@
+"""What a person changed in the field's row stands: its outline, name and columns."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+from changed_plans import Frame, geofield, plan_in, rewritten, run, shrunk
+from shapely.affinity import translate
+
+from geofield.simulate import SimulatedField
+
+
+def test_a_drawn_outline_stands_above_the_boundary_given(
+    folder: Path, made: SimulatedField
+) -> None:
+    """The same command again, after the outline was moved: the parcels' file says nothing new."""
+    file = folder / "out/field.gpkg"
+    parcels = folder / "parcels.gpkg"
+    shrunk(gpd.read_file(file, layer="field")).assign(name="Parcel 7").to_file(parcels)
+    own = ["--boundary", parcels, "--format", "gpkg", "--overwrite"]
+    run(folder, made, *own)
+    given = plan_in(folder).field
+    assert (given.method, given.name) == ("boundary", "Parcel 7")
+    rewritten(file, "field", lambda table: table.assign(name="Mine", crop="rye"))
+    run(folder, made, *own)
+    same = plan_in(folder).field
+    assert same.polygon.equals(given.polygon)
+    assert (same.name, dict(same.own)) == ("Mine", {"crop": "rye"})
+    rewritten(file, "field", shrunk)
+    moved = plan_in(folder).field.polygon
+    told = run(folder, made, *own)
+    assert "the boundary is not used" in told
+    assert "your outline kept" in told
+    run(folder, made, *own)
+    kept = plan_in(folder).field
+    assert kept.polygon.equals(moved)
+    assert (kept.method, kept.name, dict(kept.own)) == ("drawn", "Mine", {"crop": "rye"})
+
+
+def test_an_outline_of_which_nobody_recorded_how_it_was_written(
+    folder: Path, made: SimulatedField
+) -> None:
+    """As ogr2ogr copies a GeoPackage: its tables alone."""
+    file = folder / "out/field.gpkg"
+    rewritten(file, "field", shrunk)
+    moved = plan_in(folder).field.polygon
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("DELETE FROM gpkg_metadata")
+    for what in ("lost the record", "your outline kept"):
+        told = run(folder, made, "--overwrite")
+        assert what in told
+        assert plan_in(folder).field.polygon.equals(moved)
+
+
+def test_a_region_does_not_change_a_drawn_outline(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "field", shrunk)
+    command = [sys.executable, "-m", "geofield", "field", str(folder / "picture.tif")]
+    command += ["--lat", str(made.lat), "--lon", str(made.lon), "-o", str(file), "--overwrite"]
+    done = subprocess.run([*command, "--region", "1"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no region changes it" in done.stderr
+
+
+def test_what_was_thought_of_an_outline_that_was_moved_is_not_told_again(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(
+        file,
+        "field",
+        lambda table: table.assign(doubts="something").set_geometry(
+            [translate(table.geometry.iloc[0], 4, 0)], crs=table.crs
+        ),
+    )
+    geofield("export", file, "-f", "geojson,report", "--out", folder / "x")
+    row = gpd.read_file(folder / "x/geojson/field.geojson").iloc[0]
+    assert row["method"] == "drawn"
+    assert row[["certainty", "doubts"]].isna().all()
+    report = json.loads((folder / "x/report.json").read_text())
+    assert report["field"]["certainty"] is None
+
+
+def test_an_empty_column_stays(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+
+    def emptied(table: Frame) -> Frame:
+        return table.assign(
+            crop=pd.array([None], "string"), dose=[np.nan], sown=pd.to_datetime([None])
+        )
+
+    rewritten(file, "field", emptied)
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+    table = gpd.read_file(file, layer="field")
+    assert table[["crop", "dose", "sown"]].isna().all(axis=None)
+    assert (table["dose"].dtype.kind, table["sown"].dtype.kind) == ("f", "M")
+    assert plan_in(folder) == plan_in(folder)
