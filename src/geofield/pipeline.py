@@ -28,6 +28,7 @@ from geofield.earlier import (
     points_said,
     refuse_lost_obstacles,
     renamed,
+    tell_lost_tracks,
     with_points,
 )
 from geofield.errors import FieldError, FieldWarning, GeofieldError, TrackError
@@ -270,6 +271,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     from geofield.obstacles import detect_obstacles
 
     refuse_lost_obstacles(plan)
+    tell_lost_tracks(plan)
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
     detected.attrs.clear()
@@ -297,6 +299,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan)
+    tell_lost_tracks(plan)
     obstacles, evidence = None, plan.evidence
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -76,6 +77,8 @@ class Tracks:
         What was avoided.
     headland, headland_tracks, route, turns : GeoDataFrame or None
         The optional layers of the same names, where they were planned.
+    written : str
+        Fingerprint of the segments as they were planned; empty where they are those.
     """
 
     lines: gpd.GeoDataFrame
@@ -95,6 +98,7 @@ class Tracks:
     headland_tracks: gpd.GeoDataFrame | None = None
     route: gpd.GeoDataFrame | None = None
     turns: gpd.GeoDataFrame | None = None
+    written: str = ""
 
     def __repr__(self) -> str:
         return words(f"Tracks: {len(self.lines)}", self._facts())
@@ -130,6 +134,15 @@ class Tracks:
         """The same without making tables of rows that nobody asked for yet."""
         return rows_of(self)
 
+    @property
+    def edited(self) -> bool:
+        """Whether a person moved, drew or deleted segments since they were planned."""
+        return bool(self.written) and self.written != self._digest()
+
+    def _digest(self) -> str:
+        shapes = np.sort(shapely.to_wkb(self.rows()[schema.SEGMENTS.name].geometry, byte_order=1))
+        return hashlib.sha256(b"".join(shapes)).hexdigest()
+
     def evidence(self) -> dict[str, Any]:
         """What the tables do not say, as plain JSON values."""
         return {
@@ -140,6 +153,7 @@ class Tracks:
             "direction_why": self.direction_why,
             "blocked_count": self.blocked_count,
             "losses": [[each.obstacle_no, each.length_m, each.percent] for each in self.losses],
+            "segments_sha256": self.written or self._digest(),
         }
 
     @classmethod
@@ -168,6 +182,7 @@ class Tracks:
             outline=outline,
             blocked_count=int(evidence.get("blocked_count", 0)),
             losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),
+            written=str(evidence.get("segments_sha256", "")),
             **{
                 name: tables.get(name) for name in ("headland", "headland_tracks", "route", "turns")
             },
