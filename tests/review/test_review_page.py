@@ -426,3 +426,30 @@ def test_ground_is_clicked_and_another_outline_chosen(page: Page) -> None:
     chosen = page.state()["field"]
     assert chosen["rings"] == before["field"]["alternatives"][-1]["rings"]
     assert "Drawn by a person" in page.text("certainty")
+
+
+def test_keys_that_are_faster_than_the_answers_speak_of_one_after_the_other(page: Page) -> None:
+    page.press("j")
+    first = page.run("return document.querySelector('#list [aria-current=true]').dataset.no")
+    page.run(
+        "for (const key of ['c', 'r', 'c', ']', ']', ']'])"
+        " window.dispatchEvent(new KeyboardEvent('keydown', {key, bubbles: true}));"
+    )
+    page.wait(lambda: page.judged() == 4)
+    statuses = [row["status"] for row in page.state()["obstacles"]]
+    assert (statuses.count("confirmed"), statuses.count("rejected")) == (3, 1)
+    assert page.obstacle(int(first))["status"] == "confirmed"
+
+
+def test_a_key_held_down_judges_once_and_a_slider_has_its_arrows(page: Page) -> None:
+    page.press("j")
+    page.run(
+        "for (const repeat of [false, true, true, true]) window.dispatchEvent("
+        "new KeyboardEvent('keydown', {key: 'c', repeat, bubbles: true}));"
+    )
+    page.wait(lambda: page.judged() == 1)
+    slider = page.driver.find_element(By.ID, "opacity")
+    slider.send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT)
+    page.press("u")  # comes after whatever the arrows did
+    page.wait(lambda: float(slider.get_attribute("value") or 1) == pytest.approx(0.9))
+    assert page.judged() == 1

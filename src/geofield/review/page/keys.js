@@ -10,6 +10,8 @@ const KEYS = [
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
   ["n", "k_onward", a => a.onward()], ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
 ];
+// Held down, these go on; a verdict that was held too long would speak of the next obstacles, too.
+const ON_AND_ON = ["j", "k", "[", "]"];
 const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 const SHOWN = {Delete: "Del", Escape: "Esc"};
 
@@ -25,12 +27,13 @@ export function listen(actions) {
     if (control || event.altKey) return;
     if (!document.getElementById("keys-on").checked && key !== "Escape") return;
     if (key in ARROWS) {
+      if (event.target.matches?.("input[type=range]")) return;
       const metres = event.shiftKey ? 0.1 : 0.5, [x, y] = ARROWS[key];
       if (actions.nudge(x * metres, y * metres) !== false) done(event, () => {});
       return;
     }
     const found = KEYS.find(([name]) => name === key || (name.length === 1 && name === key.toLowerCase()));
-    if (found) done(event, () => found[2](actions));
+    if (found) done(event, () => (event.repeat && !ON_AND_ON.includes(found[0])) || found[2](actions));
   }, true);
 }
 

@@ -123,7 +123,7 @@ function showList() {
     const sure = each.confidence === null ? "" : ` · ${number(100 * each.confidence)} %`;
     const cost = each.lost_m ? ` · ${t("lost", {m: number(each.lost_m)})}` : "";
     press.append(node("b", each.no), node("span", `${t(each.status)}`), node("small", `${size}${sure}${cost}`));
-    press.onclick = () => choose(each.no, true);
+    press.onclick = () => inTurn(() => row(each.no) && choose(each.no, true));
     item.append(press);
     return item;
   }));
@@ -153,49 +153,66 @@ function step(forth) {
 
 // -- doing -------------------------------------------------------------------------------
 
-async function commit(command) {
+// What a person does is done one after the other: a key that is pressed before the answer to the
+// last one is there speaks of what is chosen then.
+let turn = Promise.resolve(), undone = 0;
+function inTurn(work) {
+  undone++;
+  return turn = turn.then(work).catch(refused).finally(() => undone--);
+}
+
+const commit = command => inTurn(() => make(command));
+
+async function make(command) {
   document.body.classList.toggle("busy", command.do === "ground");
   const before = new Set(state.obstacles.map(each => each.no));
   const done = await act(() => api.edit(command), show);
   document.body.classList.remove("busy");
-  if (!done) return show({});
+  if (!done) {
+    show({});
+    return false;
+  }
   if ($("message").classList.contains("bad") && !state.unnoted) say("");
   const fresh = state.obstacles.find(each => !before.has(each.no));
   if (fresh) choose(fresh.no, false);
+  return true;
 }
 
 async function verdict(status) {
-  if (chosen === null) return;
-  const rows = ordered().filter(waits), place = rows.findIndex(each => each.no === chosen);
+  const no = chosen;
+  if (no === null) return;
+  const rows = ordered().filter(waits), place = rows.findIndex(each => each.no === no);
   const following = rows[(place + 1) % rows.length]?.no;
-  await commit({do: "status", no: chosen, status});
-  if (status !== "detected" && place >= 0 && following !== undefined && following !== chosen) choose(following, true);
+  const done = await make({do: "status", no, status});
+  if (done && status !== "detected" && place >= 0 && following !== undefined && following !== no) choose(following, true);
 }
 
-const nudge = (dx, dy) => chosen !== null && commit({do: "move", no: chosen, dx_m: dx, dy_m: dy});
+const ifChosen = work => inTurn(() => chosen !== null && work(chosen));
+const nudge = (dx, dy) => chosen !== null && ifChosen(no => make({do: "move", no, dx_m: dx, dy_m: dy}));
 
 function resize(factor) {
   const each = row(chosen);
   if (each && each.radius_m !== null)
-    commit({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
+    return make({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
 }
 
-const save = name => act(() => api.save(name), answer => {
+const save = name => inTurn(() => act(() => api.save(name), answer => {
   show(answer);
   say(t("saved", {name: answer.saved_as}));
-});
+}));
 
 const ACTIONS = {
-  next: () => step(true), previous: () => step(false), confirm: () => verdict("confirmed"), reject: () => verdict("rejected"),
-  reset: () => verdict("detected"), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
-  help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => resize(1 / 1.1), larger: () => resize(1.1),
-  remove: () => tools.removeCorner() || (chosen !== null && commit({do: "delete", no: chosen})), tool: name => tools.use(name), nudge,
+  next: () => inTurn(() => step(true)), previous: () => inTurn(() => step(false)),
+  confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
+  reset: () => inTurn(() => verdict("detected")), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
+  help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
+  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => tools.use(name), nudge,
   onward: () => goTo((state.plan + 1) % state.plans.length),
-  escape: () => { if (tools.current() === "select") choose(null); tools.use("select"); },
+  escape: () => { if (tools.current() === "select") inTurn(() => choose(null)); tools.use("select"); },
 };
 
 // Edits stay with their plan on the server: nothing is lost by going to another one.
-const goTo = plan => plan !== state.plan && act(() => api.openPlan(plan), () => { ended = true; location.reload(); });
+const goTo = plan => plan !== state.plan && inTurn(() => act(() => api.openPlan(plan), () => { ended = true; location.reload(); }));
 
 // -- beginning ---------------------------------------------------------------------------
 
@@ -227,7 +244,7 @@ async function start() {
   maps.build(state, () => chosen);
   show(state);
   maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
-  tools.begin({chosen: () => chosen, row, choose, commit, again: () => show({}), showTracks, refused, scale: () => state.scale,
+  tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
   listen(ACTIONS);
@@ -259,13 +276,13 @@ async function start() {
   $("export").onclick = () => act(() => api.exportAs($("export-format").value),
     answer => say(t("exported", {files: answer.files.join(", ")})));
   $("save-as").onclick = async () => { if (await save($("save-name").value)) $("menu").close(); };
-  $("reload").onclick = () => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(told(answer.brought_back)); });
+  $("reload").onclick = () => inTurn(() => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(told(answer.brought_back)); }));
   $("stop").onclick = () => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); });
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
     $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
   });
-  window.addEventListener("beforeunload", event => { if (state.edited && !ended) event.preventDefault(); });
+  window.addEventListener("beforeunload", event => { if ((state.edited || undone) && !ended) event.preventDefault(); });
   if (!state.yours) say(t("second"), true, {text: t("take"), act: () => act(() => api.takeOver(), () => say(""))});
   else if (state.brought_back) say(told(state.brought_back));
   document.body.dataset.ready = "yes";

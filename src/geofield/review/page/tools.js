@@ -30,7 +30,7 @@ export function begin(given) {
 // The corner that was touched last: fingers have no Alt key.
 export function removeCorner() {
   if (active !== "outline") return false;
-  const rings = outlineRings(), near = 16 * maps.view.getResolution();
+  const rings = ringsOf(maps.sources.outline.getFeatures()[0]), near = 16 * maps.view.getResolution();
   let best = null;
   rings.forEach((places, ring) => places.forEach(([x, y], corner) => {
     const away = touched ? Math.hypot(x - touched[0], y - touched[1]) : Infinity;
@@ -40,7 +40,7 @@ export function removeCorner() {
   return true;
 }
 
-const outlineRings = () => maps.sources.outline.getFeatures()[0].getGeometry().getCoordinates().map(part => part.slice(0, -1).map(at));
+const ringsOf = feature => feature.getGeometry().getCoordinates().map(part => part.slice(0, -1).map(at));
 
 export const current = () => active;
 
@@ -80,14 +80,15 @@ const MAKERS = {
   anew: () => [shape("Polygon", geometry => ({do: "outline", rings: [ring(geometry)]}), true)],
   outline() {
     const modify = new ol.interaction.Modify({source: maps.sources.outline, pixelTolerance: 2 * reach});
-    const command = () => ({do: "outline", rings: outlineRings()});
+    // The shape under the hand counts: the answer to the edit before may draw the outline anew meanwhile.
+    const command = ({features}) => ({do: "outline", rings: ringsOf(features.item(0))});
     let listening = null;
-    modify.on("modifystart", ({features}) => {
-      listening = features.item(0).getGeometry().on("change", () => live(command()));
+    modify.on("modifystart", event => {
+      listening = event.features.item(0).getGeometry().on("change", () => live(command(event)));
     });
-    modify.on("modifyend", () => {
+    modify.on("modifyend", event => {
       ol.Observable.unByKey(listening);
-      commit(command());
+      commit(command(event));
     });
     return [modify];
   },
