@@ -265,13 +265,61 @@ def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:
     page.driver.switch_to.new_window("tab")
     second = Page(page.driver, address)
     assert "another tab" in second.text("message")
-    second.driver.find_element(By.CSS_SELECTOR, "#message button").click()
+    other = page.driver.current_window_handle
+    page.driver.switch_to.window(first)
+    page.press("j", "r")
+    page.wait(lambda: page.judged() == 1)
+    page.driver.switch_to.window(other)
+    taken_over(second)
+    assert second.judged() == 1  # what the first tab did meanwhile is there
     second.press("j", "r")
-    second.wait(lambda: second.judged() == 1)
+    second.wait(lambda: second.judged() == 2)
     second.driver.close()
     second.driver.switch_to.window(first)
     page.press("j", "r")
     page.wait(lambda: "another tab" in page.text("message").lower())
+    taken_over(page)
+    assert page.judged() == 2
+
+
+def taken_over(page: Page) -> None:
+    page.run("delete document.body.dataset.ready")
+    page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
+    page.wait(lambda: page.run("return document.body.dataset.ready"))
+
+
+def test_saving_under_no_name_saves_nothing(page: Page, plan_path: Path) -> None:
+    page.press("j", "r")
+    page.wait(lambda: page.judged() == 1)
+    before = plan_path.read_bytes()
+    page.button("more")
+    page.button("save-as")
+    assert page.run("return document.activeElement.id") == "save-name"
+    page.button("export")
+    # What comes of it can be read where the dialog is.
+    page.wait(
+        lambda: (
+            "Written"
+            in page.run("return document.querySelector('dialog[open] #message')?.textContent ?? ''")
+        )
+    )
+    assert plan_path.read_bytes() == before
+    assert page.state()["edited"]
+
+
+def test_another_plan_on_the_same_port_shows_its_own_picture(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    asked = "return performance.getEntriesByType('resource').map(e => e.name)"
+    tiles = []
+    port = "0"
+    for _ in range(2):
+        with served(plan_path, "--port", port) as (address, _):
+            port = address.split(":")[2].split("/")[0]
+            Page(driver, address).wait(lambda: "/tile/" in str(driver.execute_script(asked)))
+            found = driver.execute_script(asked)
+            tiles.append(next(name for name in found if "/tile/" in name))
+    assert tiles[0] != tiles[1]  # the browser keeps tiles for an hour
 
 
 def test_a_name_with_a_script_in_it_is_only_a_name(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import io
 import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -182,6 +183,66 @@ def test_a_second_tab_is_told(visitor: Visitor) -> None:
     assert visitor.post("/api/take", {"force": True}, X_Geofield_Tab="two")[1] == {"yours": True}
     assert visitor.post("/api/edit", edit, X_Geofield_Tab="two")[0] == 200
     assert visitor.post("/api/edit", edit)[0] == 422
+
+
+def test_an_edit_of_a_state_that_is_no_more_is_refused(plan_path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "Schlag #7 50%"  # no plan was found in such a folder
+    folder.mkdir()
+    for name in ("a.gpkg", "b.gpkg"):
+        shutil.copy(plan_path, folder / name)
+    server = ReviewServer()
+    shelf = server.load(lambda: Shelf(folder))
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
+    thread.start()
+    page = Visitor(server)
+    try:
+        page.post("/api/take", {})
+        seen = shelf.desk.stamp
+        edit = {"do": "status", "no": 3, "status": "rejected"}
+        status, answer = page.post("/api/edit", edit, X_Geofield_Seen=seen)
+        assert (status, answer["stamp"]) == (200, shelf.desk.stamp)
+        # A doubled tab has the name of the first one, and what that one showed.
+        assert page.post("/api/edit", {"do": "undo"}, X_Geofield_Seen=seen)[0] == 422
+        assert page.post("/api/open", {"plan": 1})[0] == 200
+        seen = answer["stamp"]
+        status, answer = page.post("/api/edit", edit, X_Geofield_Seen=seen)
+        assert status == 422
+        assert answer["other_tab"]
+        assert not shelf.desk.session.edited
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def test_a_plan_that_was_deleted_or_broken_is_told_and_edits_stay(
+    visitor: Visitor, plan_path: Path
+) -> None:
+    visitor.post("/api/take", {})
+    edit = {"do": "status", "no": 3, "status": "rejected"}
+    assert visitor.post("/api/edit", edit)[0] == 200
+    whole = plan_path.read_bytes()
+    plan_path.unlink()
+    for request in ("/api/save", "/api/reload"):
+        status, answer = visitor.post(request, {})
+        assert (status, "not there any more" in answer["message"]) == (422, True)
+    plan_path.write_bytes(b"half a download")
+    assert visitor.post("/api/reload", {})[0] == 422
+    # The other program's file is not taken for the one that was opened.
+    assert visitor.post("/api/save", {})[0] == 409
+    assert visitor.post("/api/edit", {**edit, "no": 4})[0] == 200
+    plan_path.write_bytes(whole)
+    again = Desk(plan_path)
+    assert again.brought_back == "2 edits of a session that ended without saving were brought back."
+
+
+def test_what_nobody_foresaw_is_told_in_words(
+    visitor: Visitor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    visitor.post("/api/take", {})
+    monkeypatch.setattr(Desk, "export", lambda *_: 1 / 0)
+    status, answer = visitor.post("/api/export", {"format": "geojson"})
+    assert (status, "division by zero" in answer["message"]) == (500, True)
 
 
 def test_tiles_are_the_pictures_own_pixels(plan_path: Path) -> None:

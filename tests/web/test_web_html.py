@@ -9,12 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pyproj import CRS, Transformer
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 import geofield as gf
+from geofield.web.view import place_table
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("review")]
@@ -33,6 +36,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ):
         subprocess.run([*geofield, *command, "--out", str(folder)], check=True, capture_output=True)
     return folder
+
+
+def test_places_across_180_degrees_go_on() -> None:
+    x, y = Transformer.from_crs(4326, 32701, always_xy=True).transform(-179.999, -17.0)
+    table = place_table(CRS(32701), (x - 500, y - 500, x + 500, y + 500))
+    assert np.ptp(table["lon"]) < 0.02  # a parabola through 179.9 and -179.9 leads nowhere
 
 
 def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path) -> None:

@@ -6,6 +6,7 @@ in words why something was refused, and nothing has changed then.
 
 from __future__ import annotations
 
+import secrets
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -42,17 +43,29 @@ class Desk:
         self._read()
 
     def _read(self) -> None:
-        self.seen = fingerprint(self.path)
-        self.journal = Journal(self.path)
-        plan = read_plan(self.journal.begins_at)
-        ground = None if self._picture_path is None else Ground(self._scene_of)
-        self.session = Session(plan, ground)
-        self.brought_back = self.journal.replay(self.session)
-        self.picture = (
+        seen = self._fingerprint()
+        # What cannot be read is refused before the journal forgets what is not of this file.
+        plan = read_plan(self.path)
+        picture = (
             None
             if self._picture_path is None
             else TiledPicture.open(self._picture_path, plan.field.crs)
         )
+        journal = Journal(self.path)
+        if journal.begins_at != self.path:
+            plan = read_plan(journal.begins_at)
+        ground = None if self._picture_path is None else Ground(self._scene_of)
+        session = Session(plan, ground)
+        self.brought_back = journal.replay(session)
+        self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
+        #: Tells this reading of file and picture from every other one.
+        self.reading = secrets.token_hex(4)
+        self._edits = 0
+
+    @property
+    def stamp(self) -> str:
+        """What tells the state that is shown from every other one."""
+        return f"{self.reading}.{self._edits}"
 
     # -- what the page asks ------------------------------------------------------------------
 
@@ -82,6 +95,7 @@ class Desk:
             before = self.session.step
             play(self.session, command)
             if self.session.step is not before:
+                self._edits += 1
                 self.journal.write(command)
             return self._state()
 
@@ -109,7 +123,7 @@ class Desk:
                 with _in_words(place):
                     save_plan(step.plan, place, picture=self._picture_path)
                 return {**self._state(), "saved_as": place.name}
-            if fingerprint(self.path) != self.seen:
+            if self._fingerprint() != self.seen:
                 raise ChangedError(
                     f"Another program changed {self.path.name} since it was opened here.",
                     hint="Reload it (edits made here are kept in a file beside it), or save your "
@@ -169,7 +183,20 @@ class Desk:
     # -- inner -------------------------------------------------------------------------------
 
     def _state(self) -> dict[str, Any]:
-        return {**state_of(self.session), "unnoted": self.journal.refused}
+        return {
+            **state_of(self.session),
+            "unnoted": self.journal.refused,
+            "stamp": self.stamp,
+        }
+
+    def _fingerprint(self) -> str:
+        try:
+            return fingerprint(self.path)
+        except FileNotFoundError:
+            raise FormatError(
+                f"{self.path.name} is not there any more: another program moved or deleted it.",
+                hint="Save your edits under another name, or put the file back.",
+            ) from None
 
     def _beside(self, name: str) -> Path:
         """A new file in the plan's folder: the page names no other folder."""
@@ -189,6 +216,7 @@ class Desk:
             return None
         source = picture.reader.source
         return {
+            "reading": self.reading,
             "resolutions": picture.resolutions_m,
             "infrared": picture.has_infrared,
             "credit": " · ".join(

@@ -13,6 +13,8 @@ import secrets
 from collections.abc import Mapping
 from http.cookies import CookieError, SimpleCookie
 
+from geofield.errors import GeofieldError
+
 COOKIE = "geofield_review"
 HEADER = "X-Geofield-Token"
 
@@ -28,6 +30,10 @@ SECURITY_HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
+
+
+class OtherTabError(GeofieldError):
+    """A tab asked that may not edit, or that does not show the plan as it is."""
 
 
 class Guard:

@@ -39,7 +39,7 @@ def plans_in(folder: Path) -> list[Path]:
 
 def _is_plan(path: Path) -> bool:
     try:
-        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as file:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
             return bool(file.execute("SELECT 1 FROM gpkg_metadata").fetchone())
     except sqlite3.Error:
         return False

@@ -7,6 +7,7 @@ Nothing here knows fields or tracks; `desk` answers, `guard` says who may ask.
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -16,11 +17,13 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from geofield.errors import ChangedError, GeofieldError
-from geofield.review.guard import SECURITY_HEADERS, Guard
+from geofield.review.guard import SECURITY_HEADERS, Guard, OtherTabError
 
 if TYPE_CHECKING:
+    from geofield.review.desk import Desk
     from geofield.review.shelf import Shelf
 
+_LOG = logging.getLogger(__name__)
 #: The largest request that is read: an outline of a hundred thousand corners.
 MOST_BYTES = 4_000_000
 _TYPES = {
@@ -130,7 +133,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self._refused():
             return
         if address.path == "/api/state":
-            self._state()
+            self._json(*_answered(self._state))
         elif address.path.startswith("/tile/"):
             self._tile(address.path)
         else:
@@ -158,24 +161,12 @@ class _Handler(BaseHTTPRequestHandler):
         if not isinstance(value, dict):
             self._json(400, {"message": "The request is not a JSON object."})
             return
-        try:
-            self._json(200, self._answer(urlsplit(self.path).path, value))
-        except ChangedError as error:
-            self._json(409, _words(error))
-        except GeofieldError as error:
-            self._json(422, _words(error))
-        except _NoSuchRequestError:
-            self._json(404, {"message": "There is no such request."})
+        self._json(*_answered(lambda: self._answer(urlsplit(self.path).path, value)))
 
-    def _state(self) -> None:
-        try:
-            shelf = self.server.shelf
-            opening = shelf.desk.opening()
-        except GeofieldError as error:
-            self._json(422, _words(error))
-            return
+    def _state(self) -> dict[str, Any]:
+        shelf = self.server.shelf
         plans = {"plans": shelf.names, "plan": shelf.current}
-        self._json(200, {**opening, **plans, "token": self.server.guard.token})
+        return {**shelf.desk.opening(), **plans, "token": self.server.guard.token}
 
     def _answer(self, path: str, value: dict[str, Any]) -> dict[str, Any]:
         shelf, tab = self.server.shelf, self.headers.get("X-Geofield-Tab", "")
@@ -184,18 +175,23 @@ class _Handler(BaseHTTPRequestHandler):
         if path == "/api/stop":
             self.server.stop()
             return {"stopped": True}
-        if not shelf.holds(tab):
-            raise GeofieldError(
-                "Another tab is editing this plan.", hint="Go on there, or take over here."
-            )
+        shelf.refuse_others(tab)
         if path == "/api/open":
             number = value.get("plan")
             shelf.open(number if isinstance(number, int) else -1)
             return {"plan": shelf.current}
-        desk, name = shelf.desk, value.get("name")
+        desk = shelf.desk
+        if path == "/api/preview":
+            return desk.preview(value)
+        with desk.lock:
+            shelf.refuse_outdated(self.headers.get("X-Geofield-Seen"))
+            return self._changed(desk, path, value)
+
+    @staticmethod
+    def _changed(desk: Desk, path: str, value: dict[str, Any]) -> dict[str, Any]:
+        name = value.get("name")
         requests: dict[str, Callable[[], dict[str, Any]]] = {
             "/api/edit": lambda: desk.edit(value),
-            "/api/preview": lambda: desk.preview(value),
             "/api/save": lambda: desk.save(name if isinstance(name, str) else None),
             "/api/reload": desk.reload,
             "/api/export": lambda: desk.export(str(value.get("format", ""))),
@@ -216,8 +212,8 @@ class _Handler(BaseHTTPRequestHandler):
         _, level, column, row = numbers
         try:
             data, kind = picture.tile(level, column, row, show)  # type: ignore[arg-type]
-        except GeofieldError as error:
-            self._json(404, _words(error))
+        except (GeofieldError, OSError) as error:
+            self._json(404, {"message": str(error)})
             return
         self._send(200, data, kind, {"Cache-Control": "private, max-age=3600"})
 
@@ -245,6 +241,28 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(data)
+
+
+def _answered(work: Callable[[], dict[str, Any]]) -> tuple[int, dict[str, Any]]:
+    """Status and answer of a request: a page that hears nothing would think the session ended."""
+    try:
+        return 200, work()
+    except ChangedError as error:
+        return 409, _words(error)
+    except OtherTabError as error:
+        return 422, {**_words(error), "other_tab": True}
+    except GeofieldError as error:
+        return 422, _words(error)
+    except _NoSuchRequestError:
+        return 404, {"message": "There is no such request."}
+    except OSError as error:
+        return 500, {"message": f"{error.filename or 'The disk'}: {error.strerror or error}."}
+    except Exception as error:  # noqa: BLE001 - the session must outlive a fault
+        _LOG.exception("A request of the page failed")
+        return 500, {
+            "message": f"This went wrong within geofield: {type(error).__name__}: {error}.",
+            "hint": "Nothing was changed by it; save what you have edited.",
+        }
 
 
 def _words(error: GeofieldError) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from geofield.errors import FormatError
 from geofield.review.desk import Desk
+from geofield.review.guard import OtherTabError
 from geofield.review.plans import is_farm, plans_in
 
 
@@ -63,9 +64,30 @@ class Shelf:
                 self._holder = tab
             return self._holder == tab
 
-    def holds(self, tab: str) -> bool:
-        """Whether a tab may edit."""
-        return self._holder == tab
+    def refuse_others(self, tab: str) -> None:
+        """Refuse what a tab asks that may not edit.
+
+        Raises
+        ------
+        OtherTabError
+        """
+        if self._holder != tab:
+            raise OtherTabError(
+                "Another tab is editing this plan.", hint="Go on there, or take over here."
+            )
+
+    def refuse_outdated(self, stamp: str | None) -> None:
+        """Refuse an edit of a plan that a page shows as it was: it would change something else.
+
+        Raises
+        ------
+        OtherTabError
+        """
+        if stamp is not None and stamp != self.desk.stamp:
+            raise OtherTabError(
+                "This page does not show the plan as it is: it was changed in another tab.",
+                hint="Go on there, or take over here.",
+            )
 
 
 def _desks_of(place: Path, picture: Path | None) -> list[tuple[str, Callable[[], Desk]]]:

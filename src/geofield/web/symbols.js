@@ -81,7 +81,7 @@ export function obstacleFeature(row) {
 export function lonlatOf(places, [x, y]) {
   const u = weights(places.x, x), v = weights(places.y, y);
   const at = table => table.reduce((sum, row, i) => sum + v[i] * row.reduce((s, value, j) => s + u[j] * value, 0), 0);
-  return [at(places.lon), at(places.lat)];
+  return [(at(places.lon) + 540) % 360 - 180, at(places.lat)];
 }
 
 function weights([a, b, c], x) {

@@ -124,6 +124,8 @@ def place_table(crs: CRS, bounds: tuple[float, float, float, float]) -> dict[str
     y = np.linspace(bounds[1], bounds[3], 3)
     xx, yy = np.meshgrid(x, y)
     lon, lat = transformer(crs, LONLAT).transform(xx, yy)
+    # A parabola through 179.9 and -179.9 leads nowhere: they go on beyond 180.
+    lon = lon[0, 0] + (lon - lon[0, 0] + 180.0) % 360.0 - 180.0
     return {"x": x.tolist(), "y": y.tolist(), "lon": lon.tolist(), "lat": lat.tolist()}
 
 

@@ -5,19 +5,20 @@ import {told} from "./web/words.js";
 // A tab keeps its name when it is loaded again.
 const tab = sessionStorage.getItem("tab") ?? String(crypto.getRandomValues(new Uint32Array(2)));
 sessionStorage.setItem("tab", tab);
-let token = "";
+let token = "", seen = "";
 
 export class Refused extends Error {
   constructor(status, answer) {
     super([answer.message, answer.hint].filter(Boolean).map(told).join(" "));
     this.status = status;
+    this.otherTab = Boolean(answer.other_tab);
   }
 }
 
 async function ask(path, value) {
   const options = value === undefined ? {} : {
     method: "POST",
-    headers: {"Content-Type": "application/json", "X-Geofield-Token": token, "X-Geofield-Tab": tab},
+    headers: {"Content-Type": "application/json", "X-Geofield-Token": token, "X-Geofield-Tab": tab, "X-Geofield-Seen": seen},
     body: JSON.stringify(value),
   };
   let response;
@@ -28,6 +29,8 @@ async function ask(path, value) {
   }
   const answer = await response.json();
   if (!response.ok) throw new Refused(response.status, answer);
+  // An edit is one of the state that this page shows: a tab that was doubled may show an older one.
+  seen = answer.stamp ?? seen;
   return answer;
 }
 

@@ -17,6 +17,8 @@ const waits = each => each.status === "detected" || each.status === "possible";
 let silence;
 function say(text, bad = false, button = null) {
   const node = $("message");
+  // Beside an open dialog nothing can be read or pressed.
+  (document.querySelector("dialog[open]") ?? document.body).append(node);
   node.textContent = text;
   node.classList.toggle("bad", bad);
   node.classList.toggle("on", Boolean(text));
@@ -32,7 +34,16 @@ function say(text, bad = false, button = null) {
 
 function refused(error) {
   if (ended) return;
-  say(error.status === 0 ? t("gone") : error.status === 409 ? `${error.message} ${t("changed")}` : error.message, true);
+  if (error.otherTab) say(error.message, true, {text: t("take"), act: takeOver});
+  else say(error.status === 0 ? t("gone") : error.status === 409 ? `${error.message} ${t("changed")}` : error.message, true);
+}
+
+// What the other tab did meanwhile is shown first.
+const takeOver = () => act(() => api.takeOver(), again);
+
+function again() {
+  ended = true;
+  location.reload();
 }
 
 async function act(work, after) {
@@ -212,7 +223,7 @@ const ACTIONS = {
 };
 
 // Edits stay with their plan on the server: nothing is lost by going to another one.
-const goTo = plan => plan !== state.plan && inTurn(() => act(() => api.openPlan(plan), () => { ended = true; location.reload(); }));
+const goTo = plan => plan !== state.plan && inTurn(() => act(() => api.openPlan(plan), again));
 
 // -- beginning ---------------------------------------------------------------------------
 
@@ -275,15 +286,20 @@ async function start() {
   };
   $("export").onclick = () => act(() => api.exportAs($("export-format").value),
     answer => say(t("exported", {files: answer.files.join(", ")})));
-  $("save-as").onclick = async () => { if (await save($("save-name").value)) $("menu").close(); };
-  $("reload").onclick = () => inTurn(() => act(() => api.reload(), answer => { $("menu").close(); show(answer); if (answer.brought_back) say(told(answer.brought_back)); }));
+  $("save-as").onclick = async () => {
+    const name = $("save-name").value.trim();
+    if (!name) $("save-name").focus();
+    else if (await save(name)) $("menu").close();
+  };
+  for (const dialog of document.querySelectorAll("dialog")) dialog.onclose = () => document.body.append($("message"));
+  $("reload").onclick = () => inTurn(() => act(() => api.reload(), again));
   $("stop").onclick = () => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); });
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
     $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
   });
   window.addEventListener("beforeunload", event => { if ((state.edited || undone) && !ended) event.preventDefault(); });
-  if (!state.yours) say(t("second"), true, {text: t("take"), act: () => act(() => api.takeOver(), () => say(""))});
+  if (!state.yours) say(t("second"), true, {text: t("take"), act: takeOver});
   else if (state.brought_back) say(told(state.brought_back));
   document.body.dataset.ready = "yes";
 }

@@ -56,7 +56,7 @@ function tiles({bounds, plan}, show, projection) {
     projection, interpolate: true, transition: 0,
     tileGrid: new ol.tilegrid.TileGrid({extent: bounds, origin: [bounds[0], bounds[3]],
       resolutions: pictureFacts.resolutions, tileSize: 512}),
-    tileUrlFunction: ([z, x, y]) => `tile/${show}/${plan}/${z}/${x}/${y}`,
+    tileUrlFunction: ([z, x, y]) => `tile/${show}/${plan}/${z}/${x}/${y}?${pictureFacts.reading}`,
   });
 }
 
