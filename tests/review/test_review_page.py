@@ -9,6 +9,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -21,6 +22,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from geofield.plan import read_plan
+from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import DirectionName
 
@@ -501,3 +503,49 @@ def test_a_key_held_down_judges_once_and_a_slider_has_its_arrows(page: Page) -> 
     page.press("u")  # comes after whatever the arrows did
     page.wait(lambda: float(slider.get_attribute("value") or 1) == pytest.approx(0.9))
     assert page.judged() == 1
+
+
+def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    plan = read_plan(plan_path)
+    assert plan.obstacles is not None
+    middle = plan.field.polygon.representative_point()
+    hole = middle.buffer(12, quad_segs=1)
+    obstacles = plan.obstacles.copy()
+    obstacles.loc[obstacles["obstacle_no"] == 16, "status"] = "possible"
+    detection = {**plan.evidence.detection, "threshold": 0.8}
+    odd = replace(
+        plan,
+        obstacles=obstacles,
+        field=replace(plan.field, polygon=plan.field.polygon.difference(hole)),
+        evidence=replace(plan.evidence, detection=detection, written=None),
+    )
+    save_plan(odd, plan_path, overwrite=True)
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        page.run("document.querySelector('#list [data-no=\"16\"]').click()")
+        page.press("u")  # there is no word to take back
+        page.press("c")
+        page.wait(lambda: page.obstacle(16)["status"] == "confirmed")
+        page.run("document.querySelector('#list [data-no=\"16\"]').click()")
+        page.press("u")
+        page.wait(lambda: page.obstacle(16)["status"] == "possible")
+        page.chord(Keys.CONTROL, "z")
+        page.chord(Keys.CONTROL, "z")
+        page.wait(lambda: not page.state()["edited"])
+        page.press("o")
+        for left in (3, 0):
+            rings = page.state()["field"]["rings"]
+            driver.execute_async_script(
+                "const [place, done] = arguments; import('/map.js').then(({view}) => {"
+                " view.setCenter(place); view.setResolution(0.2); done(); });",
+                rings[1][0],
+            )
+            page.click(*rings[1][0])
+            page.press(Keys.DELETE)
+            page.wait(lambda left=left: holes(page) == ([left] if left else []))
+
+
+def holes(page: Page) -> list[int]:
+    return [len(ring) for ring in page.state()["field"]["rings"][1:]]

@@ -23,6 +23,7 @@ def state_of(session: Session) -> dict[str, Any]:
         "field": field_of(plan),
         "obstacles": obstacles_view(plan.obstacles, plan.tracks),
         "settings": (plan.settings or Settings()).tracks.model_dump(mode="json"),
+        "detected_from": _detected_from(plan),
         "edited": session.edited,
         "can_undo": session.can_undo,
         "can_redo": session.can_redo,
@@ -32,6 +33,13 @@ def state_of(session: Session) -> dict[str, Any]:
 def tracks_of(plan: Plan, notes: tuple[str, ...] = ()) -> dict[str, Any]:
     """Tracks and figures: what changes while a person drags."""
     return tracks_view(plan.tracks, plan.field.area_ha, notes)
+
+
+def _detected_from(plan: Plan) -> float:
+    """The confidence from which what was found is driven around without a person's word."""
+    found = plan.evidence.detection
+    # The study's own methods know nothing merely possible; their thresholds are of other things.
+    return float(found["threshold"]) if "possible_from" in found else 0.0
 
 
 def field_of(plan: Plan) -> dict[str, Any]:

@@ -195,7 +195,14 @@ async function verdict(status) {
   const rows = ordered().filter(waits), place = rows.findIndex(each => each.no === no);
   const following = rows[(place + 1) % rows.length]?.no;
   const done = await make({do: "status", no, status});
-  if (done && status !== "detected" && place >= 0 && following !== undefined && following !== no) choose(following, true);
+  if (done && !waits({status}) && place >= 0 && following !== undefined && following !== no) choose(following, true);
+}
+
+// What was merely possible is not driven around when a person has no word on it any more.
+function takeBack() {
+  const each = row(chosen);
+  if (!each || waits(each) || each.status === "added") return;
+  return verdict(each.confidence !== null && each.confidence < state.detected_from ? "possible" : "detected");
 }
 
 const ifChosen = work => inTurn(() => chosen !== null && work(chosen));
@@ -215,7 +222,7 @@ const save = name => inTurn(() => act(() => api.save(name), answer => {
 const ACTIONS = {
   next: () => inTurn(() => step(true)), previous: () => inTurn(() => step(false)),
   confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
-  reset: () => inTurn(() => verdict("detected")), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
+  reset: () => inTurn(takeBack), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
   remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => tools.use(name), nudge,
   onward: () => goTo((state.plan + 1) % state.plans.length),

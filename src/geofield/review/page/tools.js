@@ -36,7 +36,11 @@ export function removeCorner() {
     const away = touched ? Math.hypot(x - touched[0], y - touched[1]) : Infinity;
     if (away < near && (!best || away < best.away)) best = {away, ring, corner};
   }));
-  if (best) commit({do: "outline", rings: rings.map((places, ring) => places.filter((_, i) => ring !== best.ring || i !== best.corner))});
+  if (best) {
+    const left = rings.map((places, ring) => places.filter((_, i) => ring !== best.ring || i !== best.corner));
+    // A hole of three corners goes as a whole; of the field itself three must stay, which the server tells.
+    commit({do: "outline", rings: left.filter((places, ring) => ring === 0 || places.length > 2)});
+  }
   return true;
 }
 
