@@ -294,6 +294,19 @@ def test_an_edit_that_the_disk_does_not_take_is_kept_and_noted_later(plan_path: 
     assert again.session.plan == desk.session.plan
 
 
+def test_a_second_session_on_a_plan_takes_no_notes_of_the_first_away(plan_path: Path) -> None:
+    first, second, idle = Desk(plan_path), Desk(plan_path), Desk(plan_path)
+    for number in (3, 4):
+        first.edit({"do": "status", "no": number, "status": "rejected"})
+    told = second.edit({"do": "status", "no": 9, "status": "rejected"})["unnoted"]
+    assert "another review of this plan" in told
+    idle.end()
+    assert first.edit({"do": "status", "no": 5, "status": "rejected"})["unnoted"] is None
+    assert "are lost" in str(second.end())
+    # The first one is killed here.
+    assert str(Desk(plan_path).brought_back).startswith("3 edits")
+
+
 def test_edits_are_saved_elsewhere_while_another_program_holds_the_file(plan_path: Path) -> None:
     desk = Desk(plan_path)
     desk.edit({"do": "status", "no": 3, "status": "rejected"})

@@ -44,6 +44,8 @@ class Journal:
         self._waiting: list[Mapping[str, Any]] = []
         self._plan = fingerprint(plan_path)
         self._lost: str | None = None
+        #: The journal's length as this session left it: with another one, another session writes.
+        self._there = self._length()
         self._entries = self._read()
 
     @property
@@ -90,6 +92,9 @@ class Journal:
         """Write what waits, if anything does."""
         if not self._waiting:
             return
+        if not self._is_mine():
+            self.refused = "another review of this plan is open, whose notes lie there"
+            return
         lines = "".join(json.dumps(each) + "\n" for each in self._waiting)
         try:
             with self.path.open("r+b" if self._size else "wb") as file:
@@ -101,8 +106,9 @@ class Journal:
                 os.fsync(file.fileno())
                 size = file.tell()
         except OSError as error:
-            self.refused = error.strerror or str(error)
+            self.refused, self._there = error.strerror or str(error), self._length()
             return
+        self._there = size
         self._size, self._waiting, self.refused = size, [], None
 
     def before_saving(self) -> None:
@@ -118,10 +124,17 @@ class Journal:
 
     def clear(self) -> None:
         """Nothing is left that another session would need."""
-        for path in (self.path, self.opened):
+        for path in (self.path, self.opened) if self._is_mine() else ():
             if path.is_file():  # a folder that takes no notes may refuse to forget any, too
                 path.unlink()
         self._size, self._waiting, self._entries, self.refused = 0, [], [], None
+        self._there = None
+
+    def _is_mine(self) -> bool:
+        return self._length() in (None, self._there)
+
+    def _length(self) -> int | None:
+        return self.path.stat().st_size if self.path.is_file() else None
 
     def _read(self) -> list[tuple[dict[str, Any], int]]:
         """The entries of an earlier session; none where they are not of this file, or all saved."""
