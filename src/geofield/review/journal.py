@@ -40,12 +40,11 @@ class Journal:
         #: The plan as it was when the journal began; there only where that was saved over.
         self.opened = plan_path.with_name(f".{plan_path.stem}.review-opened.gpkg")
         self.refused: str | None = None
-        self._size = 0
+        #: The whole lines of the file as this session left it, and what it does not count.
+        self._kept, self._rest = b"", b""
         self._waiting: list[Mapping[str, Any]] = []
         self._plan = fingerprint(plan_path)
         self._lost: str | None = None
-        #: The journal's length as this session left it: with another one, another session writes.
-        self._there = self._length()
         self._entries = self._read()
 
     @property
@@ -61,18 +60,22 @@ class Journal:
         is told in words.
         """
         told, self._lost = self._lost, None
+        whole = self._kept + self._rest
         unsaved = done = 0
+        begin = self._entries[0][1] if self._entries else 0
         for entry, end in self._entries[1:]:
             if "saved" in entry:
                 session.mark_saved(session.step)
-                unsaved = 0
+                unsaved, begin = 0, end
                 continue
             try:
                 play(session, entry)
             except GeofieldError as error:
+                # What follows is no part of this session: its next edit is written over it.
+                self._kept, self._rest = whole[:begin], whole[begin:]
                 kept = self._copy()
                 return f"{done} edits were brought back; then: {error} All are in {kept.name}."
-            self._size = end
+            begin = end
             done, unsaved = done + 1, unsaved + 1
         if unsaved:
             return f"{unsaved} edits of a session that ended without saving were brought back."
@@ -83,7 +86,7 @@ class Journal:
 
         What the disk does not take waits for the next time, and :attr:`refused` says why.
         """
-        if not self._size and not self._waiting:
+        if not self._kept and not self._waiting:
             self._waiting = [{"sha256": self._plan}]
         self._waiting.append(dict(entry))
         self.flush()
@@ -97,59 +100,66 @@ class Journal:
             return
         lines = "".join(json.dumps(each) + "\n" for each in self._waiting)
         try:
-            with self.path.open("r+b" if self._size else "wb") as file:
+            with self.path.open("r+b" if self._kept else "wb") as file:
                 # A line that was written by half, now or before a kill, is written anew.
-                file.truncate(self._size)
-                file.seek(self._size)
+                file.truncate(len(self._kept))
+                file.seek(len(self._kept))
                 file.write(lines.encode())
                 file.flush()
                 os.fsync(file.fileno())
-                size = file.tell()
         except OSError as error:
-            self.refused, self._there = error.strerror or str(error), self._length()
+            self.refused = error.strerror or str(error)
             return
-        self._there = size
-        self._size, self._waiting, self.refused = size, [], None
+        self._kept, self._rest = self._kept + lines.encode(), b""
+        self._waiting, self.refused = [], None
 
     def before_saving(self) -> None:
         """Keep the plan as it was opened, so that what was done on it can be undone."""
-        if self._size and not self.opened.exists():
+        if self._kept and not self.opened.exists():
             shutil.copyfile(self.plan_path, self.opened)
 
     def saved(self) -> None:
         """The edits so far lie in the plan now."""
         self._plan = fingerprint(self.plan_path)
-        if self._size or self._waiting:
+        if self._kept or self._waiting:
             self.write({"saved": self._plan})
 
     def clear(self) -> None:
         """Nothing is left that another session would need."""
-        for path in (self.path, self.opened) if self._is_mine() else ():
+        if self._is_mine():
+            self._remove()
+        self._kept, self._waiting, self._entries, self.refused = b"", [], [], None
+
+    def _remove(self) -> None:
+        for path in (self.path, self.opened):
             if path.is_file():  # a folder that takes no notes may refuse to forget any, too
                 path.unlink()
-        self._size, self._waiting, self._entries, self.refused = 0, [], [], None
-        self._there = None
+        self._kept, self._rest = b"", b""
 
     def _is_mine(self) -> bool:
-        return self._length() in (None, self._there)
-
-    def _length(self) -> int | None:
-        return self.path.stat().st_size if self.path.is_file() else None
+        """Whether the file is as this session left it, but for half a line that was cut off."""
+        if not self.path.is_file():
+            return True
+        there = self.path.read_bytes()
+        rest = there[len(self._kept) :]
+        return there.startswith(self._kept) and (rest == self._rest or b"\n" not in rest)
 
     def _read(self) -> list[tuple[dict[str, Any], int]]:
         """The entries of an earlier session; none where they are not of this file, or all saved."""
         if not self.path.exists():
-            self.clear()
+            self._remove()
             return []
         entries: list[tuple[dict[str, Any], int]] = []
-        for line in self.path.read_bytes().splitlines(keepends=True):
+        there, size = self.path.read_bytes(), 0
+        for line in there.splitlines(keepends=True):
             entry = _parsed(line)
             if entry is None:
                 break
-            self._size += len(line)
-            entries.append((entry, self._size))
+            size += len(line)
+            entries.append((entry, size))
+        self._kept, self._rest = there[:size], there[size:]
         if not entries or "saved" in entries[-1][0]:
-            self.clear()
+            self._remove()
             return []
         first = entries[0][0].get("sha256")
         marks = [entry["saved"] for entry, _ in entries if "saved" in entry]
@@ -157,7 +167,7 @@ class Journal:
         if whole and [first, *marks][-1] == self._plan:
             return entries
         kept = self._copy()
-        self.clear()
+        self._remove()
         self._lost = (
             "Edits of an earlier session belong to another version of this file and were "
             f"not made again; they are kept in {kept.name}."
