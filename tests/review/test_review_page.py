@@ -533,7 +533,7 @@ def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(
         page.wait(lambda: page.obstacle(16)["status"] == "possible")
         page.chord(Keys.CONTROL, "z")
         page.chord(Keys.CONTROL, "z")
-        page.wait(lambda: not page.state()["edited"])
+        page.wait(lambda: not page.state()["can_undo"])
         page.press("o")
         for left in (3, 0):
             rings = page.state()["field"]["rings"]

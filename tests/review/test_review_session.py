@@ -17,6 +17,7 @@ from geofield.plan import Plan, read_plan
 from geofield.review import Session, apply_command
 from geofield.review.desk import Desk
 from geofield.review.journal import journal_path
+from geofield.review.session import planned
 
 
 @pytest.fixture
@@ -305,6 +306,32 @@ def test_a_second_session_on_a_plan_takes_no_notes_of_the_first_away(plan_path: 
     assert "are lost" in str(second.end())
     # The first one is killed here.
     assert str(Desk(plan_path).brought_back).startswith("3 edits")
+
+
+def test_a_plan_edited_elsewhere_opens_with_tracks_of_what_it_holds(plan_path: Path) -> None:
+    assert Desk(plan_path).opening()["brought_back"] is None
+    with closing(sqlite3.connect(plan_path)) as file, file:
+        triggers = file.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall()
+        for (trigger,) in triggers:
+            file.execute(f'DROP TRIGGER "{trigger}"')
+        file.execute("UPDATE obstacles SET obstacle_no = NULL, status = NULL WHERE obstacle_no = 3")
+        file.execute(
+            "UPDATE obstacles SET kind = NULL, status = NULL, radius_m = NULL, buffer_m = NULL "
+            "WHERE obstacle_no = 4"
+        )
+        file.execute("DELETE FROM obstacles WHERE obstacle_no > 10")
+    desk = Desk(plan_path)
+    opening = desk.opening()
+    json.dumps(opening, allow_nan=False)  # a browser reads no NaN
+    assert len(opening["obstacles"]) == 10
+    assert {row["status"] for row in opening["obstacles"]} <= {"detected", "confirmed", "added"}
+    assert "planned anew" in opening["brought_back"]
+    again = planned(read_plan(plan_path), None).plan.tracks
+    assert again is not None
+    assert opening["figures"]["length_m"] == pytest.approx(again.statistics.length_m, abs=0.01)
+    assert not desk.save()["edited"]
+    assert desk.end() is None
+    assert Desk(plan_path).opening()["brought_back"] is None
 
 
 def test_edits_are_saved_elsewhere_while_another_program_holds_the_file(plan_path: Path) -> None:

@@ -57,6 +57,11 @@ class Desk:
         ground = None if self._picture_path is None else Ground(self._scene_of)
         session = Session(plan, ground)
         self.brought_back = journal.replay(session)
+        if self.brought_back is None and session.outdated:
+            self.brought_back = (
+                "Field or obstacles were edited after the tracks had been planned; the tracks here "
+                "are planned anew. Save them."
+            )
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.
         self.reading = secrets.token_hex(4)
@@ -172,7 +177,7 @@ class Desk:
 
     def end(self) -> str | None:
         """Leave nothing behind but edits that were not saved; where those are, in words."""
-        if not self.session.edited:
+        if not self.session.edited or self.journal.is_empty:
             self.journal.clear()
             return None
         self.journal.flush()

@@ -124,6 +124,11 @@ class Journal:
         if self._kept or self._waiting:
             self.write({"saved": self._plan})
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was done since the session began, or all was forgotten."""
+        return not (self._kept or self._waiting)
+
     def clear(self) -> None:
         """Nothing is left that another session would need."""
         if self._is_mine():

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geofield.errors import GeofieldWarning
+from geofield.model.review import reconcile
 from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
@@ -44,16 +45,22 @@ class Session:
     Parameters
     ----------
     plan : Plan
-        Field and obstacles count as they are; tracks are planned where there are none.
+        Field and obstacles count as they are; tracks are planned where there are none, or where
+        they are of before a person's edits in another program.
     ground : Ground, optional
         Finds the outline again for the edit ``ground``.
     """
 
     def __init__(self, plan: Plan, ground: Ground | None = None) -> None:
         self._ground = ground
-        self._steps = [Step(plan) if plan.tracks is not None else planned(plan, None)]
+        first = Step(plan)
+        #: Whether what lies in the file was edited since its tracks were planned.
+        self.outdated = plan.tracks is not None and not _is_planned(plan)
+        if plan.tracks is None or self.outdated:
+            first = planned(plan, None)
+        self._steps = [first]
         self._at = 0
-        self._saved = self._steps[0]
+        self._saved: Step | None = None if self.outdated else first
 
     @property
     def step(self) -> Step:
@@ -128,6 +135,20 @@ class Session:
     def forget(self) -> None:
         """Begin anew from the state that is shown: what led to it cannot be undone any more."""
         self._steps, self._at = [self.step], 0
+
+
+def _is_planned(plan: Plan) -> bool:
+    """Whether field and obstacles are those that the last stage recorded, as far as it did."""
+    obstacles, written = plan.obstacles, plan.evidence.written
+    if plan.outline_edited:
+        return False
+    if obstacles is None:
+        return True
+    if written is None:
+        return bool(obstacles["obstacle_no"].notna().all() and obstacles["status"].notna().all())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", GeofieldWarning)
+        return reconcile(obstacles, written, plan.grid)[1] == written
 
 
 def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:

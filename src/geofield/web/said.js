@@ -41,6 +41,7 @@ export const SAID = {
     [/^This page does not show the plan as it is.*$/, "Diese Seite zeigt den Plan nicht, wie er ist: er wurde in einem anderen Fenster geändert."],
     [/^(.*) is not there any more: another program.*$/, "$1 ist nicht mehr da: ein anderes Programm hat die Datei verschoben oder gelöscht."],
     [/^Save your edits under another name, or put the file back\.$/, "Speichern Sie unter anderem Namen (siehe Mehr) oder legen Sie die Datei zurück."],
+    [/^Field or obstacles were edited after the tracks had been planned;.*$/, "Feld oder Hindernisse wurden geändert, nachdem die Spuren geplant waren; hier sind die Spuren neu geplant. Speichern Sie sie."],
     [/^Go on there, or take over here\.$/, "Machen Sie dort weiter, oder übernehmen Sie hier."],
     [/^(\d+) edits of a session that ended without saving were brought back\.$/, "$1 Änderungen einer Sitzung, die ohne Speichern endete, sind wieder da."],
   ],
