@@ -123,13 +123,17 @@ class ReviewDock(QDockWidget):
 
     def _enable_keys(self, _: bool = True) -> None:
         for shortcut in self._shortcuts:
-            shortcut.setEnabled(self.isVisible() and self.review is not None)
+            shortcut.setEnabled(self.isVisible() and self._ready)
+
+    @property
+    def _ready(self) -> bool:
+        """Whether an edit would reach the plan: while its file is written, no layer holds it."""
+        return self.review is not None and self._released is None
 
     def _tell(self) -> None:
         """What the panel says of the plan as it is now."""
-        ready = self.review is not None
         for name, button in self.buttons.items():
-            button.setEnabled(ready or name == "open")
+            button.setEnabled(self._ready or (name == "open" and self._released is None))
         if self.review is None:
             self.title.setText(tr("Choose a layer of a plan, then press the button."))
             for label in (self.doubts, self.count, self.here, self.figures):
@@ -273,8 +277,9 @@ class ReviewDock(QDockWidget):
 
     def _move_to(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
         self._drop_tool()
-        self.review.move(self.current, self._to_layer(point))
-        self._show_mark()
+        if self._ready and self.current is not None:
+            self.review.move(self.current, self._to_layer(point))
+            self._show_mark()
 
     def begin_draw(self) -> None:
         """The next drag on the map is a new obstacle."""
@@ -283,6 +288,8 @@ class ReviewDock(QDockWidget):
 
     def _drawn(self, middle: QgsPointXY, edge: QgsPointXY) -> None:
         self._drop_tool()
+        if not self._ready:
+            return
         middle, edge = self._to_layer(middle), self._to_layer(edge)
         self.review.add(middle, middle.distance(edge))
 
@@ -386,10 +393,14 @@ class ReviewDock(QDockWidget):
         self._timer.stop()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         self._released = plan_files.Released(self.path)
+        self._enable_keys()
+        self._tell()
         self.live.ask({"do": "write", "file": self.path}, self._written)
 
     def _written(self, answer: dict[str, Any]) -> None:
         self._take_back()
+        if self.review is None:  # its layers were removed meanwhile
+            return
         if self._show_figures(answer):
             self._clear_preview()
         self.current = None
@@ -400,6 +411,10 @@ class ReviewDock(QDockWidget):
         released, self._released = self._released, None
         if released is not None:
             released.back()
+            self._enable_keys()
+            self._tell()
+            if self.review is None:
+                return
             # The layer has another edit buffer and undo stack now.
             self._connections = [each for each in self._connections if each[1] != self._edited]
             layer = self.review.layer

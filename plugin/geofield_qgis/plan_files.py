@@ -38,10 +38,13 @@ class Released:
     def back(self) -> None:
         """Take the file up again."""
         for layer, source, editing in self._held:
-            _point_to(layer, source, "ogr")
-            if editing:
-                layer.startEditing()
-            layer.triggerRepaint()
+            try:
+                _point_to(layer, source, "ogr")
+                if editing:
+                    layer.startEditing()
+                layer.triggerRepaint()
+            except RuntimeError:
+                continue  # removed from the project meanwhile
         self._held = []
 
 

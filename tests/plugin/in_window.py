@@ -151,7 +151,11 @@ def work():
     # Saving plans again, into the file that QGIS had open.
     ANSWER["unsaved"] = layer.isModified()
     key(Qt.Key.Key_S)
+    until(lambda: dock._released is not None, 20, "writing")
+    key(Qt.Key.Key_R)  # no layer holds the file now: an edit would be lost
+    ANSWER["while_writing"] = [dock.buttons["reject"].isEnabled(), layer.isEditable()]
     until(lambda: dock._released is None and not dock._hidden, 200, "saved")
+    ANSWER["after_writing"] = dock.buttons["reject"].isEnabled()
     QTest.qWait(200)
     ANSWER["saved"] = {
         "provider": layer.providerType(),

@@ -119,6 +119,8 @@ def test_keys_resize_move_and_draw(seen):
 def test_saving_plans_again_in_the_open_file(seen):
     saved = seen["saved"]
     assert seen["unsaved"]
+    assert seen["while_writing"] == [False, False]
+    assert seen["after_writing"]
     assert saved["messages"] == []
     assert saved["provider"] == "ogr"
     assert saved["renderer"] == "QgsRuleBasedRenderer"
