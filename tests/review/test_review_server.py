@@ -155,6 +155,31 @@ def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
     assert visitor.post("/api/nothing", {})[0] == 404
     assert visitor.post("/api/edit", {}, Content_Length=str(MOST_BYTES + 1))[0] == 413
     assert visitor.post("/api/edit", {}, Content_Length="-1")[0] == 413
+    assert visitor.post("/api/edit", {}, Content_Length="\xb2")[0] == 413  # a digit, no number
+    # Values of every wrong kind are refused in words, and the connection is not cut.
+    for edit in (
+        {"do": ["status"]},
+        {"do": "status", "no": 3, "status": ["rejected"]},
+        {"do": "status", "no": 3, "status": None},
+        {"do": "polygon", "ring": {"0": [1, 2]}},
+        {"do": "outline", "rings": [[1, 2, 3]]},
+        {"do": "outline", "rings": [["ab", "cd", "ef"]]},
+        {"do": "outline", "rings": [5]},
+        {"do": "choose", "no": 10**30},
+        {"do": "choose", "no": -1},
+        {"do": "circle", "x": 10**400, "y": 0, "radius_m": 2},
+        {"do": "move", "no": 3, "dx_m": 1e308, "dy_m": 1e308},
+        {"do": "direction", "a": None, "b": [0, 0]},
+        {"do": "direction", "a": [1e300, 1e300], "b": [0, 0]},
+        {"do": "tracks", "settings": {"spacing_m": "wide"}},
+        {"do": "tracks", "settings": {"spacing_m": 1e-9}},
+        {"do": "tracks", "settings": {"direction": 5}},
+        {"do": "ground", "place": "ab"},
+        {"do": "ground", "place": [1e300, 0]},
+    ):
+        for request in ("/api/edit", "/api/preview"):
+            status, answer = visitor.post(request, edit)
+            assert (status, bool(answer["message"])) == (422, True), (edit, answer)
     status, answer = visitor.post("/api/edit", {"do": "status", "no": 77, "status": "rejected"})
     assert (status, answer["message"]) == (422, "There is no obstacle 77.")
     for path in (

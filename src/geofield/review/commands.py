@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 Command = Mapping[str, Any]
 
 
+#: No place of a metric CRS, and no length, is beyond it, metres.
+_FAR = 1e9
+
+
 class EditError(GeofieldError):
     """An edit that cannot be made; the plan stays as it is."""
 
@@ -151,7 +155,7 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
 
 def set_direction(plan: Plan, command: Command) -> Plan:
     """Tracks along a line that was dragged: ``a``, ``b``, its ends."""
-    (ax, ay), (bx, by) = _places([command["a"], command["b"]])
+    (ax, ay), (bx, by) = places_of([command["a"], command["b"]])
     if math.hypot(bx - ax, by - ay) < 1.0:
         raise EditError("The line is shorter than a metre: it has no clear direction.")
     lon, lat = transformer(plan.field.crs, LONLAT).transform([ax, bx], [ay, by])
@@ -249,7 +253,7 @@ def _whole(command: Command, name: str) -> int:
 
 def _number(command: Command, name: str) -> float:
     value = command[name]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _FAR:
         raise EditError(f"{name} is not a number: {value!r}.")
     return float(value)
 
@@ -261,12 +265,13 @@ def _radius(command: Command) -> float:
     return radius_m
 
 
-def _places(values: Any) -> list[tuple[float, float]]:
+def places_of(values: Any) -> list[tuple[float, float]]:
+    """Places, each two numbers, x and y in the metric CRS; an `EditError` for anything else."""
     try:
         places = [(float(x), float(y)) for x, y in values]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise EditError("A place is two numbers, x and y.") from None
-    if not np.isfinite(places).all():
+    if not (np.abs(places) < _FAR).all():
         raise EditError("A place is two numbers, x and y.")
     return places
 
@@ -274,7 +279,7 @@ def _places(values: Any) -> list[tuple[float, float]]:
 def _polygon(rings: Any, what: str) -> Polygon:
     if not isinstance(rings, list) or not rings:
         raise EditError(f"The {what} has no ring.")
-    places = [_places(ring) for ring in rings]
+    places = [places_of(ring) for ring in rings]
     if any(len(set(ring)) < 3 for ring in places):
         raise EditError(f"The {what} needs at least three corners.")
     polygon = Polygon(places[0], places[1:])

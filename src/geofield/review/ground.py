@@ -13,7 +13,7 @@ from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
 from geofield.model.evidence import outline_digest
-from geofield.review.commands import Command, EditError
+from geofield.review.commands import Command, EditError, places_of
 from geofield.settings import Settings
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ class Ground:
             When the place lies outside the picture or contradicts an earlier one.
         """
         try:
-            x, y = (float(value) for value in command["place"])
-        except (KeyError, TypeError, ValueError):
+            ((x, y),) = places_of([command["place"]])
+        except KeyError:
             raise EditError("A place is two numbers, x and y.") from None
         # Searching needs the most libraries of all, and most sessions never do it.
         from geofield.field import extract_field, prepare_field
