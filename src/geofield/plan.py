@@ -197,7 +197,7 @@ class Plan:
         field = field_from_row(rows, dataset, evidence)
         obstacles = dataset.tables.get(schema.OBSTACLES.name)
         tracks = None
-        if schema.SEGMENTS.name in dataset.tables and "tracks" in evidence:
+        if Tracks.lie_in(dataset.tables, evidence):
             tracks = Tracks.from_tables(
                 dataset.tables, evidence["tracks"], grid=dataset.grid, outline=field.polygon
             )

@@ -215,3 +215,17 @@ def test_edited_tracks_are_told_before_they_are_planned_anew(
     moved = [translate(line, 0.5, 0) for line in gpd.read_file(file, layer="segments").geometry]
     rewritten(file, "segments", lambda table: table.set_geometry(moved, crs=table.crs))
     assert "The tracks there were edited" in run(folder, made, "--overwrite")
+
+
+def test_a_layer_of_tracks_that_is_gone_is_planned_again(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("DROP TABLE gaps")
+        for table in ("gpkg_contents", "gpkg_geometry_columns"):
+            connection.execute(f"DELETE FROM {table} WHERE table_name = 'gaps'")
+    assert plan_in(folder).tracks is None
+    geofield("export", file, "-f", "html", "--out", folder / "page")
+    geofield("tracks", file, "-o", file)
+    tracks = plan_in(folder).tracks
+    assert tracks is not None
+    assert tracks.spacing_m == 6

@@ -82,6 +82,16 @@ def test_info(plan_file):
     assert "0.6389" in run(info, plan_file).stdout
 
 
+def test_info_of_a_field_across_180_degrees(tmp_path):
+    import geopandas as gpd
+
+    middle = gpd.points_from_xy([-179.9999], [-17.0], crs=4326).to_crs(32701)[0]
+    gpd.GeoDataFrame(geometry=[middle.buffer(150)], crs=32701).to_file(tmp_path / "fiji.gpkg")
+    facts = json.loads(run(info, tmp_path / "fiji.gpkg", "--json").stdout)
+    assert abs(facts["field"]["lon"]) > 179.99
+    assert facts["field"]["lat"] == pytest.approx(-17.0, abs=0.01)
+
+
 def test_info_of_a_picture(sample):
     facts = json.loads(run(info, sample / "field_1.tif", "--json").stdout)
     assert facts["centre"]["lat"] == pytest.approx(35.075, abs=0.01)

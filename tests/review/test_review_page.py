@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import cast, get_args
 
 import pytest
 from axe_core_python.selenium import Axe
@@ -20,6 +20,7 @@ from selenium import webdriver
 from selenium.common.exceptions import NoAlertPresentException
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from shapely import Polygon
 
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -518,7 +519,7 @@ def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(
     odd = replace(
         plan,
         obstacles=obstacles,
-        field=replace(plan.field, polygon=plan.field.polygon.difference(hole)),
+        field=replace(plan.field, polygon=cast(Polygon, plan.field.polygon.difference(hole))),
         evidence=replace(plan.evidence, detection=detection, written=None),
     )
     save_plan(odd, plan_path, overwrite=True)

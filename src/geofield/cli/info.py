@@ -37,6 +37,8 @@ def info(file: Path, crs: str | None, as_json: bool) -> None:
 
 
 def _vector(file: Path, crs: str | None) -> dict[str, Any]:
+    import numpy as np
+
     from geofield.crs import authority_name
     from geofield.formats import detect, read_dataset
     from geofield.formats.arrow import to_lonlat
@@ -58,7 +60,9 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
     }
     if len(field):
         shape = field.geometry.iloc[0]
-        place = to_lonlat(field.geometry.to_numpy()[:1], dataset.crs)[0].representative_point()
+        # In metres: across 180 degrees the outline goes round the world in degrees.
+        inside = np.array([shape.representative_point()], dtype=object)
+        place = to_lonlat(inside, dataset.crs)[0]
         one = Field(shape, dataset.crs)
         facts["field"] = {
             "area (ha)": round(one.area_ha, 4),

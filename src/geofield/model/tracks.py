@@ -156,6 +156,12 @@ class Tracks:
             "segments_sha256": self.written or self._digest(),
         }
 
+    @staticmethod
+    def lie_in(tables: Mapping[str, gpd.GeoDataFrame], evidence: Mapping[str, Any]) -> bool:
+        """Whether all that :meth:`from_tables` needs is there: a person may delete a layer."""
+        needed = (schema.TRACKS.name, schema.SEGMENTS.name, schema.GAPS.name)
+        return "tracks" in evidence and all(name in tables for name in needed)
+
     @classmethod
     def from_tables(
         cls,

@@ -121,9 +121,7 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
         polygon = max(polygon.geoms, key=lambda part: part.area)
     evidence = dataset.provenance.evidence
     tracks = None
-    # A person may have deleted one of the layers.
-    layers = (schema.TRACKS.name, schema.SEGMENTS.name, schema.GAPS.name)
-    if "tracks" in evidence and all(name in dataset.tables for name in layers):
+    if Tracks.lie_in(dataset.tables, evidence):
         tracks = Tracks.from_tables(
             dataset.tables, evidence["tracks"], grid=dataset.grid, outline=polygon
         )
