@@ -99,6 +99,22 @@ def test_results_do_not_depend_on_the_window(simulated, monkeypatch, core_px):
         )
 
 
+def test_trees_lie_in_the_same_place_where_windows_begin_between_working_pixels(monkeypatch):
+    coarse = SimulationSettings(width_px=260, height_px=260, resolution_m=1.3, obstacles=30)
+    made = simulate_field(3, coarse)
+    places = []
+    for core_px in (1024, 160):
+        monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
+        found = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15), others=False)
+        places.append(found[["x_px", "y_px"]].to_numpy())
+    whole, parts = places
+    nearest = np.hypot(*(parts[:, None] - whole).T).argmin(axis=0)
+    away = parts - whole[nearest]
+    away = away[np.hypot(*away.T) < 1.0]
+    assert len(away) > 20
+    assert np.hypot(*away.T).mean() < 0.12
+
+
 def test_a_finer_picture_gives_the_same_trees():
     base = SimulationSettings(width_px=300, height_px=300, obstacles=6, climate="temperate")
     fine = SimulationSettings(

@@ -176,13 +176,14 @@ def _look(
             bands = working_bands(scene, tone, factor)
             named = answers(bands)
             here = _candidates(named, bands, scene.valid, factor, polarity)
-            start = round(window.col / factor), round(window.row / factor)
+            # A window starts on a whole pixel of the picture, seldom on one of the working grid.
+            start = window.col / factor, window.row / factor
             here = here.scaled(1.0, *start)
             crowns = crowns.joined(here.take(_in_core(here, window, factor)))
             if standing is not None:
                 region = search_region(scene, area)
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
-                standing.fill(named["other"], cells, start[0] // CELL_PX, start[1] // CELL_PX)
+                standing.fill(named["other"], cells, *(round(each / CELL_PX) for each in start))
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
     return crowns
