@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
+from geofield.errors import FieldWarning
 from geofield.field import extract_field
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -55,3 +56,14 @@ def test_a_rounding_error_in_the_point_changes_nothing():
     first, second = fields
     assert first.polygon.equals(second.polygon)
     assert first.quality == second.quality
+
+
+def test_a_small_picture_of_a_drone_gives_an_outline():
+    # The median's square of 21 metres is 421 pixels wide here.
+    truth = simulate_field(
+        700_021, SimulationSettings(width_px=64, height_px=64, resolution_m=0.05)
+    )
+    with pytest.warns(FieldWarning):
+        field = extract_field(truth.scene, lat=truth.lat, lon=truth.lon)
+    assert field.polygon.is_valid
+    assert 0 < 1e4 * field.area_ha < 11

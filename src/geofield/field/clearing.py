@@ -25,6 +25,8 @@ _STANDS_OUT = (5.0, 10.0, 20.0)
 _WINDOW_M, _LARGEST_M = 21.0, 45.0
 #: Side of that square at least, pixels: a smaller one holds too few for a median.
 _SMALLEST_WINDOW_PX = 9
+#: And at most: OpenCV counts the square's pixels in 16 bits.
+_LARGEST_WINDOW_PX = 255
 #: Ground is one surface within this distance. So much of what is around a thing has to be; and
 #: around what is painted, for the rest to be left out.
 _EVEN, _AROUND_THING, _AROUND_PAINT = 5.0, 0.8, 0.6
@@ -120,7 +122,7 @@ def _like_most(ground: FloatArray) -> BoolArray:
 def _standing_out(stack: FloatArray, pixel_m: float) -> FloatArray:
     import cv2
 
-    side = max(round(_WINDOW_M / pixel_m) | 1, _SMALLEST_WINDOW_PX)
+    side = min(max(round(_WINDOW_M / pixel_m) | 1, _SMALLEST_WINDOW_PX), _LARGEST_WINDOW_PX)
     total = np.zeros(stack.shape[1:], np.float32)
     for layer in stack:
         # The median filter wants bytes: thirds of a unit are fine enough.
