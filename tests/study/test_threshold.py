@@ -65,6 +65,22 @@ def test_regions_chosen_by_hand(two_fields):
         extract_field(scene, **at(scene, 30, 40), method="study", regions=[9999])
 
 
+def test_a_chosen_region_that_lies_apart_is_told(two_fields):
+    scene = scene_of(two_fields)
+    numbers = study_pictures(scene.grey)
+    left, right, around = (numbers.region_at(*at) for at in ((30, 40), (180, 90), (120, 20)))
+    place = at(scene, 30, 40)
+    apart = extract_field(scene, **place, method="study", regions=[right, left])
+    assert apart.area_ha == pytest.approx((120 * 90 - 144) * 0.25 / 1e4, rel=0.02)
+    told = f"region {right} does not touch the others and is left out"
+    assert told in apart.quality.reasons
+    with pytest.warns(FieldWarning, match="fills the whole picture"):
+        joined = extract_field(scene, **place, method="study", regions=[right, left, around])
+    assert not any("left out" in reason for reason in joined.quality.reasons)
+    twice = extract_field(scene, **place, method="study", regions=[left, left])
+    assert not any("left out" in reason for reason in twice.quality.reasons)
+
+
 def test_reconstruction_removes_dark_specks_inside(two_fields):
     pictures = study_pictures(two_fields.astype(np.float32))
     picture = pictures.reconstruction((pictures.region_at(30, 40),))

@@ -137,7 +137,21 @@ def segment(scene: Scene, x_px: float, y_px: float, regions: Sequence[int] = ())
     if len(regions) > 1:
         # The seam between neighbouring regions is a few pixels wide.
         mask = np.asarray(closing(mask, disk(3)), bool)
-    return Segmentation(mask, figures=(("threshold", pictures.threshold),))
+    notes = tuple(
+        f"region {number} does not touch the others and is left out"
+        for number in _apart(mask, pictures.regions, regions)
+    )
+    return Segmentation(mask, notes, (("threshold", pictures.threshold),))
+
+
+def _apart(mask: BoolArray, numbered: NDArray[np.int32], chosen: Sequence[int]) -> list[int]:
+    """Of several chosen regions those beside the largest part of a mask: an outline is one part."""
+    parts, count = ndimage.label(mask)
+    if len(chosen) < 2 or count < 2:
+        return []
+    largest = 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
+    within = set(np.unique(numbered[parts == largest]).tolist())
+    return sorted(set(chosen) - within)
 
 
 def _number(binary: BoolArray, valid: BoolArray) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
