@@ -7,6 +7,7 @@ positions divided by k. Pictures are float32 (rows, cols); beyond the border the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
@@ -33,6 +34,12 @@ class Window:
         """Return which positions lie in the core."""
         x0, y0, x1, y1 = self.core
         return (x_px >= x0) & (x_px < x1) & (y_px >= y0) & (y_px < y1)
+
+    @property
+    def core_slices(self) -> tuple[slice, slice]:
+        """Rows and columns of the window whose pixels have their centres in the core."""
+        x0, y0, x1, y1 = (math.ceil(edge - 0.5) for edge in self.core)
+        return slice(y0 - self.row, y1 - self.row), slice(x0 - self.col, x1 - self.col)
 
 
 def windows(

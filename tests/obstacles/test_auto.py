@@ -1,5 +1,7 @@
 """The default detector on simulated fields with known truth, and on bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -115,6 +117,22 @@ def test_trees_lie_in_the_same_place_where_windows_begin_between_working_pixels(
     assert np.hypot(*away.T).mean() < 0.12
 
 
+@pytest.mark.parametrize("core_px", [1024, 96])
+def test_ground_that_the_picture_does_not_show_is_told(simulated, monkeypatch, core_px):
+    monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
+    scene, field = simulated.scene, simulated.field
+    whole = gf.detect_obstacles(scene, field)
+    assert not any("does not show" in note for note in whole.attrs["detection"]["notes"])
+    middle = int(field.polygon_px(scene.grid).centroid.x)
+    cut = scene.crop(0, 0, middle, scene.grid.height_px)
+    valid = scene.valid.copy()
+    valid[:, middle:] = False
+    for half in (cut, replace(scene, valid=valid)):
+        with pytest.warns(ObstacleWarning, match=r"does not show (4|5)\d% of the field"):
+            found = gf.detect_obstacles(half, field)
+        assert any("does not show" in note for note in found.attrs["detection"]["notes"])
+
+
 def test_a_finer_picture_gives_the_same_trees():
     base = SimulationSettings(width_px=300, height_px=300, obstacles=6, climate="temperate")
     fine = SimulationSettings(
@@ -158,7 +176,8 @@ def test_holes_without_data_add_nothing(simulated):
     bands = scene.bands.copy()
     bands[:, ~valid] = 0
     holed = Scene(scene.grid, bands, scene.roles, valid)
-    found = gf.detect_obstacles(holed, simulated.field)
+    with pytest.warns(ObstacleWarning, match="does not show 14% of the field"):
+        found = gf.detect_obstacles(holed, simulated.field)
     rows, cols = found["y_px"].to_numpy().astype(int), found["x_px"].to_numpy().astype(int)
     assert valid[rows, cols].all()
 

@@ -116,7 +116,9 @@ def detect_by_default(
         if standing is None:
             notes.append("The field is too large to search it for what is no tree.")
     reach = None if ring is None else ring.buffer(radius_m[1] / resolution)
-    crowns = _look(picture, area, reach, tone, factor, polarity, standing, progress)
+    crowns, seen_px = _look(picture, area, reach, tone, factor, polarity, standing, progress)
+    if ring is not None:
+        notes += _unseen(ring.area, seen_px)
     crowns = once_each(crowns, **facts["suppression"])
     p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     shapes: list[shapely.Polygon] = []
@@ -161,15 +163,16 @@ def _look(
     polarity: Polarity,
     standing: StandingMap | None,
     progress: Progress | None,
-) -> Circles:
+) -> tuple[Circles, int]:
     """Return the candidates of all windows that are within reach, and fill the map.
 
-    The reach is in pixels of the picture, candidates are in working pixels.
+    The reach is in pixels of the picture, candidates are in working pixels. Told, too, is how
+    many pixels of the area have data.
     """
     todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, ALIGN_PX, factor))
     if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
-    crowns = Circles()
+    crowns, seen_px = Circles(), 0
     for done, window in enumerate(todo):
         scene = part_of(picture, (window.col, window.row, window.width, window.height), tone)
         if scene.valid.any():
@@ -180,13 +183,28 @@ def _look(
             start = window.col / factor, window.row / factor
             here = here.scaled(1.0, *start)
             crowns = crowns.joined(here.take(_in_core(here, window, factor)))
+            region = search_region(scene, area)
+            seen_px += int(region[window.core_slices].sum())
             if standing is not None:
-                region = search_region(scene, area)
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
                 standing.fill(named["other"], cells, *(round(each / CELL_PX) for each in start))
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
-    return crowns
+    return crowns, seen_px
+
+
+def _unseen(field_px: float, seen_px: int) -> list[str]:
+    """Return a note on the part of a field that the picture does not show, and warn of it."""
+    missing = field_px - seen_px
+    # Along its border pixels are counted whole or not at all.
+    if missing <= max(0.01 * field_px, field_px**0.5):
+        return []
+    note = (
+        f"The picture does not show {missing / field_px:.0%} of the field: "
+        "what stands there is not found."
+    )
+    warnings.warn(note, ObstacleWarning, stacklevel=4)
+    return [note]
 
 
 def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
