@@ -1286,12 +1286,12 @@
     <message>
       <location filename="description.py" />
       <source>Defaults</source>
-      <translation type="unfinished" />
+      <translation>Voreinstellungen</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>Begin with the default settings, not with those that the plan was made with.</source>
-      <translation type="unfinished" />
+      <translation>Mit den Voreinstellungen beginnen, nicht mit denen, mit denen der Plan gemacht wurde.</translation>
     </message>
     <message>
       <location filename="description.json" />
