@@ -151,3 +151,17 @@ def test_an_edit_that_cannot_stand_stops_before_anything_is_lost(folder: Path) -
     said = _batch(folder, code=1)
     assert "outline of field a" in " ".join(said.split())
     assert (folder / "farm" / "farm.gpkg").read_bytes() == before
+
+
+def test_what_a_person_keeps_beside_the_farm(folder: Path) -> None:
+    path = folder / "farm" / "farm.gpkg"
+    fields = pyogrio.read_dataframe(path, layer="field")
+    notes = fields[["geometry"]].assign(text="wet", geometry=fields.geometry.centroid)
+    pyogrio.write_dataframe(notes, path, layer="notes")
+    pyogrio.write_dataframe(fields.assign(sown="May"), path, layer="field", geometry_name="geom")
+    _edit(folder, "obstacles", _tree_grown)
+    for more in ((), ("--fresh",)):
+        said = _batch(folder, *more)
+        assert "columns sown of layer 'field' are not the farm's" in said or more
+        kept = pyogrio.read_dataframe(path, layer="notes")[["text", "geometry"]]
+        assert kept.equals(notes[["text", "geometry"]])

@@ -546,6 +546,7 @@ def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(
             page.click(*rings[1][0])
             page.press(Keys.DELETE)
             page.wait(lambda left=left: holes(page) == ([left] if left else []))
+        assert len(page.state()["field"]["rings"]) == 1
 
 
 def holes(page: Page) -> list[int]:

@@ -11,6 +11,8 @@ import hashlib
 import json
 import sqlite3
 import tempfile
+import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +22,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.errors import FormatError, GeofieldError
+from geofield.errors import FormatError, FormatWarning, GeofieldError
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.formats import origin
 from geofield.formats.gpkg_read import opened
@@ -71,6 +73,7 @@ def take_edits(farm: Farm, overview: Path) -> list[Plan]:
     written = record[DIGESTS]
     fields, obstacles = (_table(overview, of) for of in (schema.FIELD, schema.OBSTACLES))
     obstacles = _with_owners(obstacles, fields)
+    _tell_columns(farm, overview, {schema.FIELD: fields, schema.OBSTACLES: obstacles})
     now = digests_of(fields, obstacles)
     edited = [one for one, digest in now.items() if written.get(one) not in (None, digest)]
     unknown = [one for one in now if one not in written]
@@ -81,6 +84,22 @@ def take_edits(farm: Farm, overview: Path) -> list[Plan]:
         )
     standing = obstacles if record[DETAILS] else None
     return [_edited(farm, one, fields, standing) for one in edited if one in farm]
+
+
+def _tell_columns(
+    farm: Farm, overview: Path, tables: Mapping[schema.Layer, gpd.GeoDataFrame]
+) -> None:
+    """That columns which a person added to the overview do not stay, and what does."""
+    for of, table in tables.items():
+        known = {*farm.layer(of.name).columns, FIELD_ID, EPSG}
+        added = [name for name in schema.own_columns(of, table) if name not in known]
+        if added:
+            warnings.warn(
+                f"{overview.name}: columns {', '.join(added)} of layer {of.name!r} are not the "
+                "farm's and do not stay. Add them to the places file, or to a layer of your own.",
+                FormatWarning,
+                stacklevel=3,
+            )
 
 
 def is_overview(path: Path) -> bool:

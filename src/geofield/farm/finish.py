@@ -9,6 +9,7 @@ from geofield.farm.places import Places
 from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
+from geofield.formats.gpkg_guests import bring_guests
 from geofield.staging import staged_folder
 
 
@@ -50,4 +51,7 @@ def _overview(store: Store) -> list[str]:
         return []
     with staged_folder(store.folder, overwrite=True) as staging:
         files = write_overview(read_farm(store.place), staging, name=store.folder.name)
+        if (store.folder / OVERVIEW).is_file():
+            # What a person keeps in it beside the farm comes along.
+            bring_guests(store.folder / OVERVIEW, staging / OVERVIEW)
     return [file.name for file in files]

@@ -45,12 +45,13 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
             contents = dict(
                 connection.execute("SELECT table_name, data_type FROM old.gpkg_contents")
             )
+            here = {name for (name,) in connection.execute("SELECT table_name FROM gpkg_contents")}
         except sqlite3.DatabaseError:
             return  # not a GeoPackage
         if schema.FIELD.name not in contents:
             return
         left = []
-        for name in sorted(contents.keys() - _OURS):
+        for name in sorted(contents.keys() - _OURS - here):
             connection.execute("BEGIN")
             try:
                 _bring_layer(connection, name, contents[name])

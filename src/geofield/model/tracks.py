@@ -158,7 +158,10 @@ class Tracks:
 
     @staticmethod
     def lie_in(tables: Mapping[str, gpd.GeoDataFrame], evidence: Mapping[str, Any]) -> bool:
-        """Whether all that :meth:`from_tables` needs is there: a person may delete a layer."""
+        """Whether `tables` and `evidence` hold what :meth:`from_tables` needs.
+
+        A person may have deleted a layer.
+        """
         needed = (schema.TRACKS.name, schema.SEGMENTS.name, schema.GAPS.name)
         return "tracks" in evidence and all(name in tables for name in needed)
 
