@@ -39,14 +39,7 @@ def out(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> 
     command += ["--turning-radius", 8]
     for name in ("gpkg", "geojson", "shapefile", "isoxml", "rdf", "kml"):
         command += ["--format", name]
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, command)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return folder / "out", done.stderr
+    return folder / "out", _called(*command).stderr
 
 
 def test_the_terminal_and_the_report_tell(out: tuple[Path, str]) -> None:
@@ -111,3 +104,67 @@ def test_a_drawn_outline_at_the_frame_is_told_too(simulated: SimulatedField) -> 
     assert OUTSIDE in doubt
     parcel = replace(plan, field=replace(field, method="boundary"))
     assert parcel.doubts == ()
+
+
+@pytest.fixture(scope="module")
+def parcel(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run in a parcel of one's own of which the picture shows two thirds."""
+    folder = tmp_path_factory.mktemp("parcel")
+    x, _ = simulated.scene.pixel_of(lat=simulated.lat, lon=simulated.lon)
+    cut = simulated.scene.crop(0, 0, int(x) + 30, simulated.scene.grid.height_px)
+    write_scene(cut, folder / "half.tif")
+    outline = gpd.GeoDataFrame(geometry=[simulated.field.polygon], crs=simulated.field.crs)
+    outline.to_file(folder / "parcel.gpkg")
+    command = ["run", folder / "half.tif", "--lat", simulated.lat, "--lon", simulated.lon]
+    command += ["--boundary", folder / "parcel.gpkg", "--out", folder / "out", "--spacing", 6]
+    for name in ("gpkg", "geojson", "map", "html", "report"):
+        command += ["--format", name]
+    _called(*command)
+    return folder / "out"
+
+
+def _called(*command: object) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "geofield", *map(str, command)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_ground_that_nobody_saw_is_told_wherever_a_plan_is_looked_at(parcel: Path) -> None:
+    unseen = "The picture does not show"
+    assert unseen in _called("info", parcel / "field.gpkg").stdout
+    report = json.loads((parcel / "report.json").read_text(encoding="utf-8"))
+    assert unseen in report["evidence"]["obstacles"]["doubts"][0]
+    assert unseen in (parcel / "geojson" / "field.geojson").read_text(encoding="utf-8")
+    assert unseen in read_plan(parcel / "field.gpkg").provenance.obstacle_doubts[0]
+    page = (parcel / "field.html").read_text(encoding="utf-8")
+    start = page.index('id="plan">') + len('id="plan">')
+    values = json.loads(page[start : page.index("</script>", start)])
+    assert unseen in values["doubts"][0]
+    # A parcel is whole: it only leads out of the picture.
+    assert values["field"]["frame"] == []
+
+
+def test_a_map_shows_all_of_a_field_that_its_picture_does_not(
+    parcel: Path, simulated: SimulatedField
+) -> None:
+    pixels = np.asarray(Image.open(parcel / "map.png").convert("RGB")).astype(int)
+    assert int((np.abs(pixels - theme.rgb(theme.DOUBT)).max(axis=2) < 40).sum()) > 500
+    map_part = pixels[: int(0.9 * len(pixels))]
+    y, x = np.nonzero(np.abs(map_part - theme.rgb(theme.OUTLINE)).max(axis=2) < 30)
+    left, bottom, right, top = simulated.field.polygon.bounds
+    drawn = np.ptp(x) / np.ptp(y)
+    assert drawn == pytest.approx((right - left) / (top - bottom), rel=0.03)
+
+
+def test_an_outline_that_leads_out_of_the_picture_does_not_end_there(
+    simulated: SimulatedField,
+) -> None:
+    grid, crs = simulated.scene.grid, simulated.field.crs
+    x, y = grid.to_crs([-60.0, 120.0, 120.0, -60.0], [40.0, 50.0, 200.0, 220.0], crs)
+    drawn = shapely.Polygon(np.column_stack([x, y]))
+    assert along_frame(drawn, crs, grid) == []

@@ -122,7 +122,7 @@ def test_ground_that_the_picture_does_not_show_is_told(simulated, monkeypatch, c
     monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
     scene, field = simulated.scene, simulated.field
     whole = gf.detect_obstacles(scene, field)
-    assert not any("does not show" in note for note in whole.attrs["detection"]["notes"])
+    assert not any("does not show" in doubt for doubt in whole.attrs["detection"]["doubts"])
     middle = int(field.polygon_px(scene.grid).centroid.x)
     cut = scene.crop(0, 0, middle, scene.grid.height_px)
     valid = scene.valid.copy()
@@ -130,7 +130,7 @@ def test_ground_that_the_picture_does_not_show_is_told(simulated, monkeypatch, c
     for half in (cut, replace(scene, valid=valid)):
         with pytest.warns(ObstacleWarning, match=r"does not show (4|5)\d% of the field"):
             found = gf.detect_obstacles(half, field)
-        assert any("does not show" in note for note in found.attrs["detection"]["notes"])
+        assert any("does not show" in doubt for doubt in found.attrs["detection"]["doubts"])
 
 
 def test_a_finer_picture_gives_the_same_trees():
@@ -197,7 +197,7 @@ def test_a_coarse_picture_warns(simulated):
     coarse = Scene(grid, scene.bands[:, ::4, ::4], scene.roles, scene.valid[::4, ::4])
     with pytest.warns(ObstacleWarning, match="coarse"):
         found = gf.detect_obstacles(coarse)
-    assert "coarse" in found.attrs["detection"]["notes"][0]
+    assert "coarse" in found.attrs["detection"]["doubts"][0]
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,8 @@ def info(file: Path, crs: str | None, as_json: bool) -> None:
             click.echo(f"{key}:")
             for name, inner in value.items():
                 click.echo(f"  {name}: {inner}")
+        elif isinstance(value, list):
+            click.echo("\n".join([f"{key}:", *(f"  {each}" for each in value)]))
         else:
             click.echo(f"{key}: {value}")
 
@@ -43,6 +45,7 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
     from geofield.formats import detect, read_dataset
     from geofield.formats.arrow import to_lonlat
     from geofield.model.field import Field
+    from geofield.model.map_words import doubts_in_words
 
     found = detect(file)
     dataset = read_dataset(file, crs=crs)
@@ -70,6 +73,8 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
             "lat": round(place.y, 6),
             "lon": round(place.x, 6),
         }
+    if len(field) and (told := doubts_in_words(dataset)):
+        facts["check"] = told
     statuses = dataset.table("obstacles")["status"].value_counts(dropna=False).sort_index()
     if len(statuses):
         facts["obstacles"] = {str(key): int(count) for key, count in statuses.items()}

@@ -135,7 +135,7 @@ def restored(dataset: Dataset, record: Origin | None) -> Dataset:
 
 
 def lineage(dataset: Dataset) -> str:
-    """One line for people: the picture, its date, licence and attribution, the software."""
+    """One line for people: the picture, its date, licence, attribution, what it did not show."""
     source = dataset.provenance.source
     words = [
         f"Imagery: {source.name}" if source.name else "",
@@ -143,6 +143,7 @@ def lineage(dataset: Dataset) -> str:
         f"licence: {source.licence}" if source.licence else "",
         source.attribution,
         dataset.provenance.software,
+        *dataset.provenance.obstacle_doubts,
     ]
     return "; ".join(word for word in words if word)
 

@@ -23,6 +23,7 @@ from geofield.mapping.labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
     credit_in_words,
+    doubts_in_words,
     figures_in_words,
     frame_lines,
     length_in_words,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 Colour = tuple[int, ...]
 #: Line and space, pixels.
 Dash = tuple[float, float]
+#: Left, top, right and bottom of a picture, its pixels.
+Margins = tuple[int, int, int, int]
 
 _CASING: Colour = (0, 0, 0, 150)
 #: Where an outline is the picture's frame.
@@ -61,13 +64,13 @@ def draw_map(
     The map part, its long side of so many pixels, has a panel below: legend, scale, north, figures,
     attribution.
     """
-    margin_px = 0 if scene is None else _margin_px(dataset, scene.grid)
-    grid = _plain_grid(dataset) if scene is None else _widened(scene.grid, margin_px)
+    margins = (0, 0, 0, 0) if scene is None else _margins_px(dataset, scene.grid)
+    grid = _plain_grid(dataset) if scene is None else _widened(scene.grid, margins)
     scale = long_side_px / max(grid.width_px, grid.height_px)
     size = (max(1, round(grid.width_px * scale)), max(1, round(grid.height_px * scale)))
     canvas = _Canvas(grid, size, dataset)
     if scene is not None:
-        canvas.picture(scene, margin_px)
+        canvas.picture(scene, margins)
     canvas.tables()
     picture = canvas.finish()
     return _with_panel(picture, dataset, grid, scale)
@@ -85,24 +88,27 @@ def _plain_grid(dataset: Dataset) -> Grid:
     return Grid(width, height, Affine(resolution, 0, x0, 0, -resolution, y1), dataset.crs)
 
 
-def _margin_px(dataset: Dataset, grid: Grid) -> int:
-    """What must be added around a picture to show what goes on outside it, picture pixels."""
+def _margins_px(dataset: Dataset, grid: Grid) -> Margins:
+    """What must be added to a picture to show what goes on outside it."""
     shapes = [dataset.table(name).geometry for name in ("field", "turns", "route")]
     xy = np.concatenate([shapely.get_coordinates(shape.to_numpy()) for shape in shapes])
     x, y = grid.from_crs(xy[:, 0], xy[:, 1], dataset.crs)
     past = (-x.min(), -y.min(), x.max() - grid.width_px, y.max() - grid.height_px)
-    beyond = float(max(past))
     side = max(grid.width_px, grid.height_px)
-    if beyond < -0.02 * side:
-        return 0
-    return math.ceil(min(beyond + 0.03 * side, 0.2 * side))
+    # A picture of another place is not drawn as a speck.
+    left, top, right, bottom = (
+        0 if beyond < -0.02 * side else math.ceil(min(beyond + 0.03 * side, 2.0 * side))
+        for beyond in past
+    )
+    return left, top, right, bottom
 
 
-def _widened(grid: Grid, margin_px: int) -> Grid:
+def _widened(grid: Grid, margins: Margins) -> Grid:
     from affine import Affine
 
-    width, height = grid.width_px + 2 * margin_px, grid.height_px + 2 * margin_px
-    corner = Affine.translation(-margin_px, -margin_px)
+    left, top, right, bottom = margins
+    width, height = grid.width_px + left + right, grid.height_px + top + bottom
+    corner = Affine.translation(-left, -top)
     return Grid(width, height, grid.transform * corner, grid.crs)
 
 
@@ -117,13 +123,13 @@ class _Canvas:
         self.draw = ImageDraw.Draw(self.image, "RGBA")
         self.labels: list[Label] = []
 
-    def picture(self, scene: Scene, margin_px: int) -> None:
+    def picture(self, scene: Scene, margins: Margins) -> None:
         rgb = scene.rgb.copy()
         rgb[~scene.valid] = 70
         width, height = round(rgb.shape[1] * self.factor), round(rgb.shape[0] * self.factor)
         picture = Image.fromarray(rgb).resize((width, height), Image.Resampling.BICUBIC)
-        corner = round(margin_px * self.factor)
-        self.image.paste(picture, (corner, corner))
+        left, top = (round(margin * self.factor) for margin in margins[:2])
+        self.image.paste(picture, (left, top))
 
     def tables(self) -> None:
         line = 1.4 * _OVERSAMPLING
@@ -275,19 +281,19 @@ def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) 
 
 
 def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
-    """What speaks against the outline, in lines that fit a width in pixels."""
-    doubts = dataset.table("field")["doubts"].iloc[0]
-    if not isinstance(doubts, str) or not doubts:
-        return []
+    """What there is to check, in lines that fit a width in pixels."""
     font = ImageFont.load_default(_DOUBT_SIZE)
-    lines, line = [], "Check the outline:"
-    for word in doubts.split():
-        longer = f"{line} {word}"
-        if font.getlength(longer) > width - 32:
-            lines.append(line)
-            longer = f"    {word}"
-        line = longer
-    return [*lines, line]
+    lines = []
+    for told in doubts_in_words(dataset):
+        line, *words = told.split()
+        for word in words:
+            longer = f"{line} {word}"
+            if font.getlength(longer) > width - 32:
+                lines.append(line)
+                longer = f"    {word}"
+            line = longer
+        lines.append(line)
+    return lines
 
 
 def _scale_bar(

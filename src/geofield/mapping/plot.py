@@ -16,6 +16,7 @@ from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
     counted,
     credit_in_words,
+    doubts_in_words,
     figures_in_words,
     length_in_words,
     round_length_m,
@@ -121,9 +122,8 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
     ax.set_title("")
     ax.set_title("\n".join(figures_in_words(dataset)), loc="left", fontsize=9)
     _scale_bar(ax, dataset)
-    doubts = dataset.table(schema.FIELD.name)["doubts"].iloc[0]
-    told = [f"Check the outline: {doubts}"] if isinstance(doubts, str) and doubts else []
-    figure.supxlabel("\n".join([*told, credit_in_words(dataset)]), fontsize=8)
+    told = [*doubts_in_words(dataset), credit_in_words(dataset)]
+    figure.supxlabel("\n".join(told), fontsize=8)
     words = figure.findobj(Text)
     families = _families("".join(each.get_text() for each in words))
     for each in words:

@@ -43,6 +43,11 @@ class Provenance:
     settings: Mapping[str, Any] = field(default_factory=dict)
     evidence: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def obstacle_doubts(self) -> tuple[str, ...]:
+        """What the picture did not allow when obstacles were looked for, in words."""
+        return tuple(self.evidence.get("obstacles", {}).get("doubts", ()))
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:

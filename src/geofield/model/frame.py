@@ -26,9 +26,20 @@ def along_frame(polygon: Polygon, crs: CRS, grid: Grid | None) -> list[LineStrin
     if grid is None:
         return []
     near = NEAR_PX * grid.ground_resolution_m * float(ground_scale_of(polygon, crs))
-    strip = shapely.buffer(picture_frame(grid, crs).exterior, near)
+    inside = picture_frame(grid, crs)
+    strip = shapely.buffer(inside.exterior, near)
     along = shapely.line_merge(shapely.intersection(polygon.exterior, strip))
-    return [line for line in shapely.get_parts(along) if shapely.length(line) > 2 * near]
+    return [
+        line
+        for line in shapely.get_parts(along)
+        if shapely.length(line) > 2 * near and not _crosses(line, inside, near)
+    ]
+
+
+def _crosses(line: LineString, picture: Polygon, near: float) -> bool:
+    """Whether a short stretch only leads out of a picture."""
+    first, last = (picture.contains(shapely.Point(line.coords[at])) for at in (0, -1))
+    return first != last and line.length < 12 * near
 
 
 def with_outside(

@@ -33,6 +33,13 @@ def figures_in_words(dataset: Dataset) -> list[str]:
     return lines
 
 
+def doubts_in_words(dataset: Dataset) -> list[str]:
+    """What speaks against the outline, and what was not seen of obstacles: one line each."""
+    doubts = dataset.table("field")["doubts"].iloc[0]
+    told = [f"Check the outline: {doubts}"] if isinstance(doubts, str) and doubts else []
+    return [*told, *(f"Obstacles: {each}" for each in dataset.provenance.obstacle_doubts)]
+
+
 def credit_in_words(dataset: Dataset) -> str:
     """Whose picture it is, under which licence, and when it was taken."""
     source = dataset.provenance.source

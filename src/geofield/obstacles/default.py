@@ -61,7 +61,7 @@ class Found:
         Pixels of the scene.
     shape_confidence : float64 array
     detection : dict
-        Method, thresholds and notes.
+        Method, thresholds, doubts and notes.
     """
 
     trees: Circles
@@ -106,7 +106,7 @@ def detect_by_default(
     resolution = picture.grid.ground_resolution_m
     factor = working_factor(resolution)
     tone = tone_of(picture)
-    notes = _doubts(tone, resolution, factor, radius_m)
+    doubts = _doubts(tone, resolution, radius_m)
     facts = network(NETWORK).facts
     ring = None if area is None else shapely.Polygon(area.polygon_px(picture.grid).exterior)
     standing = outline = None
@@ -114,11 +114,13 @@ def detect_by_default(
         outline = shapely.transform(ring, lambda c: c / factor)
         standing = StandingMap.over(*np.clip(outline.bounds, 0, None).tolist())
         if standing is None:
-            notes.append("The field is too large to search it for what is no tree.")
+            doubts.append("The field is too large to search it for what is no tree.")
     reach = None if ring is None else ring.buffer(radius_m[1] / resolution)
     crowns, seen_px = _look(picture, area, reach, tone, factor, polarity, standing, progress)
     if ring is not None:
-        notes += _unseen(ring.area, seen_px)
+        doubts += _unseen(ring.area, seen_px)
+    for doubt in doubts:
+        warnings.warn(doubt, ObstacleWarning, stacklevel=3)
     crowns = once_each(crowns, **facts["suppression"])
     p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     shapes: list[shapely.Polygon] = []
@@ -145,7 +147,11 @@ def detect_by_default(
         trees.take(keep & (p >= least)),
         shapes,
         shape_confidence,
-        {"method": f"network_{tone.bands}", "notes": notes},
+        {
+            "method": f"network_{tone.bands}",
+            "doubts": doubts,
+            "notes": [] if factor == 1.0 else [_resampled(resolution, factor)],
+        },
     )
 
 
@@ -194,17 +200,15 @@ def _look(
 
 
 def _unseen(field_px: float, seen_px: int) -> list[str]:
-    """Return a note on the part of a field that the picture does not show, and warn of it."""
+    """The part of a field that the picture does not show, in words."""
     missing = field_px - seen_px
     # Along its border pixels are counted whole or not at all.
     if missing <= max(0.01 * field_px, field_px**0.5):
         return []
-    note = (
+    return [
         f"The picture does not show {missing / field_px:.0%} of the field: "
         "what stands there is not found."
-    )
-    warnings.warn(note, ObstacleWarning, stacklevel=4)
-    return [note]
+    ]
 
 
 def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
@@ -229,25 +233,21 @@ def _candidates(
     return crowns.take(bright == (polarity == "bright"))
 
 
-def _doubts(
-    tone: Tone, resolution_m: float, factor: float, radius_m: tuple[float, float]
-) -> list[str]:
-    """Return notes on what the picture does not allow, and warn of it."""
-    notes = []
+def _doubts(tone: Tone, resolution_m: float, radius_m: tuple[float, float]) -> list[str]:
+    """What a picture does not allow, in words."""
+    doubts = []
     if MIN_RADIUS_PX * resolution_m > radius_m[0]:
-        notes.append(
+        doubts.append(
             f"The picture is coarse ({resolution_m:.2f} m per pixel): crowns below "
             f"{MIN_RADIUS_PX * resolution_m:.1f} m of radius are seen by chance."
         )
     if tone.is_flat:
-        notes.append(
+        doubts.append(
             f"The picture has hardly any contrast ({tone.high - tone.low:.0f} of 255 grey "
             "levels): haze, or ground alone; trees may be missed."
         )
-    for note in notes:
-        warnings.warn(note, ObstacleWarning, stacklevel=4)
-    if factor != 1.0:
-        notes.append(
-            f"Resampled from {resolution_m:.2f} m to {resolution_m * factor:.2f} m per pixel."
-        )
-    return notes
+    return doubts
+
+
+def _resampled(resolution_m: float, factor: float) -> str:
+    return f"Resampled from {resolution_m:.2f} m to {resolution_m * factor:.2f} m per pixel."

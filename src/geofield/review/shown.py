@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from geofield.model.frame import along_frame
 from geofield.settings import Settings
 from geofield.web.view import obstacles_view, outline_view, rings_of, tracks_view
 
@@ -21,6 +22,7 @@ def state_of(session: Session) -> dict[str, Any]:
         "field_id": plan.field.field_id,
         "crs": plan.field.crs.name,
         "field": field_of(plan),
+        "doubts": list(plan.evidence.detection.get("doubts", ())),
         "obstacles": obstacles_view(plan.obstacles, plan.tracks),
         "settings": (plan.settings or Settings()).tracks.model_dump(mode="json"),
         "detected_from": _detected_from(plan),
@@ -49,11 +51,12 @@ def field_of(plan: Plan) -> dict[str, Any]:
     quality = None if drawn else field.quality
     shown = outline_view(
         field.polygon,
-        field.crs,
-        plan.grid,
         method="drawn" if drawn else field.method,
         certainty=None if quality is None else quality.score,
         doubts=plan.doubts,
+        frame=[]
+        if field.method == "boundary" and not plan.outline_edited
+        else along_frame(field.polygon, field.crs, plan.grid),
     )
     others = [
         {"rings": rings_of(one.polygon), "certainty": round(one.certainty, 3)}

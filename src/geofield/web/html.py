@@ -18,6 +18,7 @@ from geofield import schema
 from geofield.crs import ground_scale_of
 from geofield.errors import FormatError
 from geofield.model.dataset import Dataset
+from geofield.model.map_words import frame_lines
 from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
 from geofield.staging import staged_file
@@ -134,14 +135,14 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
         "area_ha": float(row["area_ha"]),
         "field": outline_view(
             polygon,
-            crs,
-            dataset.grid,
             method=str(row["method"]),
             certainty=None if certainty is None else float(certainty),
             doubts=[part for part in str(doubts).split("; ") if part]
             if isinstance(doubts, str)
             else (),
+            frame=frame_lines(dataset),
         ),
+        "doubts": list(dataset.provenance.obstacle_doubts),
         "obstacles": obstacles_view(dataset.tables.get(schema.OBSTACLES.name), tracks),
         "picture": picture,
         "bounds": bounds,

@@ -15,8 +15,6 @@ import shapely
 from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
-from geofield.grid import Grid
-from geofield.model.frame import along_frame
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -63,20 +61,19 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
 
 def outline_view(
     polygon: shapely.Polygon,
-    crs: CRS,
-    grid: Grid | None,
     *,
     method: str,
     certainty: float | None,
     doubts: Sequence[str],
+    frame: Sequence[shapely.LineString],
 ) -> dict[str, Any]:
-    """The outline, its doubts in words, and where it runs along the picture's frame."""
+    """The outline, its doubts in words, and where it is the picture's frame."""
     return {
         "rings": rings_of(polygon),
         "method": method,
         "certainty": _number(certainty),
         "doubts": list(doubts),
-        "frame": _lines(along_frame(polygon, crs, grid)),
+        "frame": _lines(frame),
     }
 
 
