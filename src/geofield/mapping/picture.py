@@ -109,7 +109,7 @@ def _widened(grid: Grid, margins: Margins) -> Grid:
     left, top, right, bottom = margins
     width, height = grid.width_px + left + right, grid.height_px + top + bottom
     corner = Affine.translation(-left, -top)
-    return Grid(width, height, grid.transform * corner, grid.crs)
+    return Grid(width, height, grid.transform @ corner, grid.crs)
 
 
 class _Canvas:
