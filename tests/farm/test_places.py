@@ -117,6 +117,28 @@ def test_parcels_keep_their_columns_and_their_zone(tmp_path: Path) -> None:
     assert one.settings.tracks.spacing_m == 4.0
 
 
+def test_a_table_is_as_good_as_its_file(tmp_path: Path) -> None:
+    path = parcels(tmp_path)
+    frame = gpd.read_file(path).rename_geometry("shape")
+    from_file = {plan.field.field_id: plan for plan in gf.plan_fields(path, spacing_m=9)}
+    for table in (frame, frame.to_crs(4326)):
+        from_table = {plan.field.field_id: plan for plan in gf.plan_fields(table, spacing_m=9)}
+        assert from_table.keys() == from_file.keys()
+        for name, plan in from_table.items():
+            same = from_file[name]
+            assert plan.field.own == same.field.own
+            assert plan.field.area_ha == pytest.approx(same.field.area_ha, rel=1e-6)
+            assert len(plan.tracks.segments) == len(same.tracks.segments)
+    for bad, message in (
+        (frame.set_crs(None, allow_override=True), "set_crs"),
+        (frame.iloc[:0], "holds no places"),
+        (pd.DataFrame({"a": [1]}), "no columns lat and lon"),
+        (pd.DataFrame({"lat": [35.0, "x"], "lon": [33.0, 33.0]}), "several kinds"),
+    ):
+        with pytest.raises(gf.GeofieldError, match=message):
+            list(gf.plan_fields(bad))
+
+
 def test_a_column_named_like_a_setting_holds_for_its_field(tmp_path: Path) -> None:
     frame = gpd.read_file(parcels(tmp_path)).iloc[:2].explode(ignore_index=True)
     frame["id"] = ["a", "b", "c"]

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 import shapely
 
-from geofield.errors import FormatError
+from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
 from geofield.strangers import check_vector
 
@@ -57,6 +58,26 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
     if path.suffix.lower() in (".parquet", ".geoparquet", ".pq"):
         return _parquet(path)
     return _vector(path, layer)
+
+
+def raw_of(frame: pd.DataFrame) -> RawPlaces:
+    """A table of places that a Python user has."""
+    import geopandas as gpd
+    import pyarrow as pa
+
+    name = "The table"
+    shapes = frame.geometry if isinstance(frame, gpd.GeoDataFrame) else None
+    if shapes is not None and shapes.crs is None:
+        raise CRSError(f"{name} does not say its CRS.", hint="Name it: frame.set_crs(...).")
+    plain = pd.DataFrame(frame[[each for each in frame if frame[each].dtype != "geometry"]])
+    try:
+        table = pa.Table.from_pandas(plain, preserve_index=False).replace_schema_metadata(None)
+    except pa.ArrowException as error:
+        raise FormatError(f"{name} has a column of several kinds of values: {error}.") from None
+    if shapes is None:
+        return RawPlaces(name, table)
+    geometry = pa.array(shapely.to_wkb(shapes.to_numpy()), pa.binary(), from_pandas=True)
+    return RawPlaces(name, table, geometry, str(shapes.name), shapes.crs)
 
 
 def _csv(path: Path, texts: set[str]) -> RawPlaces:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -15,7 +16,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, authority_name, parse_crs, transformer
 from geofield.errors import CRSError, FormatError
-from geofield.farm.place_files import RawPlaces, read_raw
+from geofield.farm.place_files import RawPlaces, raw_of, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
@@ -33,7 +34,7 @@ _BATCH = 50_000
 
 
 def read_places(
-    path: str | Path,
+    path: str | Path | pd.DataFrame,
     *,
     settings: Settings | None = None,
     layer: str | None = None,
@@ -46,10 +47,10 @@ def read_places(
 ) -> Places:
     """Read places: points (columns lat and lon, or geometry) or parcels.
 
-    From CSV, Parquet, or any vector file that GDAL reads, of which `layer` is one of several and
-    `crs` is that of coordinates that do not say theirs. Columns with usual names are found; those
-    named like settings are judged with `settings`. Places without a name are called `unnamed`, with
-    their row, or by their id.
+    From a table, CSV, Parquet, or any vector file that GDAL reads, of which `layer` is one of
+    several and `crs` is that of coordinates that do not say theirs. Columns with usual names are
+    found; those named like settings are judged with `settings`. Places without a name are called
+    `unnamed`, with their row, or by their id.
 
     Raises
     ------
@@ -59,11 +60,15 @@ def read_places(
     CRSError
         When the file does not say its CRS.
     """
-    raw = read_raw(
-        Path(path), layer=layer, texts=(*ID_COLUMNS, *NAME_COLUMNS, id_column, name_column)
-    )
+    texts = (*ID_COLUMNS, *NAME_COLUMNS, id_column, name_column)
+    if isinstance(path, pd.DataFrame):
+        raw = raw_of(path)
+        where = raw.name
+    else:
+        raw = read_raw(Path(path), layer=layer, texts=texts)
+        where = str(path)
     if not raw.table.num_rows:
-        raise FormatError(f"{path} is empty: it holds no places.", hint="Give one row per field.")
+        raise FormatError(f"{where} is empty: it holds no places.", hint="Give one row per field.")
     raw = _without_ours(raw)
     id_name, name_name = _found(raw, id_column, ID_COLUMNS), _found(raw, name_column, NAME_COLUMNS)
     lat_name, lon_name = _found(raw, lat_column, _LAT), _found(raw, lon_column, _LON)
@@ -92,7 +97,7 @@ def read_places(
     check_settings(raw.name, said, settings)
     ids, names = _names(raw, id_name, name_name, unnamed, kept, part, lat, lon)
     return Places(
-        str(path), ids, names, lat, lon, kept + 1, outlines, source,
+        where, ids, names, lat, lon, kept + 1, outlines, source,
         own.rename_columns([_unlike_ours(name) for name in own.column_names]),
         said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geofield.errors import FieldWarning, GeofieldError, ImageryError
 from geofield.farm.place_reader import read_places
@@ -15,12 +15,15 @@ from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, to
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 #: Places per worker that wait in the scheduler.
 _AHEAD = 4
 
 
 def plan_fields(
-    places: str | Path | Places,
+    places: str | Path | pd.DataFrame | Places,
     imagery: str | Path | None = None,
     *,
     settings: Settings | None = None,
@@ -37,8 +40,9 @@ def plan_fields(
 
     Parameters
     ----------
-    places : path or Places
-        Points (columns lat and lon, or geometry) or parcels; see `geofield batch`.
+    places : path, DataFrame or Places
+        Points (columns lat and lon, or geometry) or parcels, in a file or a table of pandas or
+        geopandas; see `geofield batch`.
     imagery : path, optional
         A picture, a folder or an index of pictures. Parcels need none.
     settings : Settings, optional
