@@ -262,14 +262,21 @@ def pixels(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Case], Case]
 
 
 def jpeg(quality: int) -> Callable[[np.ndarray], np.ndarray]:
+    """Bands as JPEG leaves them: red, green and blue together, any other one alone."""
+    how = [cv2.IMWRITE_JPEG_QUALITY, quality]
+
     def stored(bands: np.ndarray) -> np.ndarray:
-        eight = np.ascontiguousarray(bands.astype(np.uint8).transpose(1, 2, 0))
-        how = [cv2.IMWRITE_JPEG_QUALITY, quality]
-        parts = [eight[..., :3], *(eight[..., k] for k in range(3, eight.shape[2]))]
+        eight = bands.astype(np.uint8).transpose(1, 2, 0)
+        together = 3 if eight.shape[2] >= 3 else 0
+        # OpenCV takes colours with blue first.
+        parts = [eight[..., together - 1 :: -1]] if together else []
+        parts += [eight[..., k] for k in range(together, eight.shape[2])]
         read = [
             np.asarray(cv2.imdecode(cv2.imencode(".jpg", np.ascontiguousarray(p), how)[1], -1))
             for p in parts
         ]
+        if together:
+            read[0] = read[0][..., ::-1]
         return np.dstack(read).transpose(2, 0, 1).astype(float)
 
     return stored
