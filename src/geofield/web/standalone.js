@@ -74,7 +74,7 @@ if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.len
 if (f.turns) facts.push(["turns", String(f.turns)]);
 if (plan.obstacles.length) facts.push(["obstacles", String(plan.obstacles.length)]);
 document.getElementById("facts").replaceChildren(...facts.flatMap(([name, text]) => [node("dt", t(name)), node("dd", text)]));
-const doubts = [...[...field.doubts, ...plan.doubts].map(told), ...(field.frame.length ? [t("frame")] : []),
+const doubts = [...[...field.doubts, ...plan.doubts].map(told),
   ...(f.turns_that_do_not_fit ? [t("unfit", {n: f.turns_that_do_not_fit})] : [])];
 document.getElementById("doubts").replaceChildren(
   ...(field.certainty === null ? [] : [node("li", t("sure", {p: number(100 * field.certainty)}))]), ...doubts.map(text => node("li", text)));

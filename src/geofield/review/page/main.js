@@ -101,7 +101,6 @@ function showField() {
   $("certainty").textContent = field.certainty !== null ? t("sure", {p: number(100 * field.certainty)})
     : field.method === "drawn" ? t("drawn") : t("unknown");
   const doubts = [...field.doubts, ...state.doubts].map(told);
-  if (field.frame.length) doubts.push(t("frame"));
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
   const shown = JSON.stringify(field.rings);
   $("alternatives").replaceChildren(...field.alternatives.map((other, i) => {
