@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pyproj import CRS, Transformer
 
-from geofield.crs import northing_first
+from geofield.crs import northing_first, parse_crs
 
 
 @pytest.mark.parametrize(
@@ -24,3 +24,7 @@ def test_the_axis_order_is_projs(code, lon, lat):
     authority = Transformer.from_crs("OGC:CRS84", crs).transform(lon, lat)
     assert np.allclose(authority, xy[::-1] if northing_first(crs) else xy)
     assert not np.isclose(*xy)
+
+
+def test_a_code_out_of_a_table_is_one_too():
+    assert parse_crs(np.str_("EPSG:32633")) == parse_crs(np.int64(32633)) == parse_crs(32633)

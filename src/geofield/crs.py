@@ -46,7 +46,8 @@ def parse_crs(value: Any) -> CRS:
             "There is no coordinate reference system.", hint="Name one, for instance EPSG:32633."
         )
     try:
-        return _named(value) if isinstance(value, str) else CRS.from_user_input(value)
+        # Of numpy's text PROJ makes "EPSG:EPSG:32633".
+        return _named(str(value)) if isinstance(value, str) else CRS.from_user_input(value)
     except ProjCRSError as error:
         raise CRSError(
             f"Unknown coordinate reference system {str(value)[:80]!r}.",

@@ -326,10 +326,11 @@ class Plan:
 
     def _field_rows(self) -> Rows:
         from geofield.tracks.direction import find_baseline
+        from geofield.tracks.layout import Strips
 
         one = self.field
         baseline = find_baseline(
-            one.polygon, "longest_edge", one.crs, spacing_m=1.0, grid=self.grid
+            one.polygon, "longest_edge", one.crs, strips=Strips(1.0), grid=self.grid
         )
         edge = baseline.edge
         edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)

@@ -218,6 +218,43 @@ def test_fewest_turns_counts_pieces() -> None:
     assert len(turns.segments) < len(tracks.segments)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"spacing_m": 24.0},
+        {"spacing_m": 12.0, "headland_m": 12.0},
+        {"spacing_m": 12.0, "offset_m": 2.0},
+        {"spacing_m": 12.0, "headland_m": 5.0, "last_strip": "leave"},
+        {"spacing_m": 12.0, "last_strip": "shift"},
+    ],
+)
+def test_no_heading_beats_the_fewest_nor_what_is_said_of_them(options: dict[str, Any]) -> None:
+    ring = [(0, 0), (190, -30), (230, 90), (150, 60), (120, 170), (20, 150)]
+    field: Any = Polygon([(X + x, Y + y) for x, y in ring]).difference(
+        shapely.Point(X + 80, Y + 60).buffer(15)
+    )
+
+    def counted(direction: Any) -> tuple[int, int, str]:
+        tracks = plan_tracks(field, crs=CRS, direction=direction, **options)
+        return len(tracks.lines) + tracks.blocked_count, len(tracks.segments), tracks.direction_why
+
+    others = [counted(float(heading)) for heading in range(180)]
+    fewest = counted("fewest")[0]
+    assert fewest <= min(tracks for tracks, _, _ in others)
+    assert counted("fewest_turns")[1] <= min(pieces for _, pieces, _ in others)
+    dominant, _, why = counted("dominant")
+    saved = f"direction fewest would need {fewest} tracks instead of {dominant}"
+    assert why.endswith("no heading needs fewer tracks" if dominant <= fewest else saved)
+
+
+def test_fewest_turns_does_not_leave_a_field_undriven() -> None:
+    strip = box(X, Y, X + 200, Y + 10)
+    tracks = plan_tracks(
+        strip, crs=CRS, spacing_m=6.0, direction="fewest_turns", min_segment_m=12.0
+    )
+    assert tracks.segments["length_m"].sum() > 300
+
+
 def test_ab_lines_are_tracks_themselves() -> None:
     a, b = (X + 10.0, Y + 7.0), (X + 60.0, Y + 33.0)
     tracks = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, direction=[a, b])

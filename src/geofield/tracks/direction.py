@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import grid_north_deg, ground_scale
 from geofield.errors import TrackError
@@ -22,6 +23,8 @@ from geofield.methods import LONGEST_EDGE, method
 from geofield.model.frame import picture_frame
 from geofield.tracks.dominant import dominant_edge
 from geofield.tracks.fewest import fewest_direction
+from geofield.tracks.frame import true_heading_deg
+from geofield.tracks.layout import Strips
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 
 METHODS = ("dominant", "longest_edge", "hough", "fewest", "fewest_turns")
@@ -51,9 +54,11 @@ def find_baseline(
     direction: Any,
     crs: CRS,
     *,
-    spacing_m: float,
+    strips: Strips,
     tolerance_m: float = 1.0,
     grid: Grid | None = None,
+    area: BaseGeometry | None = None,
+    through: tuple[float, float] | None = None,
 ) -> Baseline:
     """Turn the user's choice of a direction into a baseline.
 
@@ -65,12 +70,16 @@ def find_baseline(
         ``dominant``, ``longest_edge``, ``hough``, ``fewest``, ``fewest_turns``, a true heading
         in degrees, or an A-B line in the CRS.
     crs : CRS
-    spacing_m : float
-        Needed by ``fewest``.
+    strips : Strips
+        How tracks are laid, which ``fewest`` and ``fewest_turns`` count.
     tolerance_m : float
         Half the width of the band within which an edge counts as straight.
     grid : Grid, optional
         Of the picture that the outline was found in: its frame is no edge of the field.
+    area : polygon or multi-polygon, optional
+        What is left of the field without its headland, where tracks are counted.
+    through : (x, y), optional
+        A place in the CRS that a track passes, where they are counted.
 
     Raises
     ------
@@ -96,7 +105,14 @@ def find_baseline(
             line = method(LONGEST_EDGE, direction)(polygon)
             return _from_edge(StraightRun(*shapely.get_coordinates(line).ravel().tolist()), north)
         if direction in ("fewest", "fewest_turns"):
-            along = fewest_direction(polygon, spacing_m * scale, turns=direction == "fewest_turns")
+            along = fewest_direction(
+                polygon if area is None else area,
+                strips,
+                scale=scale,
+                north_deg=north,
+                through=through,
+                turns=direction == "fewest_turns",
+            )
             return _from_vector(along, north)
         try:
             direction = float(direction)
@@ -105,12 +121,6 @@ def find_baseline(
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
     return _from_ab(direction, north)
-
-
-def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:
-    """The true heading of a direction in the CRS, 0 <= heading < 180."""
-    heading = (math.degrees(math.atan2(along[0], along[1])) + grid_north) % 180.0
-    return 0.0 if heading >= 180.0 else heading
 
 
 def _unknown(direction: Any) -> TrackError:

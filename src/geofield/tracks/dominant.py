@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import shapely
 from shapely import Polygon
 
 from geofield.tracks.frame import FloatArray
@@ -56,15 +55,3 @@ def _alike(angle: FloatArray, other: Any) -> FloatArray:
     """1 for directions that are nearly the same, falling to 0 for those that are not."""
     apart = np.abs((angle - other + 90.0) % 180.0 - 90.0)
     return np.asarray(np.clip((_OTHER_DEG - apart) / (_OTHER_DEG - _SAME_DEG), 0.0, 1.0))
-
-
-def fewest_tracks(polygon: Polygon, spacing: float) -> int:
-    """How many tracks the best heading needs: the field is narrowest across an edge of its hull."""
-    corners = shapely.get_coordinates(shapely.convex_hull(polygon))
-    if len(corners) > _MOST_DIRECTIONS:
-        corners = shapely.get_coordinates(shapely.convex_hull(polygon).simplify(spacing / 100.0))
-    edges = np.diff(corners, axis=0)
-    normals = np.column_stack((-edges[:, 1], edges[:, 0])) / np.hypot(*edges.T)[:, None]
-    across = normals @ (corners - corners[0]).T
-    width = float(np.ptp(across, axis=1).min())
-    return max(1, int(np.floor(width / spacing - 0.5 + 1e-7)) + 1)

@@ -9,15 +9,16 @@ depend on notches and holes as well. Each candidate is laid out and clipped, not
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from geofield.tracks.clip import clip_tracks
-from geofield.tracks.frame import FloatArray, TrackFrame
-from geofield.tracks.layout import track_positions
+from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
+from geofield.tracks.layout import Strips
 from geofield.tracks.shapes import FIELD, Edges, polygon_edges
 
 #: Directions tried at most before those of the shorter edges are passed over.
@@ -25,37 +26,65 @@ _MOST_ANGLES = 600
 
 
 def fewest_direction(
-    polygon: Polygon, spacing: float, *, turns: bool = False, tolerance: float = 1.0
+    area: BaseGeometry,
+    strips: Strips,
+    *,
+    scale: float = 1.0,
+    north_deg: float = 0.0,
+    through: tuple[float, float] | None = None,
+    turns: bool = False,
+    tolerance: float = 1.0,
 ) -> tuple[float, float]:
     """Find the direction, exact over the candidates, as a unit vector in the (metric) CRS.
 
-    `spacing` is in units of the CRS. With `turns` the fewest pieces count first and tracks second,
-    instead of the other way round. `tolerance` simplifies the outline before its edges become
-    candidates.
+    `area` is what tracks are laid in: the field without its headland. `scale` and `north_deg` are
+    the CRS's there, `through` a place that a track passes. With `turns` the fewest pieces count
+    first and tracks second, instead of the other way round. `tolerance` simplifies the area before
+    its edges become candidates. Obstacles do not count: tracks stay where they are when one is
+    found or moved.
     """
-    centre = polygon.centroid
-    edges = polygon_edges(
-        polygon, TrackFrame.of((centre.x, centre.y), (1.0, 0.0), left=True), FIELD
-    )
-    best: tuple[tuple[float, float, float], float] | None = None
-    for angle in candidate_angles(polygon, tolerance):
-        turned = _turned(edges, float(angle))
-        near, far = float(turned.va.min()), float(turned.va.max())
-        positions = track_positions(near, far, spacing, first_m=near + spacing / 2.0)
+    centre = area.centroid
+    frame = TrackFrame.of((centre.x, centre.y), (1.0, 0.0), scale=scale)
+    edges = polygon_edges(area, frame, FIELD)
+    place = None if through is None else frame.to_frame(*through)
+    best: tuple[tuple[float, float, float], tuple[float, float]] | None = None
+    for angle in candidate_angles(area, tolerance).tolist():
+        # As the heading is told, 0 to 180 degrees: tracks are counted from its left.
+        heading = true_heading_deg((math.cos(angle), math.sin(angle)), north_deg)
+        turn = math.radians(heading - north_deg)
+        along = math.sin(turn), math.cos(turn)
+        turned = _turned(edges, along)
+        first = None if place is None else float(place[0] * along[1] + place[1] * along[0])
+        positions = strips.across(turned, first)
+        if not len(positions):
+            positions = np.array([(turned.va.min() + turned.va.max()) / 2.0])
+        # Short ones, too: a heading is not better for what it leaves undriven.
         pieces, _ = clip_tracks(positions, turned)
         tracks, count = float(len(positions)), float(len(pieces))
+        width = float(turned.va.max() - turned.va.min())
         # Of equals, the one across which the field is narrowest.
-        score = (count, tracks, far - near) if turns else (tracks, count, far - near)
+        score = (count, tracks, width) if turns else (tracks, count, width)
         if best is None or score < best[0]:
-            best = (score, float(angle))
-    angle = best[1] if best is not None else 0.0
-    return float(np.cos(angle)), float(np.sin(angle))
+            best = (score, along)
+    return (1.0, 0.0) if best is None else best[1]
 
 
-def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
+def fewest_tracks(area: BaseGeometry, strips: Strips, scale: float = 1.0) -> int:
+    """How many tracks the best heading needs: an area is narrowest across an edge of its hull."""
+    hull = shapely.convex_hull(area)
+    corners = shapely.get_coordinates(hull)
+    if len(corners) > _MOST_ANGLES:
+        corners = shapely.get_coordinates(hull.simplify(strips.spacing_m / 100.0))
+    edges = np.diff(corners, axis=0)
+    normals = np.column_stack((-edges[:, 1], edges[:, 0])) / np.hypot(*edges.T)[:, None]
+    across = normals @ (corners - corners[0]).T
+    return strips.count(float(np.ptp(across, axis=1).min()) / scale)
+
+
+def candidate_angles(area: BaseGeometry, tolerance: float = 1.0) -> FloatArray:
     """Directions to try, radians counter-clockwise from the CRS's x axis, 0 <= angle < pi."""
-    outlines = (polygon.simplify(tolerance), polygon.convex_hull)
-    rings = [shapely.get_exterior_ring(one) for one in outlines if isinstance(one, Polygon)]
+    parts = shapely.get_parts([area.simplify(tolerance), area.convex_hull])
+    rings = [ring for ring in shapely.get_exterior_ring(parts) if ring is not None]
     edges = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
     angles = np.arctan2(edges[:, 1], edges[:, 0]) % np.pi
     # Edges first: of equals the first wins, and a driver would rather follow an edge.
@@ -71,12 +100,13 @@ def candidate_angles(polygon: Polygon, tolerance: float = 1.0) -> FloatArray:
     return np.asarray(angles[by_length[np.sort(longest)]])
 
 
-def _turned(edges: Edges, angle: float) -> Edges:
-    cos, sin = np.cos(angle), np.sin(angle)
+def _turned(edges: Edges, along: tuple[float, float]) -> Edges:
+    """Edges in the frame of a direction, v to its right as it is to the right of the x axis."""
+    x, y = along
     return replace(
         edges,
-        ua=edges.ua * cos + edges.va * sin,
-        va=edges.va * cos - edges.ua * sin,
-        ub=edges.ub * cos + edges.vb * sin,
-        vb=edges.vb * cos - edges.ub * sin,
+        ua=edges.ua * x - edges.va * y,
+        va=edges.ua * y + edges.va * x,
+        ub=edges.ub * x - edges.vb * y,
+        vb=edges.ub * y + edges.vb * x,
     )

@@ -8,6 +8,7 @@ finished ends are carried back.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,3 +72,9 @@ class TrackFrame:
             self.origin_x_m + (u * self.along_x + v * self.across_x),
             self.origin_y_m + (u * self.along_y + v * self.across_y),
         )
+
+
+def true_heading_deg(along: tuple[float, float], grid_north: float) -> float:
+    """The true heading of a direction in the CRS, 0 <= heading < 180."""
+    heading = (math.degrees(math.atan2(along[0], along[1])) + grid_north) % 180.0
+    return 0.0 if heading >= 180.0 else heading

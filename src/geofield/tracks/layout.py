@@ -6,6 +6,7 @@ track keeps its number whatever is found or moved in the field.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -18,6 +19,37 @@ LastStrip = Literal["overrun", "leave", "shift", "spread"]
 LAST_STRIPS: tuple[str, ...] = get_args(LastStrip)
 
 _EPS_M = 1e-7
+
+
+@dataclass(frozen=True, slots=True)
+class Strips:
+    """How a field is divided into strips, whatever their direction; metres on the ground."""
+
+    spacing_m: float
+    #: From the border to the first track; half a spacing if None.
+    offset_m: float | None = None
+    last_strip: LastStrip = "overrun"
+
+    @property
+    def first_m(self) -> float:
+        """From the border to the first track."""
+        return self.spacing_m / 2.0 if self.offset_m is None else float(self.offset_m)
+
+    def across(self, edges: Edges, first_m: float | None = None) -> FloatArray:
+        """Places of the tracks across an area, one of them at `first_m` if that is given."""
+        near, far = float(edges.va.min()), float(edges.va.max())
+        first_m = near + self.first_m if first_m is None else first_m
+        positions = track_positions(
+            near, far, self.spacing_m, first_m=first_m, last_strip=self.last_strip
+        )
+        return on_the_border(positions, edges)
+
+    def count(self, width_m: float) -> int:
+        """How many tracks an area needs that is so wide across them; one if none fits."""
+        positions = track_positions(
+            0.0, width_m, self.spacing_m, first_m=self.first_m, last_strip=self.last_strip
+        )
+        return max(1, len(positions))
 
 
 def on_the_border(positions: FloatArray, edges: Edges) -> FloatArray:

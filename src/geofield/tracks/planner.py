@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,10 @@ from geofield.model.tracks import Tracks
 from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
-from geofield.tracks.dominant import fewest_tracks
+from geofield.tracks.fewest import fewest_tracks
 from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.headland import headland_table, headland_track_table, main_area
-from geofield.tracks.layout import LastStrip, on_the_border, track_positions
+from geofield.tracks.layout import LastStrip, Strips
 from geofield.tracks.losses import obstacle_losses
 from geofield.tracks.outline import clean_outline, metric
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
@@ -125,6 +126,8 @@ def plan_tracks(
         crs, polygon = polygon.crs, polygon.polygon
     metric_crs = metric(crs)
     _check_lengths(spacing_m=spacing_m, step_m=step_m)
+    if offset_m is not None and not np.isfinite(offset_m):
+        raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
@@ -133,29 +136,26 @@ def plan_tracks(
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
     _refuse_too_many(outline, shapes, spacing_m * scale)
+    inner: BaseGeometry = outline
+    if headland_m != 0.0:
+        inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
+    strips = Strips(spacing_m, offset_m, last_strip)
+    place = None if through is None else _place(through)
     baseline = find_baseline(
         outline,
         direction,
         metric_crs,
-        spacing_m=spacing_m,
+        strips=strips,
         tolerance_m=straight_tolerance_m,
         grid=grid,
+        area=inner,
+        through=place,
     )
+    if place is not None:
+        baseline = replace(baseline, through=place)
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left, scale=scale)
-    inner: BaseGeometry = outline
-    if headland_m != 0.0:
-        inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
     edges = polygon_edges(inner, frame, FIELD)
-    positions, spacing_m, more = _positions(
-        edges,
-        frame,
-        baseline,
-        spacing_m=spacing_m,
-        offset_m=offset_m,
-        inset_m=headland_m,
-        through=through,
-        last_strip=last_strip,
-    )
+    positions, spacing_m, more = _positions(edges, frame, baseline, strips, inset_m=headland_m)
     pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
@@ -184,7 +184,7 @@ def plan_tracks(
         grid=grid,
         outline=outline,
         notes=(*notes, *more),
-        direction_why=_why(baseline, outline, spacing_m * scale, len(positions)),
+        direction_why=_why(baseline, fewest_tracks(inner, strips, scale), len(positions)),
         **optional,
     )
 
@@ -215,11 +215,10 @@ def _check_lengths(**lengths: float) -> None:
             raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
 
 
-def _why(baseline: Baseline, outline: Polygon, spacing: float, count: int) -> str:
+def _why(baseline: Baseline, least: int, count: int) -> str:
     """Why this direction was chosen, and what another would save."""
     if not baseline.why:
         return ""
-    least = fewest_tracks(outline, spacing)
     if least >= count:
         return f"{baseline.why}; no heading needs fewer tracks"
     return f"{baseline.why}; direction fewest would need {least} tracks instead of {count}"
@@ -246,32 +245,23 @@ def _positions(
     edges: Edges,
     frame: TrackFrame,
     baseline: Baseline,
+    strips: Strips,
     *,
-    spacing_m: float,
-    offset_m: float | None,
     inset_m: float,
-    through: Any,
-    last_strip: LastStrip,
 ) -> tuple[FloatArray, float, tuple[str, ...]]:
     """Places of the tracks, and the spacing that they have."""
     near, far = float(edges.va.min()), float(edges.va.max())
-    place = baseline.through if through is None else _place(through)
-    if place is not None and offset_m is not None:
+    spacing_m, run, first = strips.spacing_m, baseline.edge, None
+    if baseline.through is not None and strips.offset_m is not None:
         raise TrackError(
             "An offset and a place to pass through were both given.", hint="Give one of the two."
         )
-    if place is not None:
-        first = float(frame.to_frame(*place)[1])
-    else:
-        edge, run = near - inset_m, baseline.edge
-        if run is not None:
-            edge = float(np.mean(frame.to_frame([run.x0, run.x1], [run.y0, run.y1])[1]))
-        offset = spacing_m / 2.0 if offset_m is None else float(offset_m)
-        if not np.isfinite(offset):
-            raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
-        first = edge + inset_m + offset
-    positions = track_positions(near, far, spacing_m, first_m=first, last_strip=last_strip)
-    positions = on_the_border(positions, edges)
+    if baseline.through is not None:
+        first = float(frame.to_frame(*baseline.through)[1])
+    elif run is not None:
+        edge = float(np.mean(frame.to_frame([run.x0, run.x1], [run.y0, run.y1])[1]))
+        first = edge + inset_m + strips.first_m
+    positions = strips.across(edges, first)
     if not len(positions):
         note = (
             f"The spacing of {spacing_m:g} m leaves no track in a field {far - near:.2f} m wide "
@@ -279,7 +269,7 @@ def _positions(
         )
         warnings.warn(note, TrackWarning, stacklevel=3)
         return np.array([(near + far) / 2.0]), spacing_m, (note,)
-    if last_strip == "spread" and len(positions) > 1:
+    if strips.last_strip == "spread" and len(positions) > 1:
         spacing_m = float(positions[1] - positions[0])
     return positions, spacing_m, ()
 
