@@ -197,6 +197,23 @@ def test_longest_edge_of_simple_shapes() -> None:
     assert longest_edge(tiny).length == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize("x", [0.0, 137_000.0])
+def test_a_heading_and_its_opposite_count_from_opposite_sides(x: float) -> None:
+    field = box(x, 0, x + 100, 60)
+    firsts = {}
+    for heading in (0.0, 360.0, -360.0, 180.0, 540.0):
+        tracks = plan_tracks(field, crs=CRS, spacing_m=10.0, direction=heading)
+        assert tracks.heading_deg == 0.0
+        firsts[heading] = tracks.lines.geometry.iloc[0].centroid.x < X + x + 50
+    assert firsts == {0.0: True, 360.0: True, -360.0: True, 180.0: False, 540.0: False}
+
+
+@pytest.mark.parametrize("short", [-1.0, float("nan")])
+def test_no_piece_is_shorter_than_nothing(short: float) -> None:
+    with pytest.raises(TrackError, match="min_segment_m"):
+        plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=10.0, min_segment_m=short)
+
+
 def test_fewest_is_the_narrow_way() -> None:
     turn = np.deg2rad(33.0)
     field = shapely.affinity.rotate(box(0, 0, 200, 60), 33.0)
@@ -248,7 +265,7 @@ def test_no_heading_beats_the_fewest_nor_what_is_said_of_them(options: dict[str,
 
 
 def test_fewest_turns_does_not_leave_a_field_undriven() -> None:
-    strip = box(X, Y, X + 200, Y + 10)
+    strip = box(0, 0, 200, 10)
     tracks = plan_tracks(
         strip, crs=CRS, spacing_m=6.0, direction="fewest_turns", min_segment_m=12.0
     )

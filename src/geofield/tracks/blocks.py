@@ -124,7 +124,7 @@ def _with_thin(
         raise TrackError(
             f"Obstacle {number[bare[0]]} is a {geometry[bare[0]].geom_type} without a radius: "
             "it has no width to avoid.",
-            hint="Give a column radius_m, or a clearance (clearance_m, --clearance).",
+            hint="Give a column radius_m, or a clearance (--clearance).",
         )
     places, source = shapely.get_coordinates(geometry[point], return_index=True)
     strips = shapely.buffer(geometry[line], width[line], quad_segs=QUARTER_SEGMENTS)

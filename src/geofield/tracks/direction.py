@@ -133,8 +133,11 @@ def _unknown(direction: Any) -> TrackError:
 def _from_heading(heading_deg: float, north: float) -> Baseline:
     if not math.isfinite(heading_deg):
         raise TrackError(f"A heading of {heading_deg} degrees is not a direction.")
-    angle = math.radians(heading_deg - north)
-    return _from_vector((math.sin(angle), math.cos(angle)), north)
+    # By the number itself: rounding could put a heading of 0 on either side.
+    flipped = heading_deg % 360.0 >= 180.0
+    heading = heading_deg % 180.0
+    angle = math.radians(heading - north)
+    return Baseline((math.sin(angle), math.cos(angle)), heading, left=flipped)
 
 
 def _from_vector(

@@ -128,6 +128,8 @@ def plan_tracks(
     _check_lengths(spacing_m=spacing_m, step_m=step_m)
     if offset_m is not None and not np.isfinite(offset_m):
         raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
+    if not (np.isfinite(min_segment_m) and min_segment_m >= 0.0):
+        raise TrackError(f"min_segment_m is {min_segment_m}; it must be 0 or more metres.")
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
