@@ -58,6 +58,12 @@ def test_names_of_another_version_are_passed_over() -> None:
         ("[trucks]\nspacing_m = 2\n", "trucks"),
         ("[tracks\n", "not valid TOML"),
         ("tracks = 3\n", "tracks is a section"),
+        ("machines = 5\n[tracks]\nmachine = 'm'\n", "machines is a section"),
+        ("[field]\ninclude = [5]\n", "as LON,LAT"),
+        ("[field]\ninclude = [[1, [2]]]\n", "as LON,LAT"),
+        ("[field]\ninclude = ['35.1,a']\n", "as LON,LAT"),
+        ("[field]\ninclude = ['35.1,95']\n", "exchanged, 95,35.1, it is"),
+        ("[field]\ninclude = 5\n", "should be a list"),
         ("[trakcs]\nspacing_m = 2\n", "Did you mean 'tracks'"),
         ("[tracks]\nspacing_n = 2\n", "Did you mean 'spacing_m'"),
         ('[tracks]\ndirection = "longest_edg"\n', "Did you mean 'longest_edge'"),
@@ -116,6 +122,23 @@ def test_the_environment_is_checked_too(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setenv("GEOFIELD_TRACKS__ROUTE", "shortst")
     with pytest.raises(SettingsError, match="Did you mean 'shortest'"):
         load_settings()
+
+
+@pytest.mark.parametrize("name", ["GEOFIELD_EXPORT__FORMATS", "GEOFIELD_FETCH__KEYS"])
+def test_a_variable_that_cannot_be_read_is_named(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(name, "gpkg,kml")
+    with pytest.raises(SettingsError, match=name) as told:
+        load_settings()
+    assert "JSON" in str(told.value)
+    assert "gpkg,kml" not in str(told.value)
+
+
+def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:
+    path = tmp_path / "windows.toml"
+    path.write_text("[tracks]\nspacing_m = 3\n", encoding="utf-8-sig")
+    assert load_settings(path).tracks.spacing_m == 3.0
 
 
 def test_any_setting_by_its_name() -> None:

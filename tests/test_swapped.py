@@ -43,6 +43,13 @@ def test_a_swapped_point(tmp_path: Path) -> None:
     assert f"look swapped: try --lat {LAT} --lon {LON}" in told
 
 
+@pytest.mark.parametrize("option", ["--include-lonlat", "--exclude-lonlat"])
+def test_a_swapped_further_point(option: str, tmp_path: Path) -> None:
+    told = refused(*run(tmp_path / "out", option, f"{LAT},{LON}"))
+    assert f"of {option} lies outside" in told
+    assert f"look swapped: try {option} {LON},{LAT}" in told
+
+
 def test_a_swapped_parcel(parcels: Path, tmp_path: Path) -> None:
     assert "swapped" in refused(*run(tmp_path / "out", "--boundary", parcels))
 

@@ -74,7 +74,7 @@ def test_an_existing_output_is_refused_before_the_work(sample, tmp_path, capsys)
     truth, folder = sample
     file = tmp_path / "x.gpkg"
     file.write_bytes(b"mine")
-    code = run("field", folder / "scene.tif", *point(truth), "--list", "-o", file)
+    code = run("field", folder / "scene.tif", *point(truth), "--pictures", folder / "p", "-o", file)
     told = capsys.readouterr()
     assert code != 0
     assert "is there already" in told.err
@@ -88,5 +88,37 @@ def test_wrong_use_is_code_2(sample, capsys):
     assert run("field", scene, *point(truth)) == 2
     assert "-o" in capsys.readouterr().err
     file = folder / "x.gpkg"
-    both = ("--boundary", scene, "--list", "-o", file)
+    assert run("field", scene, *point(truth), "--list", "-o", file) == 2
+    assert "leave -o" in capsys.readouterr().err
+    both = ("--boundary", scene, "--list")
     assert run("field", scene, *point(truth), *both) == 2
+
+
+def test_a_window_of_one_pixel_grows(sample, tmp_path):
+    truth, folder = sample
+    code = run(
+        "field", folder / "scene.tif", *point(truth), "--size-m", 0.1, "-o", tmp_path / "x.gpkg"
+    )
+    assert code == 0
+    assert read_plan(tmp_path / "x.gpkg").field.area_ha == pytest.approx(
+        truth.field.area_ha, rel=0.2
+    )
+
+
+def test_a_picture_of_one_pixel_is_told(sample, tmp_path, capsys):
+    truth, folder = sample
+    one = tmp_path / "one.tif"
+    assert run("tiles", folder / "scene.tif", *point(truth), "--size", 1, "-o", one) == 0
+    assert run("field", one, *point(truth), "-o", tmp_path / "x.gpkg") == 1
+    assert "is one pixel" in capsys.readouterr().err
+
+
+def test_bands_are_told_from_what_the_picture_has(sample, tmp_path, capsys):
+    truth, folder = sample
+    out = ("-o", tmp_path / "x.gpkg")
+    scene = folder / "scene.tif"
+    assert run("field", scene, *point(truth), "--bands", "red,grene", *out) == 1
+    told = capsys.readouterr().err
+    assert "Did you mean 'green'" in told
+    assert "the picture has 4 bands (red, green, blue, nir)" in told
+    assert run("field", scene, *point(truth), "--bands", "red,green,blue,nir", *out) == 0

@@ -109,6 +109,10 @@ def field(
         raise click.UsageError(
             "--boundary takes a parcel as it is: leave --list, --region and --choose out."
         )
+    if list_regions and (output is not None or choose):
+        raise click.UsageError(
+            "--list shows the regions and writes no outline: leave -o and --choose out, or --list."
+        )
     if not list_regions and output is None:
         raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
     previous = None

@@ -105,7 +105,7 @@ def extract_field(
     _check(method, regions, (*include, *exclude), holes, smooth)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
-    _check_places(scene, ((lon, lat), *include, *exclude))
+    _check_places(scene, (lon, lat), include, exclude)
     picture = diffused(scene) if smooth == "diffusion" else scene
     part, whole = Part.whole(scene), scene.grid
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
@@ -214,10 +214,19 @@ def _check(
         raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
 
 
-def _check_places(scene: Scene, places: Places) -> None:
+def _check_places(
+    scene: Scene, point: tuple[float, float], include: Places, exclude: Places
+) -> None:
     """Refuse places off the picture, and a picture that shows nothing."""
-    for lon, lat in places:
-        scene.pixel_of(lat=lat, lon=lon)
+    scene.pixel_of(lat=point[1], lon=point[0])
+    for option, places in (("--include-lonlat", include), ("--exclude-lonlat", exclude)):
+        for lon, lat in places:
+            scene.pixel_of(lat=lat, lon=lon, option=option)
+    if scene.valid.size == 1:
+        raise FieldError(
+            "The picture is one pixel: no field can be seen in it.",
+            hint="Give a picture that shows the whole field.",
+        )
     if scene.is_blank:
         raise FieldError(
             "The picture is empty: all its pixels have the same value.",

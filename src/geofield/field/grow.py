@@ -53,12 +53,15 @@ def grow_field(
     while True:
         scene = read(size_m)
         bounds = _extent(scene)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            field = extract_field(scene, lat=lat, lon=lon, **options)
-        ended = covered is not None and bounds == covered
-        if not touches_edge(field) or ended or size_m >= largest_m:
-            break
+        # Two windows narrower than a pixel are the same pixel, not all of the picture.
+        ended = (bounds == covered and scene.valid.size > 1) or size_m >= largest_m
+        # A window of one pixel, or of evenly white ground, is no empty picture yet.
+        if ended or not scene.is_blank:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                field = extract_field(scene, lat=lat, lon=lon, **options)
+            if ended or not touches_edge(field):
+                break
         covered = bounds
         size_m = min(2 * size_m, largest_m)
     for warning in caught:

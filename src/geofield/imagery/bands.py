@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.errors import ImageryError
+from geofield.wording import nearest
 
 #: A mask is opaque or transparent nearly everywhere; feathered edges are thin.
 _MASK_SHARE = 0.9
@@ -41,6 +42,7 @@ _WORDS = {
     "pan": "grey",
     "panchromatic": "grey",
 }
+_ROLES = ("red", "green", "blue", "nir", "grey", "alpha", "other")
 _SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
 
 
@@ -82,7 +84,8 @@ def find_roles(
     """
     count = len(interpretation)
     if given:
-        return BandRoles(_checked(given, count))
+        names = [text or name for text, name in zip(descriptions, interpretation, strict=True)]
+        return BandRoles(_checked(given, names))
     notes: list[str] = []
     described = [_from_description(text) for text in descriptions]
     if any(described) and _is_consistent(described):
@@ -119,22 +122,27 @@ def looks_like_mask(values: NDArray[Any]) -> bool:
     return bool(binary >= _MASK_SHARE * values.size)
 
 
-def _checked(given: Sequence[str], count: int) -> tuple[str, ...]:
+def _checked(given: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Roles as the user gives them, of bands that the file calls `names`."""
+    count = len(names)
     roles = [
         _WORDS.get(_key(role), "other" if role in ("other", "", "-") else "") for role in given
     ]
+    has = f"the picture has {count} band{'s' if count != 1 else ''} ({', '.join(names)})"
     if "" in roles:
+        unknown = given[roles.index("")]
         raise ImageryError(
-            f"Unknown band role {given[roles.index('')]!r}.",
-            hint="Use red, green, blue, nir, grey, alpha, other, in the order of the bands.",
+            f"Unknown band role {unknown!r}.{nearest(_key(unknown), _WORDS)}",
+            hint=f"Use {', '.join(_ROLES)}, in the order of the bands: {has}.",
         )
     repeated = [role for role in roles if role != "other" and roles.count(role) > 1]
     if repeated:
-        raise ImageryError(f"Two bands are said to be {repeated[0]}.", hint="Name each one once.")
+        raise ImageryError(
+            f"Two bands are said to be {repeated[0]}.", hint=f"Name each one once: {has}."
+        )
     if len(roles) > count:
         raise ImageryError(
-            f"{len(roles)} band roles were given, but the picture has {count} band(s).",
-            hint=f"Name at most {count}.",
+            f"{len(roles)} band roles were given, but {has}.", hint=f"Name at most {count}."
         )
     if all(role in ("other", "alpha") for role in roles) and len(roles) >= count:
         raise ImageryError(

@@ -24,6 +24,7 @@ from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import REACH_M, WarpOrigin
 from geofield.imagery.reader import SceneReader
+from geofield.model.scene import swapped
 
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
@@ -212,7 +213,7 @@ def _outside(readers: list[SceneReader], lon: float, lat: float, name: str) -> s
     if abs(lon) <= 90 and any(
         each.grid.contains_px(*each.grid.from_lonlat(lat, lon)) for each in readers
     ):
-        message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+        message += f" {swapped(lat, lon)}"
     return message
 
 

@@ -16,10 +16,10 @@ from rasterio.transform import from_gcps
 from rasterio.vrt import WarpedVRT
 
 from geofield.crs import LONLAT, metric_crs, transformer
-from geofield.errors import CRSError, PointOutsideError
+from geofield.errors import CRSError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name, to_rasterio
-from geofield.model.scene import outside_message
+from geofield.model.scene import outside
 
 #: Sides of a ground pixel may differ by this factor before the picture is reprojected.
 MAX_ASPECT = 1.1
@@ -127,7 +127,7 @@ def _square_grid(native: Grid, point: LonLat | None) -> Grid:
         lon, lat = point
         x, y = native.from_lonlat(lon, lat)
         if not native.contains_px(x, y):
-            raise PointOutsideError(outside_message(native, lat, lon))
+            raise outside(native, lat, lon)
         local = native.crop(int(x), int(y), 1, 1)
     target = metric_crs(*here)
     aspect, _ = pixel_shape(local)

@@ -22,7 +22,7 @@ from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
 from geofield.crs import parse_crs
-from geofield.errors import ImageryError, PointOutsideError
+from geofield.errors import ImageryError
 from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of
@@ -32,7 +32,7 @@ from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scale_limits, to_uint8
 from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
-from geofield.model.scene import ImagerySource, Scene, outside_message
+from geofield.model.scene import ImagerySource, Scene, outside
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
@@ -165,7 +165,7 @@ class SceneReader:
         """
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
-            raise PointOutsideError(outside_message(self.grid, lat, lon))
+            raise outside(self.grid, lat, lon)
         if size_px is not None:
             if size_px < 1:
                 raise ImageryError(

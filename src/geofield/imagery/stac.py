@@ -21,7 +21,7 @@ from geofield.imagery.gdal import gdal_env, is_remote, open_picture
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
-from geofield.model.scene import ImagerySource
+from geofield.model.scene import ImagerySource, swapped
 
 _RASTER = ("image/tiff", "image/vnd.stac.geotiff", "image/jp2", "application/x-geotiff")
 _SINGLE = ("red", "green", "blue", "nir")
@@ -64,7 +64,7 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
         if not here:
             message = f"No item of {path.name} holds the point lat {lat}, lon {lon}."
             if any(_holds(f, lon, lat) for f in features):
-                message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
+                message += f" {swapped(lat, lon)}"
             raise PointOutsideError(message)
         features = here
     features = sorted(features, key=lambda f: _date(f) or "", reverse=True)

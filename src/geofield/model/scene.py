@@ -162,7 +162,7 @@ class Scene:
         bands, valid = self.bands[:, r0:r1, c0:c1], self.valid[r0:r1, c0:c1]
         return replace(self, grid=grid, bands=bands, valid=valid)
 
-    def pixel_of(self, *, lat: float, lon: float) -> tuple[float, float]:
+    def pixel_of(self, *, lat: float, lon: float, option: str | None = None) -> tuple[float, float]:
         """The pixel position of a point that must lie on the picture's data.
 
         Rounded to a thousandth of a pixel: the last digits are the transformation's own, and a
@@ -172,6 +172,8 @@ class Scene:
         ----------
         lat, lon : float
             Degrees, WGS 84.
+        option : str, optional
+            What gave the point as LON,LAT, for the message; ``--lat`` and ``--lon`` otherwise.
 
         Raises
         ------
@@ -181,29 +183,41 @@ class Scene:
         """
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
-            raise PointOutsideError(outside_message(self.grid, lat, lon))
+            raise outside(self.grid, lat, lon, option)
         rows, columns = self.grid.shape
         x, y = min(round(float(x), 3), columns - 1e-3), min(round(float(y), 3), rows - 1e-3)
         if not self.valid[int(y), int(x)]:
             raise PointOutsideError(
-                f"The point lat {lat}, lon {lon} (pixel {x:.0f}, {y:.0f}) lies where the picture "
-                "has no data.",
+                f"{_point(lat, lon, option)} (pixel {x:.0f}, {y:.0f}) lies where the picture has "
+                "no data.",
                 hint="Choose a point on the picture itself.",
             )
         return x, y
 
 
-def outside_message(grid: Grid, lat: float, lon: float) -> str:
-    """Say that a point lies outside, what is covered, and whether lat and lon look swapped."""
+def outside(grid: Grid, lat: float, lon: float, option: str | None = None) -> PointOutsideError:
+    """The error of a point outside: what is covered, and whether lat and lon look swapped.
+
+    `option` is what gave the point as LON,LAT; ``--lat`` and ``--lon`` when None.
+    """
     corners = grid.corners_lonlat()
     lons, lats = [c[0] for c in corners], [c[1] for c in corners]
     message = (
-        f"The point lat {lat}, lon {lon} lies outside the picture, which covers lat "
-        f"{min(lats):.6f} to {max(lats):.6f}, lon {min(lons):.6f} to {max(lons):.6f}."
+        f"{_point(lat, lon, option)} lies outside the picture, which covers lat {min(lats):.6f} "
+        f"to {max(lats):.6f}, lon {min(lons):.6f} to {max(lons):.6f}."
     )
-    swapped = (
-        abs(lon) <= 90 and grid.contains_px(*grid.from_lonlat(lat, lon))  # lat as lon and back
+    if abs(lon) <= 90 and grid.contains_px(*grid.from_lonlat(lat, lon)):  # lat as lon and back
+        return PointOutsideError(f"{message} {swapped(lat, lon, option)}")
+    return PointOutsideError(
+        message, hint="Give a point on the picture, or a picture of the point."
     )
-    if swapped:
-        message += f" Latitude and longitude look swapped: try --lat {lon} --lon {lat}."
-    return message
+
+
+def swapped(lat: float, lon: float, option: str | None = None) -> str:
+    """What to say of a point that lies right with latitude and longitude exchanged."""
+    right = f"{option} {lat},{lon}" if option else f"--lat {lon} --lon {lat}"
+    return f"Latitude and longitude look swapped: try {right}."
+
+
+def _point(lat: float, lon: float, option: str | None) -> str:
+    return f"The point lat {lat}, lon {lon}{f' of {option}' if option else ''}"

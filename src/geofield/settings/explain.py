@@ -24,6 +24,7 @@ def explained(error: ValidationError) -> str:
         whole = isinstance(problem.get("input"), Mapping)
         given = [] if secret or whole else [f"given: {problem.get('input')!r}"]
         message = problem["msg"].removeprefix("Value error, ")
+        message = message.replace("valid tuple", "list").replace("valid dictionary", "table")
         near = ""
         if problem["type"] == "extra_forbidden":
             message = "there is no such setting"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from geofield.settings.section import Section
+from geofield.settings.section import Section, words
 
 #: The formats that can be written; held against the registry of formats by a test.
 FormatName = Literal[
@@ -41,7 +41,7 @@ FormatName = Literal[
 class ExportSettings(Section):
     """What is written."""
 
-    formats: tuple[FormatName, ...] = Field(
+    formats: Annotated[tuple[FormatName, ...], BeforeValidator(words)] = Field(
         ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
     )
     points: bool = Field(False, description="Track points in linked data, too: most of its bytes.")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, SecretStr
+from pydantic import BeforeValidator, Field, PositiveFloat, SecretStr
 
-from geofield.settings.section import Section
+from geofield.settings.section import Section, words
 
 
 class SourceSettings(Section):
@@ -41,7 +41,7 @@ class ImagerySettings(Section):
         description="Side of the window read around the point, metres; all of a small picture.",
         json_schema_extra={"option": "--size-m"},
     )
-    bands: tuple[str, ...] | None = Field(
+    bands: Annotated[tuple[str, ...] | None, BeforeValidator(words)] = Field(
         None,
         description="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
     )

@@ -17,6 +17,8 @@ from geofield.settings.section import nearest
 from geofield.settings.tracks import said_over
 from geofield.settings.whole import SECTIONS, Settings, Stage, names_of
 
+_KNOWN = (*SECTIONS, "machines")
+
 
 def load_settings(
     path: str | Path | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
@@ -39,21 +41,11 @@ def load_settings(
     SettingsError
         Naming the setting, its value and what would be right.
     """
-    known = (*SECTIONS, "machines")
-    merged: dict[str, dict[str, Any]] = {section: {} for section in known}
+    merged: dict[str, dict[str, Any]] = {section: {} for section in _KNOWN}
     try:
         for source in (_read_toml(path), _from_environment(), overrides or {}):
+            _check_sections(source)
             for section, settings in source.items():
-                if section not in known:
-                    raise SettingsError(
-                        f"Unknown section [{section}] in the settings." + nearest(section, known),
-                        hint=f"Sections: {', '.join(known)}.",
-                    )
-                if not isinstance(settings, Mapping):
-                    raise SettingsError(
-                        f"{section} is a section of the settings, not a value.",
-                        hint=f"Write [{section}] and its settings below.",
-                    )
                 said = {k: v for k, v in settings.items() if v is not None}
                 merged[section] = (
                     _tracks_said(merged[section], said, _machines(merged, source))
@@ -63,6 +55,21 @@ def load_settings(
         return Settings(**merged)
     except ValidationError as error:
         raise SettingsError(explained(error)) from None
+
+
+def _check_sections(source: Mapping[str, Any]) -> None:
+    """Refuse what is no section."""
+    for section, settings in source.items():
+        if section not in _KNOWN:
+            raise SettingsError(
+                f"Unknown section [{section}] in the settings." + nearest(section, _KNOWN),
+                hint=f"Sections: {', '.join(_KNOWN)}.",
+            )
+        if not isinstance(settings, Mapping):
+            raise SettingsError(
+                f"{section} is a section of the settings, not a value.",
+                hint=f"Write [{section}] and its settings below.",
+            )
 
 
 def _machines(*sources: Mapping[str, Any]) -> dict[str, Machine]:
@@ -179,6 +186,7 @@ def _from_environment() -> dict[str, Any]:
     if not any(name.upper().startswith("GEOFIELD_") for name in os.environ):
         return {}
     from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
+    from pydantic_settings import SettingsError as UnreadableError
 
     class Variables(BaseSettings):
         """How the variables are named."""
@@ -190,7 +198,17 @@ def _from_environment() -> dict[str, Any]:
     }
     # Only its parsing is used.
     Environment = create_model("Environment", __base__=Variables, **sections)
-    return EnvSettingsSource(Environment)()
+    try:
+        return EnvSettingsSource(Environment)()
+    except UnreadableError as error:
+        text = getattr(error.__cause__, "doc", None)
+        # By its name alone: it may hold a key.
+        given = {k: v for k, v in os.environ.items() if k.upper().startswith("GEOFIELD_")}
+        names = [name for name, value in given.items() if value == text]
+        raise SettingsError(
+            f"{' or '.join(names) or 'A variable GEOFIELD_...'} in the environment cannot be read.",
+            hint="""Lists and tables are written as JSON there, such as '["gpkg", "kml"]'.""",
+        ) from None
 
 
 def _read_toml(path: str | Path | None) -> dict[str, Any]:
@@ -198,7 +216,7 @@ def _read_toml(path: str | Path | None) -> dict[str, Any]:
     if path is None and not file.is_file():
         return {}
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise SettingsError(f"The settings file {file} cannot be read: {error.strerror}.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

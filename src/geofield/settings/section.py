@@ -14,18 +14,29 @@ NonNegative = Annotated[float, Field(ge=0)]
 
 def _lonlat(value: Any) -> Any:
     """Longitude and latitude of a text ``LON,LAT``; what is a pair already stays."""
-    if isinstance(value, str):
-        value = value.split(",")
-    if len(value) != 2:
-        raise ValueError("write a position as LON,LAT, for instance 33.531142,35.075373")
-    lon, lat = (float(part) for part in value)
-    if not (abs(lon) <= 180 and abs(lat) <= 90):
-        raise ValueError(f"{lon:g},{lat:g} is no longitude and latitude")
-    return lon, lat
+    try:
+        lon, lat = map(float, value.split(",") if isinstance(value, str) else value)
+    except (TypeError, ValueError):
+        raise ValueError("write a position as LON,LAT, for instance 33.531142,35.075373") from None
+    if abs(lon) <= 180 and abs(lat) <= 90:
+        return lon, lat
+    exchanged = abs(lat) <= 180 and abs(lon) <= 90
+    raise ValueError(
+        f"{lon:.10g},{lat:.10g} is no longitude and latitude"
+        + (f": exchanged, {lat:.10g},{lon:.10g}, it is" if exchanged else "")
+    )
 
 
 LonLat = Annotated[tuple[float, float], BeforeValidator(_lonlat)]
 """Longitude and latitude, degrees."""
+
+
+def words(value: Any) -> Any:
+    """The words of a list, where one of them may be several with commas, or all are one text."""
+    parts = [value] if isinstance(value, str) else value
+    if not isinstance(parts, list | tuple) or not all(isinstance(part, str) for part in parts):
+        return value  # what is wrong is said by the setting's own check
+    return tuple(word.strip() for part in parts for word in part.split(","))
 
 
 class Section(BaseModel):
