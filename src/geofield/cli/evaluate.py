@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from geofield.cli.console import echo_json, say
+from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.files import FILE, OLD_FILE
 from geofield.errors import ObstacleError
 
@@ -67,6 +67,8 @@ def evaluate(
     from geofield.evaluation import evaluate as compare
     from geofield.plan import read_plan
 
+    if scene_file is not None and picture is None:
+        say_note("--scene changes nothing without --draw, which names the picture to write.")
     found = read_obstacles(detected, layer, metric=True)
     true = read_obstacles(truth, truth_layer)
     options: dict[str, Any] = {"distance_m": distance_m, "seed": seed}

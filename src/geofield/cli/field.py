@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,12 @@ import click
 from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.files import FILE, FOLDER, claim_file
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import name_option, point_options, stage_options
+from geofield.cli.options import (
+    name_option,
+    point_options,
+    stage_options,
+    tell_idle,
+)
 from geofield.cli.parcels import boundary_options, own_parcel
 from geofield.cli.refresh import say_outdated
 
@@ -104,17 +110,12 @@ def field(
     from geofield.pipeline import open_scene, run_field
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
+    from geofield.settings import with_values
 
-    if boundary is not None and (regions or list_regions or choose):
-        raise click.UsageError(
-            "--boundary takes a parcel as it is: leave --list, --region and --choose out."
-        )
-    if list_regions and (output is not None or choose):
-        raise click.UsageError(
-            "--list shows the regions and writes no outline: leave -o and --choose out, or --list."
-        )
-    if not list_regions and output is None:
-        raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
+    _refuse_at_odds(click.get_current_context().params)
+    parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
+    chosen = with_values(settings, method="study") if regions else settings
+    tell_idle(chosen, parcel=parcel is not None)
     previous = None
     if output is not None:
         claim_file(output)
@@ -135,7 +136,6 @@ def field(
             _study(scene, lat, lon, regions, pictures, tell=list_regions, as_json=as_json)
         if output is None:
             return
-        parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
         plan = run_field(
             picture, lat=lat, lon=lon, settings=settings, previous=previous, regions=regions,
             boundary=parcel, choose=choose, name=name,
@@ -145,6 +145,26 @@ def field(
         echo_json(_figures(plan, output))
     else:
         _say(plan, output, alternatives=alternatives)
+
+
+def _refuse_at_odds(given: Mapping[str, Any]) -> None:
+    """Refuse options that ask for two outlines at once, or for none."""
+    listing, regions, choose = given["list_regions"], given["regions"], given["choose"]
+    if given["boundary"] is not None and (regions or listing or choose):
+        raise click.UsageError(
+            "--boundary takes a parcel as it is: leave --list, --region and --choose out."
+        )
+    if listing and (given["output"] is not None or choose):
+        raise click.UsageError(
+            "--list shows the regions and writes no outline: leave -o and --choose out, or --list."
+        )
+    if regions and (choose or given["field__include"] or given["field__exclude"]):
+        raise click.UsageError(
+            "--region takes the study's regions as they are: leave --choose, --include-lonlat and "
+            "--exclude-lonlat out, or --region."
+        )
+    if not listing and given["output"] is None:
+        raise click.UsageError("Name the GeoPackage to write with -o, or ask for --list.")
 
 
 def _figures(plan: Plan, output: Path) -> dict[str, Any]:

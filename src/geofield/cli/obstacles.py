@@ -10,7 +10,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import OLD_FILE, claim_file, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import continued, defaults_option, stage_options
+from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def obstacles(
     plan = read_plan(plan_file)
     if not defaults:
         settings = continued(settings, plan.settings, "obstacles")
+    tell_idle(settings)
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
     save_plan(plan, output, read_from=plan_file, overwrite=overwrite)
     table = plan.obstacles

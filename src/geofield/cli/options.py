@@ -16,8 +16,17 @@ from typing import Any, Literal, TypeVar
 import click
 from pydantic.fields import FieldInfo
 
-from geofield.cli.console import say
-from geofield.settings import LonLat, Settings, Stage, as_before, load_settings, option_named
+from geofield.cli.console import say, say_note
+from geofield.settings import (
+    FieldSettings,
+    LonLat,
+    Settings,
+    Stage,
+    as_before,
+    idle,
+    load_settings,
+    option_named,
+)
 from geofield.wording import nearest
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -134,6 +143,19 @@ def continued(settings: Settings, earlier: Settings | None, section: Stage) -> S
     if told:
         say(f"As the plan was made: {', '.join(told)}")
     return settings
+
+
+def tell_idle(settings: Settings, *, parcel: bool = False) -> None:
+    """Tell which options that were given change nothing, as the way they belong to is not taken.
+
+    With a `parcel` of the user's own those are all options of the outline.
+    """
+    said = section_values(click.get_current_context().params)
+    for name in said.pop("field", {}) if parcel else ():
+        option = option_named(name, FieldSettings.model_fields[name])
+        say_note(f"{option} changes nothing beside --boundary, whose parcel is taken as it is.")
+    for sentence in idle(settings, said):
+        say_note(sentence)
 
 
 def _as_typed(value: Any) -> str:

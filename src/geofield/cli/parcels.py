@@ -37,6 +37,9 @@ def own_parcel(
 ) -> Field | None:
     """The user's own parcel from any vector file; None without one."""
     if path is None:
+        if layer or name:
+            given = "--boundary-layer" if layer else "--boundary-name"
+            raise click.UsageError(f"{given} is of a file of parcels: name it with --boundary.")
         return None
     from geofield.field import field_from_boundary
     from geofield.formats.foreign import read_vector

@@ -16,6 +16,7 @@ from geofield.cli.options import (
     name_option,
     point_options,
     stage_options,
+    tell_idle,
 )
 from geofield.cli.parcels import boundary_options, own_parcel
 from geofield.cli.refresh import say_outdated
@@ -94,6 +95,8 @@ def run(
     from geofield.staging import PREFIX
 
     claim_folder(out)
+    parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
+    tell_idle(settings, parcel=parcel is not None)
     if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
         # Said at once, not after the work.
         raise OutputExistsError(
@@ -109,7 +112,6 @@ def run(
             imagery, settings, lat=lat, lon=lon, acknowledged=acknowledge_terms, progress=progress
         ) as picture,
     ):
-        parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
         plan = plan_field(
             picture, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,
             progress=progress, timings_s=timings, name=name,

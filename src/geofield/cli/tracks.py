@@ -11,7 +11,13 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import OLD_PATH, PATH, claim_file, claim_folder, output_option
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.options import continued, defaults_option, name_option, stage_options
+from geofield.cli.options import (
+    continued,
+    defaults_option,
+    name_option,
+    stage_options,
+    tell_idle,
+)
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -80,6 +86,8 @@ def tracks(
     job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     places = None if plan is not None else parcels_in(file, settings, crs)
     several = places is not None and len(places) > 1
+    if places is None or not places.settings.num_columns:
+        tell_idle(settings)  # a column could choose another way for its field
     if name and several:
         raise click.UsageError("--name is one field's name: the file has several.")
     rows: list[dict[str, Any]]

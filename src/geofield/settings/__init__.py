@@ -7,6 +7,7 @@ arguments of its stage, so that each figure is described once, here.
 
 from geofield.settings.export import ExportSettings, FormatName
 from geofield.settings.field import FieldSettings
+from geofield.settings.idle import idle
 from geofield.settings.imagery import FetchSettings, ImagerySettings, SourceSettings
 from geofield.settings.load import as_before, from_mapping, load_settings, with_values
 from geofield.settings.machines import Machine
@@ -32,6 +33,7 @@ __all__ = [
     "TrackSettings",
     "as_before",
     "from_mapping",
+    "idle",
     "load_settings",
     "option_named",
     "with_values",
