@@ -123,6 +123,14 @@ def test_what_goes_wrong_is_said(
     assert not Path("a.tif").exists()
 
 
+def test_options_of_tiles_with_a_picture_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    picture = Path(__file__).parents[2] / "sample_data" / "field_1.tif"
+    assert run("tiles", picture, *POINT, "--size", 20, "--resolution", 2, "-o", "a.tif") == 0
+    assert "--resolution changes nothing here" in capsys.readouterr().err
+    assert run("tiles", picture, *POINT, "--size", 20, "-o", "b.tif") == 0
+    assert "changes nothing" not in capsys.readouterr().err
+
+
 def test_terms_are_refused_until_acknowledged(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,14 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from geofield.cli.console import echo_json, progress_bar
+from geofield.cli.console import echo_json, progress_bar, say_note
 from geofield.cli.files import FOLDER, OLD_FILE, claim_file, output_option
 from geofield.cli.options import Degrees, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
+    from geofield.imagery.sources import Source
     from geofield.settings import Settings
+
+
+#: What only sources of tiles take.
+_OF_TILES = ("zoom", "resolution_m", "whole_tiles", "missing", "layer")
 
 
 class ZoomType(click.ParamType[Any]):
@@ -145,6 +151,7 @@ def tiles(
         offline=offline,
         options=options,
     )
+    _tell_idle(found, place["zoom"])
     with progress_bar(quiet=as_json) as progress:
         done = acquire(
             found, where, output, options=options, overwrite=overwrite, progress=progress
@@ -153,6 +160,23 @@ def tiles(
         echo_json(where_json(done))
     else:
         describe(done)
+
+
+def _tell_idle(source: Source, zoom: int | str | None) -> None:
+    """Tell which options that were given change nothing with a source."""
+    from geofield.imagery.sources import PictureSource
+
+    context = click.get_current_context()
+    given = [
+        each
+        for each in context.command.params
+        if context.get_parameter_source(each.name or "") is ParameterSource.COMMANDLINE
+    ]
+    for option in given:
+        if isinstance(source, PictureSource) and option.name in _OF_TILES:
+            say_note(f"{option.opts[0]} changes nothing here: a picture is cut on its own pixels.")
+        elif option.name == "resolution_m" and zoom is not None:
+            say_note("--resolution changes nothing beside --zoom, which stands instead of it.")
 
 
 def _where(lat: float | None, lon: float | None, area: Path | None, place: dict[str, Any]) -> Where:
