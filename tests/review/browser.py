@@ -117,8 +117,15 @@ class Page:
         )
         return found[0], found[1]
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 6) -> None:
-        """Press at one place of the plan, move, and let go at another."""
+    def drag(
+        self,
+        start: tuple[float, float],
+        end: tuple[float, float],
+        steps: int = 6,
+        *,
+        back: bool = False,
+    ) -> None:
+        """Press at one place of the plan, move, and let go at another, or back at the first."""
         (x0, y0), (x1, y1) = self.pixel(*start), self.pixel(*end)
         action = ActionChains(self.driver, duration=30)
         action.w3c_actions.pointer_action.move_to_location(x0, y0)
@@ -127,6 +134,8 @@ class Page:
             action.w3c_actions.pointer_action.move_to_location(
                 round(x0 + (x1 - x0) * step / steps), round(y0 + (y1 - y0) * step / steps)
             )
+        if back:
+            action.w3c_actions.pointer_action.move_to_location(x0, y0)
         action.w3c_actions.pointer_action.pointer_up()
         action.perform()
 

@@ -141,6 +141,47 @@ def test_drawing_moving_and_resizing_with_the_pointer(page: Page) -> None:
     page.wait(lambda: len(page.state()["obstacles"]) == number)
 
 
+def test_a_click_draws_no_circle_and_tells_how_it_is_done(page: Page) -> None:
+    before = page.state()
+    x, y = before["obstacles"][0]["centre"]
+    page.press("a")
+    page.click(x, y)
+    page.wait(lambda: "press at its middle and drag" in page.text("message"))
+    page.press(Keys.ESCAPE, "a")
+    page.drag((x, y), (x + 20, y), back=True)
+    time.sleep(0.3)
+    after = page.state()
+    assert (after["obstacles"], after["can_undo"]) == (before["obstacles"], False)
+
+
+def test_what_is_done_is_spoken_and_done_without_a_pointer(page: Page) -> None:
+    known = len(page.state()["obstacles"])
+
+    def spoken() -> str:
+        return str(page.run("return document.getElementById('spoken').textContent"))
+
+    page.press("j")
+    page.wait(lambda: spoken().startswith("Obstacle"))
+    first = int(
+        page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+    )
+    page.press("c")
+    # The word that was given, then the next one that waits for a word.
+    page.wait(lambda: spoken().startswith(f"Obstacle {first}: confirmed. Obstacle "))
+    page.chord(Keys.CONTROL, "z")
+    page.wait(lambda: spoken().startswith(f"Undone. Obstacle {first}: "))
+    page.chord(Keys.CONTROL, Keys.SHIFT, "z")
+    page.wait(lambda: spoken() == f"Redone. Obstacle {first}: confirmed")
+    page.press("a")
+    page.wait(lambda: spoken() == "Add circle")
+    page.run("document.getElementById('map').focus()")
+    page.press(Keys.ENTER)
+    page.wait(lambda: len(page.state()["obstacles"]) == known + 1)
+    page.wait(lambda: spoken().startswith(f"Obstacle {known + 1}: added by hand"))
+    page.press(Keys.DELETE)
+    page.wait(lambda: spoken() == f"Obstacle {known + 1}: deleted")
+
+
 def test_the_outline_is_edited_and_tracks_turn(page: Page) -> None:
     before = page.state()
     offered = page.run(
@@ -342,7 +383,7 @@ def test_a_name_with_a_script_in_it_is_only_a_name(
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("width", [360, 1280])
 def test_accessibility_rules_hold(plan_path: Path, scheme: str, width: int) -> None:
     with served(plan_path) as (address, _):
         more = ["--force-dark-mode", "--blink-settings=preferredColorScheme=0"] * (scheme == "dark")

@@ -34,6 +34,7 @@ const WORDS = {
     v_overrun: "over the border", v_leave: "left out", v_shift: "moved inside", v_spread: "spacing evened",
     v_none: "none", v_boustrophedon: "one by one", v_skip: "skipping some", v_shortest: "shortest",
     outline_no: "Outline {n} · {p} %", alternatives: "Other outlines", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
+    undone: "Undone", redone: "Redone", deleted: "deleted", k_here: "Add a circle in the middle of the map, where it has the focus",
     k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
   },
   de: {
@@ -67,6 +68,7 @@ const WORDS = {
     v_overrun: "über den Rand", v_leave: "auslassen", v_shift: "hineinrücken", v_spread: "Abstand anpassen",
     v_none: "keiner", v_boustrophedon: "eine nach der anderen", v_skip: "überspringend", v_shortest: "kürzester",
     outline_no: "Umriss {n} · {p} %", alternatives: "Andere Umrisse", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
+    undone: "Zurückgenommen", redone: "Wiederholt", deleted: "gelöscht", k_here: "Kreis in der Mitte der Karte, wenn sie den Fokus hat",
     k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
   },
 };

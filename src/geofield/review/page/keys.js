@@ -4,7 +4,7 @@ import {t} from "./web/words.js";
 
 const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
-  ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")],
+  ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")], ["Enter", "k_here", a => a.here()],
   ["m", "k_move", a => a.tool("select")], ["[", "k_size", a => a.smaller()], ["]", "k_size", a => a.larger()],
   ["o", "k_outline", a => a.tool("outline")],
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
@@ -32,6 +32,8 @@ export function listen(actions) {
       if (actions.nudge(x * metres, y * metres) !== false) done(event, () => {});
       return;
     }
+    // Buttons and lists have their own use for it.
+    if (key === "Enter" && event.target.id !== "map") return;
     const found = KEYS.find(([name]) => name === key || (name.length === 1 && name === key.toLowerCase()));
     if (found) done(event, () => (event.repeat && !ON_AND_ON.includes(found[0])) || found[2](actions));
   }, true);

@@ -32,6 +32,26 @@ function say(text, bad = false, button = null) {
   if (text && !button) silence = setTimeout(() => say(""), bad ? 9000 : 4000);
 }
 
+// For those who hear the page: what is told in one moment is said together.
+const sentences = [];
+function speak(text) {
+  if (!sentences.length) setTimeout(() => { $("spoken").textContent = sentences.splice(0).join(". "); }, 60);
+  sentences.push(text);
+}
+
+const named = each => `${t("obstacle")} ${each.no}: ${t(each.status)}`;
+
+// What an edit, or taking one back, did: to obstacles, else to the field as a whole.
+function speakOf(command, before) {
+  if (command.do === "undo" || command.do === "redo") speak(t(`${command.do}ne`));
+  const old = new Map(before.map(each => [each.no, each])), now = new Set(state.obstacles.map(each => each.no));
+  const changed = state.obstacles.filter(each => old.get(each.no)?.status !== each.status).map(named);
+  const gone = before.filter(each => !now.has(each.no)).map(each => `${t("obstacle")} ${each.no}: ${t("deleted")}`);
+  const told = [...changed, ...gone];
+  if (told.length && told.length < 5) told.forEach(speak);
+  else speak($("figures").textContent);
+}
+
 function refused(error) {
   if (ended) return;
   if (error.otherTab) say(error.message, true, {text: t("take"), act: takeOver});
@@ -149,8 +169,7 @@ function choose(no, zoom) {
   maps.showHandle(no === null ? null : row(no));
   if (no === null) return;
   if (zoom) maps.zoomTo(row(no));
-  const each = row(no);
-  $("spoken").textContent = `${t("obstacles")} ${no}: ${t(each.status)}`;
+  speak(named(row(no)));
 }
 
 function step(forth) {
@@ -175,7 +194,7 @@ const commit = command => inTurn(() => make(command));
 
 async function make(command) {
   document.body.classList.toggle("busy", command.do === "ground");
-  const before = new Set(state.obstacles.map(each => each.no));
+  const before = state.obstacles;
   const done = await act(() => api.edit(command), show);
   document.body.classList.remove("busy");
   if (!done) {
@@ -183,7 +202,8 @@ async function make(command) {
     return false;
   }
   if ($("message").classList.contains("bad") && !state.unnoted) say("");
-  const fresh = state.obstacles.find(each => !before.has(each.no));
+  speakOf(command, before);
+  const fresh = state.obstacles.find(each => before.every(({no}) => no !== each.no));
   if (fresh) choose(fresh.no, false);
   return true;
 }
@@ -223,7 +243,7 @@ const ACTIONS = {
   confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
   reset: () => inTurn(takeBack), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
-  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => tools.use(name), nudge,
+  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.addHere, nudge,
   onward: () => goTo((state.plan + 1) % state.plans.length),
   escape: () => { if (tools.current() === "select") inTurn(() => choose(null)); tools.use("select"); },
 };
@@ -261,7 +281,7 @@ async function start() {
   maps.build(state, () => chosen);
   show(state);
   maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
-  tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, scale: () => state.scale,
+  tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, explain: word => say(t(word)), scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
   listen(ACTIONS);

@@ -10,7 +10,7 @@ const reach = matchMedia("(pointer: coarse)").matches ? 16 : 6;
 const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
 const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
 
-// `desk`: {chosen(), row(no), choose(no), commit(command), again(), showTracks(answer, moving), refused(error), measured(text), changed()}
+// `desk`: {chosen(), row(no), choose(no), commit(command), again(), showTracks(answer, moving), refused(error), explain(word), measured(text), changed()}
 export function begin(given) {
   desk = given;
   maps.map.on("singleclick", event => {
@@ -44,15 +44,21 @@ export function removeCorner() {
   return true;
 }
 
+// A circle without a pointer: in the middle of the map, to be moved and sized by keys.
+export function addHere() {
+  const [x, y] = at(maps.view.getCenter());
+  if (active === "circle") commit({do: "circle", x, y, radius_m: 2});
+}
+
 const ringsOf = feature => feature.getGeometry().getCoordinates().map(part => part.slice(0, -1).map(at));
 
 export const current = () => active;
 
 export function use(name) {
+  active = name;
   for (const one of held) maps.map.removeInteraction(one);
   maps.sources.sketch.clear(true);
   desk.measured("");
-  active = name;
   held = MAKERS[name]();
   for (const one of held) maps.map.addInteraction(one);
   desk.changed();
@@ -72,8 +78,16 @@ const MAKERS = {
     const command = geometry => ({do: "circle", x: at(geometry.getCenter())[0], y: at(geometry.getCenter())[1],
                                   radius_m: Math.max(0.3, Math.round(geometry.getRadius() * desk.scale() * 1000) / 1000)});
     draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => live(command(target))));
+    // A click, or a hand that went back to where it began, draws nothing: how it is done is told.
+    const explain = () => {
+      endPreview();
+      desk.again();
+      if (active === "circle") desk.explain("k_add");
+    };
+    draw.on("drawabort", explain);
     draw.on("drawend", async ({feature}) => {
-      await commit(command(feature.getGeometry()));
+      if (feature.getGeometry().getRadius() < reach / 3 * maps.view.getResolution()) explain();
+      else await commit(command(feature.getGeometry()));
       maps.sources.sketch.clear();
     });
     return [draw];
