@@ -6,11 +6,14 @@ import json
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from geofield.errors import ChangedError
 from geofield.formats import read_dataset
+from geofield.review.desk import Desk
 from geofield.review.live import LivePlans
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
@@ -20,6 +23,38 @@ SAMPLE = Path(__file__).parents[2] / "sample_data" / "field_1.gpkg"
 @pytest.fixture
 def plan(tmp_path):
     return Path(shutil.copy(SAMPLE, tmp_path / "field.gpkg"))
+
+
+#: As QGIS does: the file stays open, and what is saved lies in the write-ahead log.
+EDITOR = """
+import sqlite3, sys
+connection = sqlite3.connect(sys.argv[1], isolation_level=None)
+for name in ("ST_IsEmpty", "ST_MinX", "ST_MaxX", "ST_MinY", "ST_MaxY"):
+    connection.create_function(name, 1, lambda shape: 0)
+connection.execute("PRAGMA journal_mode = WAL")
+print("open", flush=True)
+for line in sys.stdin:
+    connection.execute("UPDATE obstacles SET status = ?", (line.strip(),))
+    print("saved", flush=True)
+"""
+
+
+@contextmanager
+def editor(path):
+    """Another program that has a plan open; gives what sets the status of all obstacles."""
+    command = [sys.executable, "-c", EDITOR, str(path)]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "open\n"
+
+        def save(status):
+            process.stdin.write(f"{status}\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == "saved\n"
+
+        yield save
+        process.kill()  # it crashes: the log is left
 
 
 def rows_of(path, **changed):
@@ -72,3 +107,30 @@ def test_the_command_answers_line_by_line_and_writes(plan):
     lines = read_dataset(plan).table("segments")
     assert len(lines) == len(written["segments"])
     assert lines["length_m"].sum() == pytest.approx(written["figures"]["length_m"])
+
+
+def test_edits_in_the_write_ahead_log_are_seen(plan):
+    live, question = LivePlans(), {"do": "plan", "file": str(plan)}
+    with editor(plan) as save:
+        save("confirmed")
+        before = live.answer(question)
+        main = plan.read_bytes()
+        save("rejected")
+        assert plan.read_bytes() == main
+        after = live.answer(question)
+        assert len(after["segments"]) < len(before["segments"])
+
+
+def test_a_session_does_not_write_over_a_write_ahead_log(plan):
+    with editor(plan) as save:
+        save("confirmed")
+        desk = Desk(plan)
+        save("rejected")
+    desk.edit({"do": "move", "no": 1, "dx_m": 1.0, "dy_m": 0.0})
+    with pytest.raises(ChangedError):
+        desk.save()
+    desk.reload()
+    assert set(desk.session.plan.obstacles["status"]) == {"rejected"}
+    # Reading folded the log into the file: that is no change by another program.
+    desk.edit({"do": "move", "no": 1, "dx_m": 1.0, "dy_m": 0.0})
+    assert desk.save()["saved_as"] == plan.name

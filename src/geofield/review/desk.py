@@ -43,9 +43,8 @@ class Desk:
         self._read()
 
     def _read(self) -> None:
-        seen = self._fingerprint()
         # What cannot be read is refused before the journal forgets what is not of this file.
-        plan = read_plan(self.path)
+        seen, plan = self._read_plan()
         picture = (
             None
             if self._picture_path is None
@@ -66,6 +65,16 @@ class Desk:
         #: Tells this reading of file and picture from every other one.
         self.reading = secrets.token_hex(4)
         self._edits = 0
+
+    def _read_plan(self) -> tuple[str, Plan]:
+        """The version of the file, and the plan in it.
+
+        Reading itself makes another version of a file whose write-ahead log was left by a crash: it
+        is folded in.
+        """
+        seen, plan = self._fingerprint(), read_plan(self.path)
+        now = self._fingerprint()
+        return (seen, plan) if now == seen else (now, read_plan(self.path))
 
     @property
     def stamp(self) -> str:

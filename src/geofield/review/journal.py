@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,16 @@ def journal_path(plan_path: Path) -> Path:
 
 
 def fingerprint(plan_path: Path) -> str:
-    """What tells one version of a plan's file from another."""
-    return hashlib.sha256(plan_path.read_bytes()).hexdigest()
+    """What tells one version of a plan's file from another, its write-ahead log included."""
+    version = hashlib.sha256(plan_path.read_bytes())
+    with suppress(FileNotFoundError):
+        version.update(log_of(plan_path).read_bytes())
+    return version.hexdigest()
+
+
+def log_of(plan_path: Path) -> Path:
+    """The write-ahead log of SQLite, where QGIS puts what it saves while the file is open there."""
+    return plan_path.with_name(plan_path.name + "-wal")
 
 
 class Journal:

@@ -8,6 +8,7 @@ file is read once.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield.errors import GeofieldError
+from geofield.review.journal import log_of
 from geofield.review.session import Step, planned
 from geofield.web.view import ends_of
 
@@ -28,7 +30,7 @@ class LivePlans:
     """Answers questions about plans; keeps the one asked about last."""
 
     def __init__(self) -> None:
-        self._key: tuple[Path, int] | None = None
+        self._key: object = None
         self._plan: Plan | None = None
 
     def answer(self, question: Mapping[str, Any]) -> dict[str, Any]:
@@ -57,10 +59,7 @@ class LivePlans:
     def _read(self, path: Path) -> Plan:
         from geofield.plan import read_plan
 
-        try:
-            key = (path, path.stat().st_mtime_ns)
-        except OSError as error:
-            raise GeofieldError(f"{path} cannot be read: {error.strerror}.") from None
+        key = (path, _version(path))
         if self._plan is None or key != self._key:
             self._plan, self._key = read_plan(path), key
         return self._plan
@@ -71,6 +70,17 @@ class LivePlans:
         step = planned(self._read(path), None)
         save_plan(step.plan, path, read_from=path)
         return _told(step)
+
+
+def _version(path: Path) -> list[tuple[int, int]]:
+    """Times and sizes that tell whether a plan was written since, its write-ahead log included."""
+    try:
+        facts = [path.stat()]
+    except OSError as error:
+        raise GeofieldError(f"{path} cannot be read: {error.strerror}.") from None
+    with suppress(FileNotFoundError):
+        facts.append(log_of(path).stat())
+    return [(each.st_mtime_ns, each.st_size) for each in facts]
 
 
 def _edited(plan: Plan, question: Mapping[str, Any]) -> Plan:
