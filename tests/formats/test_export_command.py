@@ -190,14 +190,17 @@ def test_a_field_across_the_180th_meridian_comes_back(tmp_path, name, product):
     )
 
 
-@pytest.mark.parametrize("name", ["geojson", "shapefile", "fiboa"])
+@pytest.mark.parametrize("name", ["geojson", "shapefile", "fiboa", "kml"])
 def test_shapes_are_cut_at_the_180th_meridian(tmp_path, name):
     dataset = in_fiji()
     write_dataset(dataset, tmp_path, [name])
     file = {"geojson": "geojson/field.geojson", "shapefile": "shapefile/boundary.shp",
-            "fiboa": "fiboa/field.parquet"}[name]  # fmt: skip
-    read = gpd.read_parquet if name == "fiboa" else gpd.read_file
-    shape = read(tmp_path / file).geometry.iloc[0]
+            "fiboa": "fiboa/field.parquet", "kml": "field.kml"}[name]  # fmt: skip
+    if name == "fiboa":
+        shape = gpd.read_parquet(tmp_path / file).geometry.iloc[0]
+    else:
+        layer = "field" if name == "kml" else None
+        shape = gpd.read_file(tmp_path / file, layer=layer).geometry.iloc[0]
     assert shape.geom_type == "MultiPolygon"
     # Degrees squared of the field; a ring that goes round the earth has a million times more.
     assert shape.area == pytest.approx(

@@ -1,6 +1,6 @@
 """Fields across the 180th meridian, in formats of longitude and latitude.
 
-Formats of single positions (GPX, ISOXML, KML, CSV) give each its longitude between -180 and
+Formats of single positions (GPX, ISOXML, CSV) give each its longitude between -180 and
 180. Formats of shapes cut them at the meridian, as RFC 7946 (section 3.1.9) wants it: a polygon
 whose ring jumps from 180 to -180 would go round the earth. Reading joins either again.
 """

@@ -12,6 +12,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema, theme
+from geofield.formats.antimeridian import split
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.formats.origin import lineage
@@ -131,7 +132,7 @@ def _style(name: str, colour: str, width: float, fill: str | None) -> ET.Element
 
 def _folder(layer: Layer, dataset: Dataset) -> ET.Element:
     table = dataset.table(layer.name)
-    shapes = to_lonlat(exact_geometry(layer, table), dataset.crs)
+    shapes = split(to_lonlat(exact_geometry(layer, table), dataset.crs))
     folder = node("Folder", node("name", layer.name))
     for row, shape in zip(table.to_dict("records"), shapes, strict=True):
         data = node("SchemaData", schemaUrl=f"#schema_{layer.name}")
