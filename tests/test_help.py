@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sys
 from collections import defaultdict
+from pathlib import Path
 
 import click
 import pytest
@@ -46,3 +50,35 @@ def test_an_option_has_the_same_kind_of_value_in_every_command() -> None:
                 kinds[word][plain].append(name)
     several = {word: dict(kind) for word, kind in kinds.items() if len(kind) > 1}
     assert not several
+
+
+_FIRST = {"the first one ": 1, "the first two ": 2}
+
+
+def examples_on_the_sample(name: str) -> list[str]:
+    """The command lines of a command's help that are said to run on the project's own sample."""
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    found = re.search(
+        r"Examples? \(((?:the first \w+ )?)on the project's own sample\):\n((?:  .*\n)+)",
+        command.epilog or "",
+    )
+    if not found:
+        return []
+    lines = [line.strip() for line in found[2].replace("\\\n", "").splitlines()]
+    return lines[: _FIRST.get(found[1])]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in COMMANDS if examples_on_the_sample(name)])
+def test_examples_run_one_after_the_other(name: str, tmp_path: Path) -> None:
+    shutil.copytree(Path(__file__).parents[1] / "sample_data", tmp_path / "sample_data")
+    before = (tmp_path / "sample_data" / "field_1.gpkg").read_bytes()
+    for line in examples_on_the_sample(name):
+        assert line.startswith("geofield ")
+        command = f"{sys.executable} -m {line}"
+        done = subprocess.run(
+            command, shell=True, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, (line, done.stderr)
+    assert (tmp_path / "sample_data" / "field_1.gpkg").read_bytes() == before

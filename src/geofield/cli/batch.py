@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.command(
     cls=GroupedCommand,
     epilog="""\b
-Examples (on the project's own sample):
+Examples (the first one on the project's own sample):
   geofield batch sample_data/seeds.csv sample_data/field_1.tif --spacing 4 --out farm/
   geofield batch parcels.gpkg --obstacles trees.gpkg --workers 8 --out farm/
   geofield batch places.parquet ortho/ --scheduler tcp://10.0.0.5:8786 --out s3://bucket/farm

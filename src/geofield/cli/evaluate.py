@@ -14,8 +14,11 @@ from geofield.errors import ObstacleError
 
 @click.command(
     epilog="""\b
-Example (on the project's own sample):
-  geofield evaluate detected.gpkg truth.gpkg --distance 6 --draw hits.png --scene scene.tif
+Examples (on the project's own sample):
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield evaluate out/field.gpkg sample_data/field_1.gpkg
+  geofield evaluate out/field.gpkg sample_data/field_1.gpkg --distance 6 --driving \\
+      --draw hits.png --scene out/scene.tif
 """
 )
 @click.argument("detected", type=OLD_FILE)

@@ -14,7 +14,7 @@ from geofield.cli.files import FOLDER, PATH, claim_folder
 
 @click.command(
     epilog="""\b
-Examples:
+Examples (on the project's own sample):
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/
   geofield export out/field.gpkg --format isoxml --format kml --out export/
   geofield export out/field.gpkg -f map -f html --out pictures/

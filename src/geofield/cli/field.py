@@ -33,7 +33,7 @@ Examples (on the project's own sample):
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 -o field.gpkg
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --list
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
-      --region 2 --region 3 -o field.gpkg
+      --region 2 --region 3 -o regions.gpkg
   geofield field sample_data/field_1.tif --lat 35.075373 --lon 33.531142 \\
       --include-lonlat 33.5305,35.0753 --exclude-lonlat 33.5325,35.0743 \\
       --alternatives -o field.gpkg --overwrite

@@ -13,7 +13,9 @@ from geofield.cli.files import PATH, claim_file, output_option
 @click.command(
     "import",
     epilog="""\b
-Examples:
+Examples (the first two on the project's own sample):
+  geofield export sample_data/field_1.gpkg --format shapefile --out others/
+  geofield import others/shapefile/boundary.shp others/shapefile/obstacles.shp -o mine.gpkg
   geofield import boundary.shp -o field.gpkg
   geofield import boundary.shp trees.geojson -o field.gpkg --crs EPSG:32633
   geofield import TASKDATA/ -o field.gpkg && geofield tracks field.gpkg --spacing 3 -o field.gpkg

@@ -15,7 +15,7 @@ from geofield.cli.files import PATH
     epilog="""\b
 Examples (on the project's own sample):
   geofield info sample_data/field_1.tif
-  geofield info out/field.gpkg --json
+  geofield info sample_data/field_1.gpkg --json
 """
 )
 @click.argument("file", type=PATH)

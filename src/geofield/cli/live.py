@@ -12,7 +12,7 @@ import click
     hidden=True,
     epilog="""\b
 Example:
-  echo '{"do": "write", "file": "sample_data/field_1.gpkg"}' | geofield live
+  echo '{"do": "plan", "file": "sample_data/field_1.gpkg"}' | geofield live
 """,
 )
 def live() -> None:

@@ -15,11 +15,13 @@ from geofield.wording import nearest
 
 @click.command(
     epilog="""\b
-Examples:
-  geofield query out/field.rdf out/obstacles.rdf obstacles-larger-than --set radius=2.5
-  geofield query out/field.ttl length-per-track --json
-  geofield query out/field.ttl my-own-query.rq
+Examples (on the project's own sample):
   geofield query --list
+  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
+  geofield query out/field.rdf out/obstacles.rdf obstacles-larger-than --set radius=2.5
+  geofield query out/tracks.rdf length-per-track --json
+  geofield query length-per-track --show > my-own.rq
+  geofield query out/tracks.rdf my-own.rq
 """
 )
 @click.argument("arguments", nargs=-1, metavar="FILE... NAME")

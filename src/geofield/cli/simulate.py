@@ -109,7 +109,8 @@ def simulate(
         echo_json(rows)
         return
     trees = sum(row["obstacles"] for row in rows)
-    say(f"Wrote {len(rows)} fields with {trees} trees to {out}/; their points are in seeds.csv.")
+    plural = "" if fields == 1 else "s"
+    say(f"Wrote {fields} field{plural} with {trees} trees to {out}/; points are in seeds.csv.")
 
 
 def _write(one: SimulatedField, folder: Path, name: str) -> dict[str, Any]:

@@ -13,8 +13,9 @@ from geofield.cli.files import PATH
 
 @click.command(
     epilog="""\b
-Examples:
-  geofield validate out/field.gpkg
+Examples (on the project's own sample):
+  geofield validate sample_data/field_1.gpkg
+  geofield export sample_data/field_1.gpkg --format isoxml --out export/
   geofield validate export/isoxml/TASKDATA/TASKDATA.XML --json
 """
 )
