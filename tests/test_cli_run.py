@@ -219,6 +219,14 @@ def test_wrong_pictures(
         target.write(bands)
     message = fails(capsys, out, plain, *where)
     assert "coordinate reference system" in message or "CRS" in message
+    local = tmp_path / "local.tif"
+    shape = {"width": bands.shape[2], "height": bands.shape[1], "count": 4, "dtype": "uint8"}
+    crs = rasterio.crs.CRS.from_wkt('LOCAL_CS["mine",UNIT["metre",1]]')
+    with rasterio.open(local, "w", **shape, crs=crs, transform=Affine.scale(2, -2)) as target:
+        target.write(bands)
+    message = fails(capsys, out, local, *where)
+    assert "mine is not the CRS of a map" in message
+    assert "--crs" in message
 
 
 def test_an_empty_scene_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS, Geod, Transformer
 from pyproj.exceptions import CRSError as ProjCRSError
+from pyproj.exceptions import ProjError
 
 from geofield.errors import CRSError
 
@@ -125,7 +126,7 @@ def transformer(source: CRS, target: CRS) -> Transformer:
     """
     try:
         return _transformer(source.srs, target.srs)
-    except ProjCRSError as error:
+    except ProjError as error:
         raise CRSError(
             f"Coordinates cannot be brought from {source.name[:80]!r} to {target.name[:80]!r}.",
             hint="Is the file whole that says them? Name another system.",

@@ -72,7 +72,10 @@ class Grid:
         if self.width_px < 1 or self.height_px < 1:
             raise GridError(f"A grid of {self.width_px} x {self.height_px} px has no pixels.")
         if not all(map(math.isfinite, self.transform[:6])) or self.transform.determinant == 0:
-            raise GridError(f"The transform {tuple(self.transform)[:6]} cannot be inverted.")
+            raise GridError(
+                f"The transform {tuple(self.transform)[:6]} cannot be inverted.",
+                hint="Georeference the picture anew (QGIS: Layer > Georeferencer).",
+            )
 
     def __repr__(self) -> str:
         lon, lat = self.centre_lonlat

@@ -98,6 +98,27 @@ def test_info_of_a_picture(sample):
     assert facts["metres per pixel on the ground"] > 0
 
 
+def test_info_of_pictures_of_any_name_and_without_a_place(sample, tmp_path):
+    import shutil
+
+    import rasterio
+
+    named = shutil.copy(sample / "field_1.tif", tmp_path / "field_1.img")
+    facts = json.loads(run(info, named, "--json").stdout)
+    assert facts["centre"]["lat"] == pytest.approx(35.075, abs=0.01)
+    local = tmp_path / "local.tif"
+    shape = {"width": 9, "height": 9, "count": 1, "dtype": "uint8"}
+    crs = rasterio.crs.CRS.from_wkt('LOCAL_CS["mine",UNIT["metre",1]]')
+    with rasterio.open(local, "w", **shape, crs=crs, transform=rasterio.Affine.scale(2, -2)):
+        pass
+    facts = json.loads(run(info, local, "--json").stdout)
+    assert "mine" in facts["CRS"]
+    assert "centre" not in facts
+    (tmp_path / "plain.txt").write_text("neither picture nor vector file")
+    with pytest.raises(FormatError, match=r"format of .*plain.txt is not known"):
+        run(info, tmp_path / "plain.txt")
+
+
 def test_validate_finds_a_track_through_a_tree(tmp_path):
     dataset = make_dataset()
     dataset.tables["obstacles"].loc[2, "status"] = "confirmed"

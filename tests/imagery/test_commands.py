@@ -109,6 +109,8 @@ def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture
         (["tiles", "https://h/{z}/{x}", *POINT, "-o", "a.tif"], 1, "lacks {y}"),
         (["tiles", "google", *POINT, "-o", "a.tif"], 1, "GEOFIELD_KEY_GOOGLE"),
         (["tiles", "naip", *POINT, "-o", "no/a.tif"], 1, "folder exists"),
+        (["tiles", "", *POINT, "-o", "a.tif"], 1, "no imagery source or file ''"),
+        (["field", "", *POINT, "-o", "a.tif"], 1, "no imagery source or file ''"),
         (["tiles", "naip", *POINT, "-o", "a.tif", "--offline"], 1, "not in the cache"),
         (["tiles", "naip", *POINT, "-o", "a.tif", "--offline", "--no-cache"], 1, "needs a cache"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ Examples (on the project's own sample):
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON on stdout.")
 def info(file: Path, crs: str | None, as_json: bool) -> None:
     """Show what FILE, a picture or vector file, holds: layers, rows, place, CRS, origin."""
-    facts = _picture(file) if file.suffix.lower() in (".tif", ".tiff") else _vector(file, crs)
+    facts = _facts(file, crs)
     if as_json:
         echo_json(facts)
         return
@@ -36,6 +37,25 @@ def info(file: Path, crs: str | None, as_json: bool) -> None:
             click.echo("\n".join([f"{key}:", *(f"  {each}" for each in value)]))
         else:
             click.echo(f"{key}: {value}")
+
+
+def _facts(file: Path, crs: str | None) -> dict[str, Any]:
+    """What a file holds; one of no vector format that is known may be a picture of any kind."""
+    from geofield.errors import FormatError, ImageryError
+    from geofield.formats import detect
+
+    if file.suffix.lower() in (".tif", ".tiff"):
+        return _picture(file)
+    try:
+        detect(file)
+    except FormatError as error:
+        if not file.is_file():
+            raise
+        try:
+            return _picture(file)
+        except ImageryError:
+            raise error from None
+    return _vector(file, crs)
 
 
 def _vector(file: Path, crs: str | None) -> dict[str, Any]:
@@ -92,6 +112,7 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
 
 
 def _picture(file: Path) -> dict[str, Any]:
+    from geofield.errors import CRSError, GridError
     from geofield.grid import Grid
     from geofield.imagery.gdal import gdal_env, open_picture, reading
 
@@ -108,12 +129,14 @@ def _picture(file: Path) -> dict[str, Any]:
         }
         tags = {key: value for key, value in picture.tags().items() if key != "AREA_OR_POINT"}
         if picture.crs:
-            grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())
-            lon, lat = grid.centre_lonlat
-            facts |= {
-                "metres per pixel on the ground": round(grid.ground_resolution_m, 4),
-                "centre": {"lat": round(lat, 6), "lon": round(lon, 6)},
-            }
+            # What has no place on the earth is shown without one.
+            with suppress(CRSError, GridError):
+                grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())
+                lon, lat = grid.centre_lonlat
+                facts |= {
+                    "metres per pixel on the ground": round(grid.ground_resolution_m, 4),
+                    "centre": {"lat": round(lat, 6), "lon": round(lon, 6)},
+                }
     if tags:
         facts["tags"] = tags
     return facts

@@ -17,7 +17,9 @@ _SIDE_PX = 1024
 
 def is_own_picture(what: str) -> bool:
     """Whether what the user names is a picture or a set of pictures on a disk."""
-    return "{" not in what and Path(what).exists() and Path(what).suffix.lower() != ".mbtiles"
+    if not what or "{" in what:  # no name at all would be the working folder
+        return False
+    return Path(what).exists() and Path(what).suffix.lower() != ".mbtiles"
 
 
 @contextmanager

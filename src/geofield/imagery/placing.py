@@ -67,8 +67,11 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     """
     gcps, _ = dataset.gcps
     transform = Affine(*tuple(dataset.transform)[:6])
-    if crs.is_geocentric or crs.is_vertical:
-        raise CRSError(f"{crs.name} is not the CRS of a map.", hint="Reproject the picture first.")
+    if crs.is_geocentric or crs.is_vertical or crs.is_engineering:
+        raise CRSError(
+            f"{crs.name} is not the CRS of a map.",
+            hint="Reproject the picture first, or name its CRS: --crs EPSG:32633.",
+        )
     if transform.is_identity:
         if len(gcps) < 3:
             raise CRSError(

@@ -135,7 +135,8 @@ def kind_of(what: str) -> tuple[str, str]:
         return "picture", what
     if "{" in what and "}" in what:
         return "xyz", what
-    return _kind_of_file(Path(what)), what
+    # No name at all, as of a variable that is not set, would be the working folder.
+    return _kind_of_file(Path(what)) if what else "", what
 
 
 def _kind_of_address(address: str) -> str:
