@@ -24,6 +24,9 @@ from geofield.model import Scene
 from geofield.plan import read_plan
 from geofield.simulate import SimulatedField
 
+SAMPLE = Path(__file__).parents[1] / "sample_data"
+PICTURE, PLAN = str(SAMPLE / "field_1.tif"), str(SAMPLE / "field_1.gpkg")
+
 
 def geofield(*args: object) -> int:
     """Run the command line in this process; returns the exit code."""
@@ -294,6 +297,49 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
         text = capsys.readouterr().out
         assert "Example" in text, name
         assert f"geofield {name}" in text, name
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["simulate", "--seed", "-5", "--out", "sim"], "x>=0"),
+        (["evaluate", PLAN, PLAN, "--seed", "-5"], "x>=0"),
+        (["evaluate", PLAN, PLAN, "--draw", "hits.shp"], "hits.shp is not the name of a picture"),
+        (["obstacles", PLAN, PICTURE, "-o", "field.gpkg"], "The picture comes first"),
+        (["field", PICTURE, "--lat", "35,07", "--lon", "33.5", "-o", "a.gpkg"], "write degrees"),
+        (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", ""], "it is empty"),
+    ],
+)
+def test_wrong_words_are_told_with_the_right_ones(
+    words: list[str],
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert geofield(*words) == 2
+    assert told in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_taken_name_is_told_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken = tmp_path / "taken.gpkg"
+    taken.write_bytes(b"mine")
+    # A picture that is not there would be the next to be told.
+    assert geofield("obstacles", "missing.tif", PLAN, "-o", taken) == 1
+    assert "is there already" in capsys.readouterr().err
+    assert geofield("field", "missing.tif", "--lat", 35, "--lon", 33, "-o", "field.shp") == 1
+    assert "not a GeoPackage name" in capsys.readouterr().err
+
+
+def test_simulated_trees_without_room_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert geofield("simulate", "--size", 64, "--trees", 500, "--out", tmp_path / "sim") == 0
+    assert "Not all 500 trees have room" in capsys.readouterr().err
 
 
 def test_a_mistyped_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,7 +46,8 @@ def test_an_option_has_the_same_kind_of_value_in_every_command() -> None:
             )
             for word in option.opts:
                 # A folder may also be an address of an object store, written as a text.
-                plain = kind.replace("Range", "").replace("ParamType", "").replace("Path", "String")
+                plain = kind.replace("Range", "").replace("ParamType", "")
+                plain = plain.replace("NamedPath", "String").replace("Path", "String")
                 kinds[word][plain].append(name)
     several = {word: dict(kind) for word, kind in kinds.items() if len(kind) > 1}
     assert not several

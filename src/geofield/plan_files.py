@@ -14,6 +14,15 @@ if TYPE_CHECKING:
     from geofield.plan import Plan
 
 
+def refuse_other_names(output: Path) -> None:
+    """Refuse to write a plan into what is no GeoPackage by its name."""
+    if output.suffix.lower() != ".gpkg":
+        raise FormatError(
+            f"{output} is not a GeoPackage name.",
+            hint="Stages write NAME.gpkg; use `geofield export` for other formats.",
+        )
+
+
 def save_plan(
     plan: Plan,
     output: Path,
@@ -33,11 +42,7 @@ def save_plan(
     from geofield.formats.gpkg_guests import bring_guests
     from geofield.formats.gpkg_read import scene_beside
 
-    if output.suffix.lower() != ".gpkg":
-        raise FormatError(
-            f"{output} is not a GeoPackage name.",
-            hint="Stages write NAME.gpkg; use `geofield export` for other formats.",
-        )
+    refuse_other_names(output)
     same = read_from is not None and output.resolve() == read_from.resolve()
     dataset = plan.to_dataset()
     if picture is None and read_from is not None:

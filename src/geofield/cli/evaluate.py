@@ -40,7 +40,9 @@ Examples (on the project's own sample):
     is_flag=True,
     help="Also what a driver loses: DETECTED is a plan with its field and tracks.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the bootstrap."
+)
 @click.option(
     "--draw", "picture", type=FILE, help="PNG to write: hits, misses and false detections."
 )
@@ -70,7 +72,9 @@ def evaluate(
     from geofield.evaluation import evaluate as compare
     from geofield.plan import read_plan
 
-    if scene_file is not None and picture is None:
+    if picture is not None:
+        _refuse_other_pictures(picture)
+    elif scene_file is not None:
         say_note("--scene changes nothing without --draw, which names the picture to write.")
     found = read_obstacles(detected, layer, metric=True)
     true = read_obstacles(truth, truth_layer)
@@ -109,3 +113,12 @@ def evaluate(
         )
         say(f"  ground lost      {lost.share_lost:6.1%}  ({lost.lost_m2:.0f} square metres)")
         say(f"  expected unseen  {lost.expected_unseen_per_ha:6.2f} per hectare")
+
+
+def _refuse_other_pictures(picture: Path) -> None:
+    from PIL import Image
+
+    if picture.suffix.lower() not in Image.registered_extensions():
+        raise click.BadParameter(
+            f"{picture} is not the name of a picture: write NAME.png.", param_hint="--draw"
+        )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say
-from geofield.cli.files import FILE, FOLDER, claim_file
+from geofield.cli.files import FILE, FOLDER, claim_plan
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
     name_option,
@@ -118,7 +118,7 @@ def field(
     tell_idle(chosen, parcel=parcel is not None)
     previous = None
     if output is not None:
-        claim_file(output)
+        claim_plan(output)
         if output.is_file():
             if not overwrite:
                 raise OutputExistsError(

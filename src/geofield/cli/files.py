@@ -12,12 +12,23 @@ from geofield.staging import claimed
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-PATH = click.Path(path_type=Path)
-FILE = click.Path(dir_okay=False, path_type=Path)
-FOLDER = click.Path(file_okay=False, path_type=Path)
+
+class NamedPath(click.Path):
+    """A path; no name at all, as of a variable that is not set, is not the working folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path."""
+        if value == "":
+            self.fail("it is empty: give a name.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+PATH = NamedPath(path_type=Path)
+FILE = NamedPath(dir_okay=False, path_type=Path)
+FOLDER = NamedPath(file_okay=False, path_type=Path)
 #: What must be there.
-OLD_PATH = click.Path(exists=True, path_type=Path)
-OLD_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+OLD_PATH = NamedPath(exists=True, path_type=Path)
+OLD_FILE = NamedPath(exists=True, dir_okay=False, path_type=Path)
 plan_argument = click.argument("plan_file", metavar="PLAN.gpkg", type=OLD_FILE)
 
 
@@ -40,3 +51,11 @@ def claim_folder(folder: Path, names: Collection[str] | None = None) -> None:
 def claim_file(output: Path) -> None:
     """The same for one file."""
     claim_folder(output.parent, (output.name,))
+
+
+def claim_plan(output: Path) -> None:
+    """The same for a plan that a stage will write; another name than a GeoPackage's is refused."""
+    from geofield.plan_files import refuse_other_names
+
+    refuse_other_names(output)
+    claim_file(output)

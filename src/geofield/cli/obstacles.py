@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from geofield.cli.console import echo_json, say
-from geofield.cli.files import OLD_FILE, claim_file, output_option
+from geofield.cli.files import OLD_FILE, claim_plan, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated
@@ -48,11 +48,19 @@ def obstacles(
     you say nothing else. The tracks are removed, for they no longer fit: run `geofield tracks`
     next.
     """
+    from geofield.errors import OutputExistsError
     from geofield.pipeline import run_obstacles, scene_of_plan
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
 
-    claim_file(output)
+    if imagery.lower().endswith(".gpkg") and plan_file.suffix.lower() != ".gpkg":
+        raise click.UsageError("The picture comes first: geofield obstacles IMAGERY FIELD.gpkg.")
+    claim_plan(output)
+    if output.exists() and not overwrite and not output.samefile(plan_file):
+        # Said at once, not after the work.
+        raise OutputExistsError(
+            f"{output} is there already.", hint="Choose another name, or --overwrite."
+        )
     plan = read_plan(plan_file)
     if not defaults:
         settings = continued(settings, plan.settings, "obstacles")

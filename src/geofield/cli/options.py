@@ -56,10 +56,13 @@ class Degrees(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The angle as a float."""
-        angle = super().convert(value, param, ctx)
+        try:
+            angle = float(value)
+        except ValueError:
+            angle = math.nan
         if not math.isfinite(angle):
-            self.fail(f"{value!r} is not an angle.", param, ctx)
-        return angle
+            self.fail(f"{value!r} is not an angle: write degrees, such as 35.0754.", param, ctx)
+        return super().convert(angle, param, ctx)
 
 
 class NearestChoice(click.Choice[str]):

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import FOLDER, claim_folder
 from geofield.simulate import CLIMATES, SimulatedField
 
@@ -24,7 +24,11 @@ Examples:
     "--fields", default=1, show_default=True, type=click.IntRange(1, 10_000), help="How many."
 )
 @click.option(
-    "--seed", default=1, show_default=True, type=int, help="The same seed gives the same fields."
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="The same seed gives the same fields.",
 )
 @click.option(
     "--size",
@@ -105,6 +109,9 @@ def simulate(
             writer = csv.DictWriter(file, fieldnames=list(rows[0]))
             writer.writeheader()
             writer.writerows(rows)
+    wanted, least = asked["obstacles"], min(row["obstacles"] for row in rows)
+    if wanted is not None and least < wanted:
+        say_note(f"Not all {wanted} trees have room in every field: one has {least}.")
     if as_json:
         echo_json(rows)
         return

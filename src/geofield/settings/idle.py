@@ -64,7 +64,7 @@ def _obstacles(now: ObstacleSettings) -> dict[str, str]:
 
 
 def _tracks(now: TrackSettings) -> dict[str, str]:
-    why = {}
+    why: dict[str, str] = {}
     if now.route == "none":
         no_route = "without a route: add --route, such as --route boustrophedon"
         why |= dict.fromkeys(("turning_radius_m", "curve", "margin_m", "start_lonlat"), no_route)
