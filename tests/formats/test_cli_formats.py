@@ -119,6 +119,18 @@ def test_info_of_pictures_of_any_name_and_without_a_place(sample, tmp_path):
         run(info, tmp_path / "plain.txt")
 
 
+def test_validate_goes_on_behind_what_it_cannot_read(plan_file, tmp_path):
+    (tmp_path / "plain.txt").write_text("no product")
+    files = [str(tmp_path / "plain.txt"), str(plan_file)]
+    done = CliRunner().invoke(validate, [*files, "--json"])
+    assert done.exit_code == 1
+    found = json.loads(done.stdout)
+    assert found[files[1]] == []
+    (only,) = found[files[0]]
+    assert only["level"] == "error"
+    assert "is not known" in only["message"]
+
+
 def test_validate_finds_a_track_through_a_tree(tmp_path):
     dataset = make_dataset()
     dataset.tables["obstacles"].loc[2, "status"] = "confirmed"

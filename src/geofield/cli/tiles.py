@@ -132,6 +132,10 @@ def tiles(
     )
     from geofield.imagery import acquire
 
+    if output.suffix.lower() not in ("", ".tif", ".tiff"):
+        raise click.BadParameter(
+            f"{output} would be a GeoTIFF under another name: write NAME.tif.", param_hint="-o"
+        )
     where = _where(lat, lon, area, place)
     folder = None if no_cache else cache_dir_of(settings, cache_dir)
     options = replace(

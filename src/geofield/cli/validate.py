@@ -27,15 +27,25 @@ def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> 
 
     Exit code 1 when there is an error; warnings alone leave it at 0.
     """
-    from geofield.formats import validate_file
+    from geofield.errors import FormatError
+    from geofield.formats import Finding, validate_file
 
-    reports = {str(file): validate_file(file) for file in files}
+    reports = {}
+    for file in files:
+        try:
+            reports[str(file)] = validate_file(file)
+        except FormatError as error:
+            if len(files) == 1:
+                raise
+            # The others are checked all the same.
+            told = f"{error.message} {error.hint or ''}".strip()
+            reports[str(file)] = [Finding("error", "file", told)]
     failed = any(each.level == "error" for found in reports.values() for each in found)
     if as_json:
-        echo_json({file: [asdict(each) for each in found] for file, found in reports.items()})
+        echo_json({name: [asdict(each) for each in found] for name, found in reports.items()})
     else:
-        for file, found in reports.items():
-            say(f"{file}: {'no fault found' if not found else f'{len(found)} findings'}")
+        for name, found in reports.items():
+            say(f"{name}: {'no fault found' if not found else f'{len(found)} findings'}")
             for each in found:
                 say(f"  {each.level}: {each.where}: {each.message}")
     if failed:
