@@ -135,6 +135,15 @@ def test_a_variable_that_cannot_be_read_is_named(
     assert "gpkg,kml" not in str(told.value)
 
 
+def test_a_variable_of_no_section_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEOFIELD_KEY_A__B", "a key of a source")
+    monkeypatch.setenv("GEOFIELD_SHARED", "another program's own")
+    load_settings()
+    monkeypatch.setenv("GEOFIELD_TRACK__SPACING_M", "3")
+    with pytest.raises(SettingsError, match=r"GEOFIELD_TRACK__SPACING_M.*Did you mean 'tracks'"):
+        load_settings()
+
+
 def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:
     path = tmp_path / "windows.toml"
     path.write_text("[tracks]\nspacing_m = 3\n", encoding="utf-8-sig")

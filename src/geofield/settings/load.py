@@ -18,6 +18,7 @@ from geofield.settings.tracks import said_over
 from geofield.settings.whole import SECTIONS, Settings, Stage, names_of
 
 _KNOWN = (*SECTIONS, "machines")
+_PREFIX = "GEOFIELD_"
 
 
 def load_settings(
@@ -183,15 +184,24 @@ def from_mapping(values: Mapping[str, Any]) -> Settings:
 
 def _from_environment() -> dict[str, Any]:
     """What variables such as ``GEOFIELD_TRACKS__SPACING_M`` say, by section."""
-    if not any(name.upper().startswith("GEOFIELD_") for name in os.environ):
+    given = {name: text for name, text in os.environ.items() if name.upper().startswith(_PREFIX)}
+    if not given:
         return {}
+    for name in given:
+        section, separator, _ = name.upper().removeprefix(_PREFIX).lower().partition("__")
+        if separator and section not in _KNOWN and not section.startswith("key_"):
+            raise SettingsError(
+                f"{name} in the environment names no section of the settings."
+                + nearest(section, _KNOWN),
+                hint=f"Sections: {', '.join(_KNOWN)}.",
+            )
     from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
     from pydantic_settings import SettingsError as UnreadableError
 
     class Variables(BaseSettings):
         """How the variables are named."""
 
-        model_config = SettingsConfigDict(env_prefix="GEOFIELD_", env_nested_delimiter="__")
+        model_config = SettingsConfigDict(env_prefix=_PREFIX, env_nested_delimiter="__")
 
     sections: dict[str, Any] = {
         name: (field.annotation, field.default) for name, field in Settings.model_fields.items()
@@ -203,7 +213,6 @@ def _from_environment() -> dict[str, Any]:
     except UnreadableError as error:
         text = getattr(error.__cause__, "doc", None)
         # By its name alone: it may hold a key.
-        given = {k: v for k, v in os.environ.items() if k.upper().startswith("GEOFIELD_")}
         names = [name for name, value in given.items() if value == text]
         raise SettingsError(
             f"{' or '.join(names) or 'A variable GEOFIELD_...'} in the environment cannot be read.",
