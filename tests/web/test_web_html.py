@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from axe_core_python.selenium import Axe
 from pyproj import CRS, Transformer
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -71,6 +72,10 @@ def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path) -> None:
         assert f"{plan.field.area_ha:.2f} ha" in shown
         assert f"{len(plan.tracks.lines)} ·" in shown
         assert "Turn that does not fit" in shown
+        size = {"width": 360, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        assert driver.execute_script("return document.documentElement.scrollWidth") == 360
+        assert not [(v["id"], v["nodes"][0]["html"]) for v in Axe().run(driver)["violations"]]
     finally:
         driver.quit()
 

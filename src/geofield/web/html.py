@@ -101,11 +101,11 @@ def document(dataset: Dataset, scene: Scene | None = None) -> str:
 <script>{_in_script(page_file("vendor/ol.js").decode())}</script>
 </head><body>
 <main id="map" tabindex="0" aria-label="{title}"></main>
-<aside aria-label="{title}"><h1>{title}</h1><dl id="facts"></dl><ul id="doubts"></ul>
+<aside tabindex="0" aria-label="{title}"><h1>{title}</h1><dl id="facts"></dl><ul id="doubts"></ul>
 <h2 data-t="legend"></h2><ul id="legend"></ul>
 <small id="place"></small>
 <small>{html.escape(credit)}</small><small>{html.escape(dataset.provenance.software)}</small></aside>
-<div id="popup"></div>
+<div id="popup" role="status"></div>
 <script type="application/json" id="plan">{data}</script>
 <script type="module">
 {_in_script(script)}
