@@ -180,6 +180,8 @@ def test_what_is_done_is_spoken_and_done_without_a_pointer(page: Page) -> None:
     page.wait(lambda: spoken().startswith(f"Obstacle {known + 1}: added by hand"))
     page.press(Keys.DELETE)
     page.wait(lambda: spoken() == f"Obstacle {known + 1}: deleted")
+    assert len(page.state()["obstacles"]) == known
+    assert page.obstacle(first)["status"] == "confirmed"
 
 
 def test_the_outline_is_edited_and_tracks_turn(page: Page) -> None:
