@@ -208,6 +208,11 @@ def test_a_heading_and_its_opposite_count_from_opposite_sides(x: float) -> None:
     assert firsts == {0.0: True, 360.0: True, -360.0: True, 180.0: False, 540.0: False}
 
 
+def test_points_that_no_disk_holds_are_refused() -> None:
+    with pytest.raises(TrackError, match="track points"):
+        plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=10.0, step_m=1e-6)
+
+
 @pytest.mark.parametrize("short", [-1.0, float("nan")])
 def test_no_piece_is_shorter_than_nothing(short: float) -> None:
     with pytest.raises(TrackError, match="min_segment_m"):

@@ -37,6 +37,7 @@ from geofield.tracks.tables import (
 )
 
 MOST_PIECES = 10_000_000
+MOST_POINTS = 100_000_000
 
 
 def plan_tracks(
@@ -137,7 +138,7 @@ def plan_tracks(
     shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
-    _refuse_too_many(outline, shapes, spacing_m * scale)
+    _refuse_too_many(outline, shapes, spacing_m * scale, step_m * scale)
     inner: BaseGeometry = outline
     if headland_m != 0.0:
         inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
@@ -226,8 +227,8 @@ def _why(baseline: Baseline, least: int, count: int) -> str:
     return f"{baseline.why}; direction fewest would need {least} tracks instead of {count}"
 
 
-def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float) -> None:
-    """Refuse a spacing that would fill the memory, before anything is made.
+def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, step: float) -> None:
+    """Refuse a spacing or a step that would fill memory or disk, before anything is made.
 
     Lines a spacing apart meet a curve 2 L / (pi spacing) times on average over all directions
     (Crofton); a piece of the field has two ends, and an obstacle cuts one piece into two.
@@ -240,6 +241,13 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float) -
             f"So narrow a spacing would give about {count:.1g} pieces of track; "
             f"{MOST_PIECES:,} are the most.",
             hint="Give the spacing in metres, for instance 3, or plan parts of the field.",
+        )
+    points = outline.area / (spacing * step)
+    if points > MOST_POINTS:
+        raise TrackError(
+            f"So short a step would give about {points:.1g} track points; "
+            f"{MOST_POINTS:,} are the most.",
+            hint="Give the step in metres, for instance 1.",
         )
 
 
