@@ -13,7 +13,8 @@ from shapely import Point, box
 
 import geofield as gf
 from geofield.errors import CRSError, ObstacleError
-from geofield.evaluation import draw_reliability, match_points, reliability
+from geofield.evaluation import draw_matches, draw_reliability, match_points, reliability
+from geofield.evaluation.picture import FALSE, HIT
 
 UTM = "EPSG:32636"
 
@@ -161,3 +162,29 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
     with Image.open(tmp_path / "hits.png") as picture:
         colours = {c for _, c in picture.getcolors(10_000)}
     assert {(40, 200, 90), (60, 150, 255), (235, 60, 50)} <= colours
+
+
+@pytest.mark.parametrize("drawn", ["outside", "no shape", "nothing"])
+def test_drawing_shows_the_rows_that_were_compared(tmp_path, drawn):
+    found, area = table([(0, 0), (5000, 0)]), None
+    if drawn == "outside":
+        area = found.geometry.iloc[0].buffer(100)
+    elif drawn == "no shape":
+        found.loc[found.index[1], "geometry"] = None
+    else:
+        found = found[:0]
+    truth = found[:1].set_geometry(found[:1].centroid)
+    result = gf.evaluate(found, truth, area=area, bootstrap=0)
+    draw_matches(found, truth, result, tmp_path / "hits.png", area=area)
+    with Image.open(tmp_path / "hits.png") as picture:
+        colours = {c for _, c in picture.getcolors(10_000)}
+    assert colours == ({(255, 255, 255)} if drawn == "nothing" else {(255, 255, 255), HIT})
+
+
+def test_drawing_shows_detections_that_are_points(tmp_path):
+    found = table([(0, 0), (500, 0)])
+    points = found.set_geometry(found.centroid)
+    result = gf.evaluate(points, found[:0], bootstrap=0)
+    draw_matches(points, found[:0], result, tmp_path / "hits.png")
+    with Image.open(tmp_path / "hits.png") as picture:
+        assert FALSE in {c for _, c in picture.getcolors(10_000)}

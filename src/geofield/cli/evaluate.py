@@ -91,7 +91,7 @@ def evaluate(
     result = compare(found, true, **options)
     score = result.pooled
     if picture is not None:
-        draw_matches(found, true, result, picture, scene_file)
+        draw_matches(found, true, result, picture, scene_file, area=options.get("area"))
         say(f"Drawn to {picture}: hits green, missed blue, false red.")
     if as_json:
         figures = {"distance_m": distance_m, **score.as_dict()}

@@ -90,7 +90,6 @@ def evaluate(
     """
     found = detected if isinstance(detected, Mapping) else {"": detected}
     true = truth if isinstance(truth, Mapping) else {"": truth}
-    true = {name: active(table) for name, table in true.items()}
     missing = sorted(set(found) ^ set(true))
     if missing:
         raise ObstacleError(f"Picture {missing[0]!r} has detections or a truth, but not both.")
@@ -98,9 +97,9 @@ def evaluate(
     rows: dict[str, Counts] = {}
     for name in found:
         within = area.get(name) if isinstance(area, Mapping) else area
-        a, b = _comparable(found[name], true[name])
-        centre_a, radius_a, _ = _circles(a, within)
-        centre_b, radius_b, has_radius = _circles(b, within)
+        a, b = compared(found[name], true[name], within)
+        centre_a, radius_a, _ = _circles(a)
+        centre_b, radius_b, has_radius = _circles(b)
         match = match_points(centre_a, centre_b, distance_m)
         matches[name] = match
         difference = radius_a[match.detected_index] - radius_b[match.truth_index]
@@ -117,28 +116,36 @@ def evaluate(
         for name in found:
             lines = segments[name] if isinstance(segments, Mapping) else segments
             field = area[name] if isinstance(area, Mapping) else area
-            lost += driving(lines, found[name], true[name], field)
+            lost += driving(lines, found[name], active(true[name]), field)
     return Evaluation(pooled, images, matches, distance_m, lost)
 
 
-def _comparable(
-    detected: gpd.GeoDataFrame, truth: gpd.GeoDataFrame
+def compared(
+    detected: gpd.GeoDataFrame, truth: gpd.GeoDataFrame, area: Any = None
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+    """The rows of one picture that count, in the order of its matches, both in one CRS."""
     if detected.crs is None or truth.crs is None:
         raise CRSError("Detections and truth need a CRS.", hint="Set it with set_crs.")
     if not is_metric(detected.crs):
         raise CRSError(
             "Detections are not in a metric CRS.", hint="Reproject them to their UTM zone."
         )
-    detected = active(detected)
-    return detected, truth.to_crs(detected.crs)
+    truth = active(truth).to_crs(detected.crs)
+    return _counting(active(detected), area), _counting(truth, area)
 
 
-def _circles(frame: gpd.GeoDataFrame, within: Any) -> tuple[FloatArray, FloatArray, bool]:
+def _counting(frame: gpd.GeoDataFrame, area: Any) -> gpd.GeoDataFrame:
+    """The rows with a shape, and with its centre inside where there is an area."""
+    geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    keep = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
+    if area is not None:
+        keep &= shapely.covers(area, shapely.centroid(geometry))
+    return frame[keep]
+
+
+def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
     """Centres (n, 2) and radii (n,), and whether there are radii at all."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
-    present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
-    frame, geometry = frame[present], geometry[present]
     centre = shapely.centroid(geometry)
     xy = np.column_stack([shapely.get_x(centre), shapely.get_y(centre)]).reshape(-1, 2)
     radius = np.full(len(geometry), np.nan)
@@ -147,7 +154,4 @@ def _circles(frame: gpd.GeoDataFrame, within: Any) -> tuple[FloatArray, FloatArr
     else:
         area = ground_areas_m2(geometry, CRS(frame.crs))
         radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)
-    if within is not None:
-        keep = shapely.covers(within, centre)
-        xy, radius = xy[keep], radius[keep]
     return xy, radius, bool(np.isfinite(radius).any())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from geofield import schema
 from geofield.errors import CRSError, ObstacleError
-from geofield.evaluation.compare import Evaluation
+from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
-from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.strangers import check_vector
 
@@ -75,18 +74,22 @@ def draw_matches(
     result: Evaluation,
     path: Path,
     scene: Scene | Path | None = None,
+    *,
+    area: Any = None,
 ) -> None:
     """Write a PNG of hits (green), misses (blue) and false detections (red).
 
     Parameters
     ----------
     detected, truth : GeoDataFrame
-        What was evaluated, one picture without an area.
+        What was evaluated, one picture.
     result : Evaluation
     path : path
         PNG to write.
     scene : Scene or path, optional
         Picture to draw on; white ground when not given.
+    area : shapely geometry, optional
+        That of the evaluation.
     """
     from PIL import Image, ImageDraw
 
@@ -94,10 +97,9 @@ def draw_matches(
         from geofield.imagery import read_scene
 
         scene = read_scene(scene)
-    detected = active(detected)
+    detected, truth = compared(detected, truth, area)
     match = next(iter(result.matches.values()))
     crs = detected.crs
-    truth = active(truth).to_crs(crs)
     if scene is not None:
         scale = max(min(_SIDE_PX / max(scene.grid.shape), 4.0), 0.05)
         size = (round(scene.grid.width_px * scale), round(scene.grid.height_px * scale))
@@ -108,9 +110,8 @@ def draw_matches(
             x, y = grid.from_crs(c[:, 0], c[:, 1], crs)
             return np.column_stack([x, y]).astype(float) * scale
     else:
-        west, south, east, north = shapely.total_bounds(
-            np.concatenate([detected.geometry.to_numpy(), truth.geometry.to_numpy()])
-        )
+        shapes = np.concatenate([detected.geometry.to_numpy(), truth.geometry.to_numpy()])
+        west, south, east, north = shapely.total_bounds(shapes) if len(shapes) else np.zeros(4)
         extent = max(east - west, north - south, 10.0) * 1.1
         centre = np.array([(west + east) / 2, (south + north) / 2])
         canvas = Image.new("RGB", (_SIDE_PX, _SIDE_PX), "white")
@@ -122,9 +123,13 @@ def draw_matches(
     pen = ImageDraw.Draw(canvas)
     hit = np.isin(np.arange(match.detected_count), match.detected_index)
     for shape, good in zip(detected.geometry.to_numpy(), hit, strict=True):
+        colour = HIT if good else FALSE
         for part in shapely.get_parts(shape):
             ring = place(shapely.get_coordinates(part))
-            pen.line([tuple(p) for p in ring], fill=HIT if good else FALSE, width=2)
+            if len(ring) == 1:
+                (x, y) = ring[0]
+                pen.ellipse([x - 7, y - 7, x + 7, y + 7], outline=colour, width=2)
+            pen.line([tuple(p) for p in ring], fill=colour, width=2)
     met = np.isin(np.arange(match.truth_count), match.truth_index)
     centres = place(shapely.get_coordinates(shapely.centroid(truth.geometry.to_numpy())))
     for (x, y), good in zip(centres, met, strict=True):
