@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
+from shapely import box
 
 from geofield import theme
 from geofield.mapping import draw_map
@@ -132,3 +133,25 @@ def test_without_any_other_font_accents_are_left_out(monkeypatch: pytest.MonkeyP
     )
     assert text == "Grosse Pres"
     assert map_fonts.written("Long meadow, 3.62 ha", 14)[0] == "Long meadow, 3.62 ha"
+
+
+def test_one_letter_that_no_font_has_costs_the_others_nothing() -> None:
+    alone, own = map_fonts.written("M\N{LATIN SMALL LETTER U WITH DIAERESIS}hle", 14)
+    text, font = map_fonts.written(f"{alone} \U0010fffd", 14)
+    assert text.startswith(alone)
+    assert font.getname() == own.getname()
+
+
+@pytest.mark.parametrize("width_m", [12.0, 150.0])
+def test_words_of_any_length_stay_on_the_map(plan: Plan, width_m: float) -> None:
+    middle = plan.field.polygon.centroid
+    strip = box(middle.x, middle.y, middle.x + width_m, middle.y + 300)
+    name = "Long strip beside the road to the village " * 4 + "x" * 200
+    field = replace(plan.field, polygon=strip, name=name)
+    picture = draw_map(replace(plan, field=field, scene=None).to_dataset(), None)
+    bottom = np.asarray(picture)[1400:]
+    assert len(bottom) > 106  # the usual panel
+    assert (bottom[:, [0, -1]] == bottom[-1, 0]).all()
+    # The legend, which is the first line, has the figures below it, not on it.
+    ink = (bottom[:22] != bottom[-1, 0]).any(axis=(0, 2))
+    assert not ink[-100:].any()

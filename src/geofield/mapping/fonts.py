@@ -6,6 +6,7 @@ others.
 
 from __future__ import annotations
 
+import math
 import unicodedata
 from collections.abc import Iterator
 from functools import cache
@@ -38,16 +39,23 @@ _PLAIN = str.maketrans(
 
 
 def written(text: str, size_px: int) -> tuple[str, FreeTypeFont]:
-    """A text and a font of a size that has its letters.
+    """A text and the font of a size that has most of its letters.
 
-    Where no font has them all, letters with accents are written without; others stay boxes.
+    Letters with accents that it lacks are written without; others stay boxes.
     """
-    for font in _fonts(size_px):
-        if all(_has(font, letter) for letter in text):
-            return text, font
-    own = _own(size_px)
-    parts = unicodedata.normalize("NFKD", text.translate(_PLAIN))
-    return "".join(part for part in parts if not unicodedata.combining(part)), own
+    fewest: float = math.inf
+    for each in _fonts(size_px):
+        lacking = {letter for letter in text if not _has(each, letter)}
+        if len(lacking) < fewest:
+            font, missing, fewest = each, lacking, len(lacking)
+        if not lacking:
+            break
+    return "".join(_plain(each) if each in missing else each for each in text), font
+
+
+def _plain(letter: str) -> str:
+    parts = unicodedata.normalize("NFKD", letter.translate(_PLAIN))
+    return "".join(part for part in parts if not unicodedata.combining(part))
 
 
 def _fonts(size_px: int) -> Iterator[FreeTypeFont]:

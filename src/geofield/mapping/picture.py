@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,12 +47,15 @@ _CASING: Colour = (0, 0, 0, 150)
 _FRAME_DASH = (9.0, 7.0)
 _INK: Colour = (255, 255, 255, 255)
 _PANEL: Colour = (20, 24, 28, 215)
+_GROUND: Colour = (70, 74, 70)
 
 #: The long side of the picture's map part, pixels.
 LONG_SIDE_PX = 1400
 #: Drawn this much larger, then reduced: smooth lines.
 _OVERSAMPLING = 2
 _DOUBT_SIZE = 14
+#: A map of a narrower field has plain ground on both sides: its panel needs room for words.
+_NARROWEST_PX = 560
 #: At most this many numbers along the tracks' starts.
 _MAX_LABELS = 40
 
@@ -119,7 +123,7 @@ class _Canvas:
         self.grid, self.size, self.dataset = grid, size, dataset
         self.large = (size[0] * _OVERSAMPLING, size[1] * _OVERSAMPLING)
         self.factor = self.large[0] / grid.width_px
-        self.image = Image.new("RGB", self.large, (70, 74, 70))
+        self.image = Image.new("RGB", self.large, _GROUND)
         self.draw = ImageDraw.Draw(self.image, "RGBA")
         self.labels: list[Label] = []
 
@@ -223,30 +227,75 @@ def _dashes(points: NDArray[np.float64], on: float, off: float) -> list[list[flo
 
 
 def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float) -> Image.Image:
-    """The picture with a panel below it."""
-    doubts = _doubt_lines(dataset, picture.width)
-    panel_height = 106 + 18 * len(doubts)
-    image = Image.new("RGB", (picture.width, picture.height + panel_height), _PANEL[:3])
-    image.paste(picture)
+    """The picture with a panel below it, wide enough for the panel's words."""
+    width = max(picture.width, _NARROWEST_PX)
+    entries = _legend_entries(dataset)
+    step, rows = _legend_size(entries, width)
+    legend_right = 16 + step * math.ceil(len(entries) / rows)
+    figures = [written(text, _figure_size(n)) for n, text in enumerate(figures_in_words(dataset))]
+    beside = legend_right + max(font.getlength(text) for text, font in figures) + 16 <= width
+    below = (
+        [] if beside else [(t, font) for text, font in figures for t in _wrapped(text, font, width)]
+    )
+    doubt_font = ImageFont.load_default(_DOUBT_SIZE)
+    doubts = [
+        line for told in doubts_in_words(dataset) for line in _wrapped(told, doubt_font, width)
+    ]
+    credit, credit_font = written(credit_in_words(dataset), 12)
+    owners = _wrapped(credit, credit_font, width)
+    legend_height = 26 + 22 * rows
+    panel_height = (
+        legend_height + 22 * len(below) + 18 * len(doubts) + 16 * max(len(owners) - 1, 0) + 14
+    )
+    image = Image.new("RGB", (width, picture.height + panel_height), _PANEL[:3])
     draw = ImageDraw.Draw(image)
-    top = picture.height
-    _legend(draw, dataset, 16, top + 14)
-    _figures(draw, dataset, top, image.width)
-    _scale_bar(draw, grid, scale, picture.width - 30, picture.height - 22)
-    _north_arrow(draw, grid, picture.width - 42, 46)
+    top, left = picture.height, (width - picture.width) // 2
+    draw.rectangle([0, 0, width, top - 1], fill=_GROUND)
+    image.paste(picture, (left, 0))
+    _scale_bar(draw, grid, scale, left + picture.width - 30, top - 22)
+    _north_arrow(draw, grid, left + picture.width - 42, 46)
+    _legend(draw, entries, 16, top + 14, step, rows)
+    if beside:
+        for index, (text, font) in enumerate(figures):
+            place = (width - 16, top + 14 + 22 * index)
+            draw.text(place, text, font=font, fill=_INK[:3], anchor="rm")
+    top += legend_height - 12
+    for text, font in below:
+        draw.text((16, top), text, font=font, fill=_INK[:3], anchor="lm")
+        top += 22
     for number, line in enumerate(doubts):
-        place = (16, top + 92 + 18 * number)
-        font = ImageFont.load_default(_DOUBT_SIZE)
-        draw.text(place, line, font=font, fill=theme.rgb(theme.DOUBT), anchor="ls")
-    credit, font = written(credit_in_words(dataset), 12)
-    draw.text((16, image.height - 12), credit, font=font, fill=(190, 195, 200), anchor="ls")
+        place = (16, top + 12 + 18 * number)
+        draw.text(place, line, font=doubt_font, fill=theme.rgb(theme.DOUBT), anchor="ls")
+    for number, line in enumerate(reversed(owners)):
+        place = (16, image.height - 12 - 16 * number)
+        draw.text(place, line, font=credit_font, fill=(190, 195, 200), anchor="ls")
     return image
 
 
-def _legend(draw: ImageDraw.ImageDraw, dataset: Dataset, left: int, top: int) -> None:
+def _figure_size(number: int) -> int:
+    """The size of the letters of a line of figures: the first one holds the field's name."""
+    return 16 if number == 0 else 14
+
+
+def _legend_size(entries: Sequence[tuple[str, str, Dash | None]], width: int) -> tuple[int, int]:
+    """Width of a column, pixels, and rows of a legend that fits a width."""
     font = ImageFont.load_default(14)
-    for index, (color, text, dash) in enumerate(_legend_entries(dataset)):
-        x, y = left + 190 * (index // 3), top + 22 * (index % 3)
+    step = max(190, *(math.ceil(34 + font.getlength(text) + 16) for _, text, _ in entries))
+    columns = max(1, (width - 32) // step)
+    return step, max(3, math.ceil(len(entries) / columns))
+
+
+def _legend(
+    draw: ImageDraw.ImageDraw,
+    entries: Iterable[tuple[str, str, Dash | None]],
+    left: int,
+    top: int,
+    step: int,
+    rows: int,
+) -> None:
+    font = ImageFont.load_default(14)
+    for index, (color, text, dash) in enumerate(entries):
+        x, y = left + step * (index // rows), top + 22 * (index % rows)
         for piece in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
             draw.line(piece, fill=theme.rgb(color), width=3)
         draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
@@ -273,27 +322,21 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, Dash | None]]:
     return [(color, text, dash) for shown, color, text, dash in entries if shown]
 
 
-def _figures(draw: ImageDraw.ImageDraw, dataset: Dataset, top: int, width: int) -> None:
-    for index, words in enumerate(figures_in_words(dataset)):
-        line, font = written(words, 16 if index == 0 else 14)
-        place = (width - 16, top + 14 + 22 * index)
-        draw.text(place, line, font=font, fill=_INK[:3], anchor="rm")
-
-
-def _doubt_lines(dataset: Dataset, width: int) -> list[str]:
-    """What there is to check, in lines that fit a width in pixels."""
-    font = ImageFont.load_default(_DOUBT_SIZE)
-    lines = []
-    for told in doubts_in_words(dataset):
-        line, *words = told.split()
-        for word in words:
-            longer = f"{line} {word}"
-            if font.getlength(longer) > width - 32:
+def _wrapped(text: str, font: ImageFont.FreeTypeFont, width: int) -> list[str]:
+    """A text in lines that fit a picture's width, pixels; the further ones are indented."""
+    lines: list[str] = []
+    line = ""
+    for word in re.findall(r"\S+\s*", text):
+        if line.strip() and font.getlength((line + word).rstrip()) > width - 32:
+            lines.append(line.rstrip())
+            line = "    "
+        for letter in word:
+            # A word that is longer than a line, or a script without spaces.
+            if font.getlength((line + letter).rstrip()) > width - 32:
                 lines.append(line)
-                longer = f"    {word}"
-            line = longer
-        lines.append(line)
-    return lines
+                line = "    "
+            line += letter
+    return [*lines, line.rstrip()] if line.strip() else lines
 
 
 def _scale_bar(
