@@ -7,9 +7,11 @@ import multiprocessing
 import os
 import random
 import sqlite3
+import struct
 import subprocess
 import sys
 import time
+import zlib
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -345,6 +347,17 @@ def test_tiles_that_never_come_whole_are_counted_as_failed(tmp_path: Path) -> No
         acquire(_named(server), _WIDE, tmp_path / "a.tif", options=options)
     assert "not a picture (text/html) 3 times" in str(caught.value)
     assert "0 are not there" in str(caught.value)
+
+
+def test_a_tile_that_says_it_is_enormous_is_a_broken_one() -> None:
+    from geofield.imagery.client import BrokenBodyError
+    from geofield.imagery.decode import decode_tile
+
+    body = bytearray(tile_server.encode(tile_pixels(18, 1, 1)))
+    body[16:24] = struct.pack(">II", 30_000, 30_000)
+    body[29:33] = struct.pack(">I", zlib.crc32(body[12:29]))
+    with pytest.raises(BrokenBodyError, match="broken picture"):
+        decode_tile(bytes(body), "image/png", (256, 256))
 
 
 def test_a_server_that_refuses_everything_is_left_in_peace(tmp_path: Path) -> None:

@@ -724,6 +724,14 @@ def test_own_pictures_are_cut_as_they_are(tmp_path: Path) -> None:
     area = shapely.box(*grid.to_lonlat(40, 60), *grid.to_lonlat(60, 40))
     done = acquire(source, Where(area=area), tmp_path / "area.tif")
     assert 19 <= done.grid.width_px <= 22
+    # Ground that is wide and low gives a picture of that shape, with all of its corners.
+    corners = np.array([(20, 40), (80, 40), (80, 60), (20, 60)])
+    area = shapely.Polygon(np.column_stack(grid.to_lonlat(*corners.T)))
+    done = acquire(source, Where(area=area), tmp_path / "wide.tif")
+    x, y = done.grid.from_lonlat(*shapely.get_coordinates(area).T)
+    size = done.grid.width_px, done.grid.height_px
+    assert min(x.min(), y.min(), size[0] - x.max(), size[1] - y.max()) > -1e-3
+    assert size[1] < 0.5 * size[0]
     with pytest.raises(ImageryError, match="is the picture itself"):
         acquire(source, Where(lat=lat, lon=lon), path, overwrite=True)
 
@@ -756,6 +764,16 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
     (tmp_path / "bad.mbtiles").write_text("nothing")
     with pytest.raises(ImageryError, match="not an MBTiles file"):
         find_source(str(tmp_path / "bad.mbtiles"))
+    # Damaged after it was looked at.
+    with sqlite3.connect(file) as db:
+        (page,) = db.execute("SELECT rootpage FROM sqlite_master WHERE name = 'tiles'").fetchone()
+        (size,) = db.execute("PRAGMA page_size").fetchone()
+    db.close()
+    content = bytearray(file.read_bytes())
+    content[page * size - size : page * size - size + 8] = b"\xff" * 8
+    file.write_bytes(content)
+    with pytest.raises(ImageryError, match="the file is damaged there"):
+        acquire(source, where, tmp_path / "c.tif")
 
 
 def test_jpeg_and_webp_tiles(tmp_path: Path) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pyproj import Geod
 from shapely.geometry.base import BaseGeometry
 
@@ -258,31 +261,48 @@ def _picture(
     """A window of the user's own picture."""
     if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
         raise ImageryError(f"{path} is the picture itself.", hint="Give the output another name.")
-    lat, lon = place.point
-    size_m = place.size_m
-    if place.area is not None and place.size_px is None and size_m is None:
-        size_m = _extent_m(place.area)
-    scene = read_scene(
-        source.path,
-        lat=lat,
-        lon=lon,
-        size_m=size_m,
-        size_px=place.size_px,
-        allow=allow,
-    )
+    if place.area is not None and place.size_px is None and place.size_m is None:
+        lat, lon = replace(place, lat=None, lon=None).point
+        size_m = _across_m(place.area, lat, lon)
+        around = read_scene(source.path, lat=lat, lon=lon, size_m=size_m, allow=allow)
+        scene = _cut_to(place.area, around)
+    else:
+        lat, lon = place.point
+        scene = read_scene(
+            source.path,
+            lat=lat,
+            lon=lon,
+            size_m=place.size_m,
+            size_px=place.size_px,
+            allow=allow,
+        )
     scene = _with_provenance(scene, source)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 
 
-def _extent_m(area: BaseGeometry) -> float:
-    """The longer side of an area's box, ground metres."""
+def _across_m(area: BaseGeometry, lat: float, lon: float) -> float:
+    """The side of a square around a point that holds an area's box however it is turned."""
     west, south, east, north = area.bounds
-    middle = (south + north) / 2
-    geod = Geod(ellps="WGS84")
-    return float(
-        max(geod.inv(west, middle, east, middle)[2], geod.inv(west, south, west, north)[2], 1.0)
-    )
+    lons, lats = [west, west, east, east], [south, north, south, north]
+    _, _, radii = Geod(ellps="WGS84").inv(lons, lats, [lon] * 4, [lat] * 4)
+    return float(max(2.0 * np.max(radii), 1.0))
+
+
+def _cut_to(area: BaseGeometry, scene: Scene) -> Scene:
+    """What a scene shows of an area's box: its pixels may be at an angle to lon/lat."""
+    west, south, east, north = area.bounds
+    lon, lat = np.meshgrid(np.linspace(west, east, 17), np.linspace(south, north, 17))
+    x, y = scene.grid.from_lonlat(lon.ravel(), lat.ravel())
+    left, right = _span(x, scene.grid.width_px)
+    top, bottom = _span(y, scene.grid.height_px)
+    return scene.crop(left, top, right - left, bottom - top)
+
+
+def _span(position_px: NDArray[np.float64], side_px: int) -> tuple[int, int]:
+    """The pixels that positions fall on, one at least, of those that there are."""
+    first = min(max(math.floor(position_px.min() + 1e-6), 0), side_px - 1)
+    return first, min(max(math.ceil(position_px.max() - 1e-6), first + 1), side_px)
 
 
 def _with_provenance(scene: Scene, source: PictureSource) -> Scene:

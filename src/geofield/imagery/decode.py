@@ -16,6 +16,10 @@ from geofield.imagery.client import BrokenBodyError
 Pixels = tuple[NDArray[np.uint8], NDArray[np.bool_] | None]
 
 
+#: A small file that says it is a picture of gigabytes.
+_BOMBS = (Image.DecompressionBombWarning, Image.DecompressionBombError)
+
+
 class WrongSizeError(ImageryError):
     """The tiles are sound, but not of the size the source is said to have."""
 
@@ -43,7 +47,7 @@ def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
     except UnidentifiedImageError:
         said = kind.partition(";")[0].strip() or "no type"
         raise BrokenBodyError(f"not a picture ({said})") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombWarning):
+    except (OSError, SyntaxError, ValueError, *_BOMBS):
         raise BrokenBodyError("broken picture") from None
     if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
         rgba = np.asarray(image.convert("RGBA"))

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 #: Red, green and blue; a fourth number is the opacity.
 Colour = tuple[int, ...]
+_Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 #: Line and space, pixels.
 Dash = tuple[float, float]
 #: Left, top, right and bottom of a picture, its pixels.
@@ -322,7 +323,7 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, Dash | None]]:
     return [(color, text, dash) for shown, color, text, dash in entries if shown]
 
 
-def _wrapped(text: str, font: ImageFont.FreeTypeFont, width: int) -> list[str]:
+def _wrapped(text: str, font: _Font, width: int) -> list[str]:
     """A text in lines that fit a picture's width, pixels; the further ones are indented."""
     lines: list[str] = []
     line = ""

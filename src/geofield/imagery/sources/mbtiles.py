@@ -11,6 +11,7 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from geofield.errors import ImageryError
+from geofield.imagery.client import BrokenBodyError
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TilePyramid
 
@@ -60,14 +61,17 @@ class MBTilesSource:
         return cls(words.get("name") or file.name, str(file), known, pyramid)
 
     def read(self, tile: Tile) -> bytes | None:
-        """The bytes of a tile, or None."""
+        """The bytes of a tile, or None; `BrokenBodyError` where the file is damaged."""
         row = 2**tile.zoom - 1 - tile.row
-        with closing(_connected(Path(self.path))) as db:
-            found = db.execute(
-                "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? "
-                "AND tile_row = ?",
-                (tile.zoom, tile.column, row),
-            ).fetchone()
+        try:
+            with closing(_connected(Path(self.path))) as db:
+                found = db.execute(
+                    "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? "
+                    "AND tile_row = ?",
+                    (tile.zoom, tile.column, row),
+                ).fetchone()
+        except sqlite3.DatabaseError as error:
+            raise BrokenBodyError(f"the file is damaged there: {error}") from None
         return None if found is None else bytes(found[0])
 
 
