@@ -89,3 +89,18 @@ def test_the_sample_data_come_from_their_seed(sample: Path) -> None:
         assert made.field.polygon_px(made.scene.grid).contains(shapely.Point(x, y))
     total = sum(path.stat().st_size for path in sample.iterdir())
     assert total < 2_000_000
+
+
+def test_the_command_tells_of_trees_without_room_and_of_a_bad_seed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from geofield.cli import main
+
+    with pytest.raises(SystemExit, match="0"):
+        main(["simulate", "--size", "64", "--trees", "40", "--out", str(tmp_path / "sim")])
+    said = capsys.readouterr().err
+    assert "Not all 40 trees have room" in said
+    with pytest.raises(SystemExit, match="2"):
+        main(["simulate", "--seed", "-1", "--out", str(tmp_path / "none")])
+    with pytest.raises(SettingsError, match="below zero"):
+        simulate_field(-1)

@@ -15,6 +15,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import LONLAT, transformer, utm_crs
+from geofield.errors import SettingsError
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px
@@ -60,9 +61,16 @@ def simulate_field(seed: int, settings: SimulationSettings | None = None) -> Sim
     Parameters
     ----------
     seed : int
-        The same seed and settings give the same field.
+        From 0 on; the same seed and settings give the same field.
     settings : SimulationSettings, optional
+
+    Raises
+    ------
+    SettingsError
+        When the seed is below zero.
     """
+    if seed < 0:
+        raise SettingsError(f"The seed {seed} is below zero.")
     settings = settings or SimulationSettings()
     rng = np.random.default_rng(seed)
     climate = settings.climate or CLIMATES[int(rng.integers(len(CLIMATES)))]
@@ -104,7 +112,7 @@ def simulate_fields(
     count, seed : int
     settings : SimulationSettings, optional
     obstacle_counts : sequence of int, optional
-        Crowns per field, repeated when too short.
+        Crowns per field, repeated when too short; fewer where there is no room for as many.
     equal_brightness_every : int
         0 for never.
     """

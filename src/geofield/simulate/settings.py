@@ -22,7 +22,7 @@ class SimulationSettings:
     resolution_m : float
         Metres per pixel.
     obstacles : int or None
-        Crowns inside the field; None draws 3 to 25.
+        Crowns inside the field, fewer where there is no room; None draws 3 to 25.
     radius_m : (float, float)
         Range of the crowns' radii.
     climate : {"temperate", "dry", "lush", "bare"} or None
