@@ -61,7 +61,8 @@ def test_figures_of_a_hand_made_case():
     assert score.f1 == pytest.approx(4 / 7)
     assert score.radius_bias == pytest.approx(0)
     assert score.radius_error == pytest.approx(0.5)
-    assert score.distance == pytest.approx(1.5)
+    # On the ground: 500 km off the zone's middle it draws a metre 0.27 % longer.
+    assert score.distance == pytest.approx(1.5 / 1.0027, rel=1e-4)
     low, high = score.interval["f1"]
     assert low < score.f1 < high
 
@@ -188,3 +189,38 @@ def test_drawing_shows_detections_that_are_points(tmp_path):
     draw_matches(points, found[:0], result, tmp_path / "hits.png")
     with Image.open(tmp_path / "hits.png") as picture:
         assert FALSE in {c for _, c in picture.getcolors(10_000)}
+
+
+def test_distances_are_those_on_the_ground():
+    # World Mercator at 60 degrees draws a metre twice as long.
+    base = gpd.GeoSeries([Point(33.0, 60.0)], crs=4326).to_crs(UTM).iloc[0]
+    found = table([(base.x, base.y)])
+    truth = table([(base.x + 5, base.y)])
+    for crs in (UTM, "EPSG:3395"):
+        result = gf.evaluate(found.to_crs(crs), truth, distance_m=6, bootstrap=0)
+        assert result.pooled.hits == 1
+        assert result.pooled.distance == pytest.approx(5, abs=0.02)
+
+
+@pytest.mark.parametrize("wrong", ["no shapes", "radius in words", "no folder"])
+def test_the_command_says_what_is_wrong(tmp_path, capsys, wrong):
+    import pandas as pd
+    import pyogrio
+
+    from geofield.cli import main
+
+    found, file = table([(500_000, 4_000_000)]), tmp_path / "found.gpkg"
+    arguments, words = [], "is a table without shapes"
+    if wrong == "no shapes":
+        pyogrio.write_dataframe(pd.DataFrame({"radius_m": [2.0]}), file, layer="obstacles")
+    elif wrong == "radius in words":
+        found.assign(radius_m="3 m").to_file(file, layer="obstacles")
+        words = "holds words, as '3 m'"
+    else:
+        found.to_file(file, layer="obstacles")
+        arguments, words = ["--draw", str(tmp_path / "none" / "hits.png")], "hits.png"
+    with pytest.raises(SystemExit, match="1"):
+        main(["evaluate", str(file), str(file), *arguments])
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said

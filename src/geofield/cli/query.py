@@ -68,7 +68,10 @@ def query(
 def _own(name: str, known: list[str]) -> str:
     path = Path(name)
     if path.suffix in (".rq", ".sparql") and path.is_file():
-        return path.read_text(encoding="utf-8")
+        try:
+            return path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            raise FormatError(f"{name} is no text in UTF-8.", hint="Save it as UTF-8.") from None
     raise FormatError(
         f"There is no query {name!r}, and no file of SPARQL of that name.",
         hint=nearest(name, known).strip() or f"Queries: {', '.join(known)}.",

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
-from geofield.crs import ground_areas_m2, is_metric
+from geofield.crs import ground_areas_m2, ground_scale, is_metric
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
@@ -84,7 +84,7 @@ def evaluate(
     Raises
     ------
     ObstacleError
-        When the distance is not above zero or a picture has no truth.
+        When the distance is not above zero, a picture has no truth or a radius is no number.
     CRSError
         When a table has no CRS, or the detected obstacles are not in metres.
     """
@@ -100,7 +100,8 @@ def evaluate(
         a, b = compared(found[name], true[name], within)
         centre_a, radius_a, _ = _circles(a)
         centre_b, radius_b, has_radius = _circles(b)
-        match = match_points(centre_a, centre_b, distance_m)
+        scale = _scale(np.vstack([centre_a, centre_b]), a.crs)
+        match = match_points(centre_a / scale, centre_b / scale, distance_m)
         matches[name] = match
         difference = radius_a[match.detected_index] - radius_b[match.truth_index]
         if not has_radius:
@@ -134,6 +135,13 @@ def compared(
     return _counting(active(detected), area), _counting(truth, area)
 
 
+def _scale(centres: FloatArray, crs: Any) -> float:
+    """Units of a CRS in a metre on the ground, in the middle of some centres."""
+    if not len(centres):
+        return 1.0
+    return float(ground_scale(CRS(crs), *centres.mean(axis=0)))
+
+
 def _counting(frame: gpd.GeoDataFrame, area: Any) -> gpd.GeoDataFrame:
     """The rows with a shape, and with its centre inside where there is an area."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
@@ -150,7 +158,13 @@ def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
     xy = np.column_stack([shapely.get_x(centre), shapely.get_y(centre)]).reshape(-1, 2)
     radius = np.full(len(geometry), np.nan)
     if "radius_m" in frame.columns:
-        radius = frame["radius_m"].to_numpy(dtype="float64", na_value=np.nan)
+        try:
+            radius = frame["radius_m"].to_numpy(dtype="float64", na_value=np.nan)
+        except ValueError:
+            first = frame["radius_m"].dropna().iloc[0]
+            raise ObstacleError(
+                f"The column radius_m holds words, as {first!r}.", hint="Give numbers, metres."
+            ) from None
     else:
         area = ground_areas_m2(geometry, CRS(frame.crs))
         radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)

@@ -14,10 +14,12 @@ from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
 from geofield.model.scene import Scene
+from geofield.staging import cannot_write
 from geofield.strangers import check_vector
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    from PIL.Image import Image
 
 HIT, MISSED, FALSE = (40, 200, 90), (60, 150, 255), (235, 60, 50)
 _SIDE_PX = 1200
@@ -59,6 +61,11 @@ def read_obstacles(
             layer = None
         usual = schema.OBSTACLES.name if schema.OBSTACLES.name in layers else layers[0]
         frame = gpd.read_file(path, layer=layer or usual)
+        if not isinstance(frame, gpd.GeoDataFrame):
+            raise ObstacleError(
+                f"The layer {layer or usual!r} of {path.name} is a table without shapes.",
+                hint="Give one of points, boxes or polygons.",
+            )
     except pyogrio.errors.DataSourceError as error:
         raise ObstacleError(f"{path.name} cannot be read: {error}.") from None
     if frame.crs is None:
@@ -134,7 +141,15 @@ def draw_matches(
     centres = place(shapely.get_coordinates(shapely.centroid(truth.geometry.to_numpy())))
     for (x, y), good in zip(centres, met, strict=True):
         pen.rectangle([x - 3, y - 3, x + 3, y + 3], fill=HIT if good else MISSED)
-    canvas.save(path)
+    _save(canvas, path)
+
+
+def _save(canvas: Image, path: Path) -> None:
+    """Write a PNG, whatever the file is called."""
+    try:
+        canvas.save(path, "PNG")
+    except OSError as error:
+        raise cannot_write(path, error) from None
 
 
 def draw_reliability(confidence: ArrayLike, hit: ArrayLike, path: Path) -> float:
@@ -178,5 +193,5 @@ def draw_reliability(confidence: ArrayLike, hit: ArrayLike, path: Path) -> float
         pen.ellipse([x - 5, y - 5, x + 5, y + 5], fill=(30, 90, 200))
     pen.text((edge, side + edge + 12), "confidence, 0 to 1", fill="black")
     pen.text((edge, 14), f"share of hits, 0 to 1; calibration error {error:.3f}", fill="black")
-    canvas.save(path)
+    _save(canvas, path)
     return error
