@@ -235,6 +235,10 @@ def test_the_command_answers_lists_and_shows(files, tmp_path):
     own = tmp_path / "own.rq"
     own.write_text("SELECT (COUNT(*) AS ?n) WHERE { ?t a gf:Track }")
     assert run(cli, ["query", *names, str(own)]).stdout.splitlines()[0] == "n"
+    own.write_bytes(b"SELECT \xff")
+    result = run(cli, ["query", *names, str(own)])
+    assert result.exit_code == 1
+    assert "own.rq is no text in UTF-8" in str(result.exception) + result.stderr
     assert run(cli, ["query"]).exit_code == 2
 
 
