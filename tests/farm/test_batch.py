@@ -346,7 +346,11 @@ def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
     (tmp_path / "farm" / "status" / "chunk=0000" / "part-0.parquet").unlink()
     kept = layers_of(tmp_path / "farm")
     batch(places, "--spacing", 5, "--out", tmp_path / "farm")
-    assert layers_of(tmp_path / "farm") == kept
+    now = layers_of(tmp_path / "farm")
+    # The overview tells, besides, that the outline is not that of the places.
+    assert {**now, "farm.gpkg": kept["farm.gpkg"]} == kept
+    notes = read_farm(tmp_path / "farm").status.set_index("field_id")["notes"]
+    assert "reviewed outline stands" in notes["p4"]
     # With another spacing the tracks are new, and the outline is theirs.
     batch(places, "--spacing", 8, "--fresh", "--out", tmp_path / "farm")
     again = read_farm(tmp_path / "farm")["p4"]

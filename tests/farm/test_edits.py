@@ -14,6 +14,7 @@ import geopandas as gpd
 import pyogrio
 import pytest
 import shapely
+import shapely.affinity
 
 import geofield as gf
 
@@ -165,3 +166,61 @@ def test_what_a_person_keeps_beside_the_farm(folder: Path) -> None:
         assert "columns sown of layer 'field' are not the farm's" in said or more
         kept = pyogrio.read_dataframe(path, layer="notes")[["text", "geometry"]]
         assert kept.equals(notes[["text", "geometry"]])
+
+
+def _sql(path: Path, statement: str) -> None:
+    subprocess.run(["ogrinfo", "-q", path, "-sql", statement], check=True, capture_output=True)
+
+
+def _parcels(folder: Path, change: Callable[[gpd.GeoDataFrame], gpd.GeoDataFrame]) -> None:
+    change(gpd.read_file(folder / "parcels.gpkg")).to_file(folder / "parcels.gpkg")
+
+
+def test_names_and_columns_of_a_person_stay_with_other_settings(folder: Path) -> None:
+    geofield("farm", "get", folder / "farm", "a", "-o", folder / "a.gpkg")
+    plan = pyogrio.read_dataframe(folder / "a.gpkg", layer="field")
+    # The code was a number, and those of the other fields are.
+    plan = plan.assign(name="Hof", code="A7", note="wet", crop=None)
+    pyogrio.write_dataframe(plan, folder / "a.gpkg", layer="field", geometry_name="geom")
+    _parcels(folder, lambda table: table.assign(code=[1, 2, 3, 4]))
+    _batch(folder, "--fresh")
+    geofield("farm", "put", folder / "a.gpkg", folder / "farm")
+    for more in ((), ("--fresh", "--spacing", 8)):
+        _batch(folder, *more)
+        rows = gf.read_farm(folder / "farm").fields.set_index("field_id")
+        assert rows.loc["a", ["name", "code", "note"]].tolist() == ["Hof", "A7", "wet"]
+        assert rows.loc["b", ["name", "code", "crop"]].tolist() == ["b", "2", "rye"]
+        assert rows["crop"].isna().tolist() == [True, False, False, False]
+
+
+def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
+    _edit(folder, "obstacles", _tree_grown)
+    _batch(folder)
+
+    def moved(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        shapes = table.geometry.to_numpy(copy=True)
+        shapes[1] = shapely.affinity.translate(shapes[1], 0, 3000)
+        shapes[2] = shapely.affinity.scale(shapes[2], 0.9, 1)
+        return table.set_geometry(gpd.GeoSeries(shapes, crs=table.crs))
+
+    _parcels(folder, moved)
+    _batch(folder, "--fresh")
+    status = gf.read_farm(folder / "farm").status.set_index("field_id")
+    assert status["status"].to_dict() == {"a": "done", "b": "failed", "c": "done", "d": "done"}
+    assert "reviewed as 'b' is of a field elsewhere" in status["error"]["b"]
+    assert status["notes"]["c"] == (
+        "The reviewed outline stands; that of the places differs by 0.14 ha."
+    )
+
+
+def test_any_id_can_be_reviewed(folder: Path) -> None:
+    ids = [".5", "a/b", "поле" * 20, "y" * 300]
+    _parcels(folder, lambda table: table.assign(id=ids))
+    _batch(folder, "--fresh")
+    _sql(folder / "farm" / "farm.gpkg", "UPDATE obstacles SET status = 'rejected'")
+    _batch(folder)
+    _batch(folder, "--fresh")
+    farm = gf.read_farm(folder / "farm")
+    assert set(farm.status["field_id"]) == set(ids)
+    assert farm.status["reviewed"].all()
+    assert set(farm.obstacles["status"]) == {"rejected"}

@@ -17,7 +17,7 @@ from geofield.farm.layers import tables_of
 from geofield.farm.limits import Limits, Watch
 from geofield.farm.marks import MOST_DEATHS, Marks
 from geofield.farm.places import Place
-from geofield.farm.reviewed import reviewed_plan
+from geofield.farm.reviewed import file_of, reviewed_plan
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.farm.work import Job, in_words, listening, plan_place, told
@@ -38,7 +38,7 @@ class Orders:
     #: The user's own columns, by the places file.
     own: pa.Schema | None = None
     limits: Limits = field(default_factory=Limits)
-    #: Ids of fields that a person put back.
+    #: Files of the plans that a person put back.
     reviewed: frozenset[str] = frozenset()
     #: Of geofield where the run was started.
     version: str = __version__
@@ -103,7 +103,7 @@ def _planned(place: Place, orders: Orders) -> tuple[Plan | None, Outcome]:
     """The plan of a place, where there is one, and its row of the status."""
     begun = time.perf_counter()
     plan: Plan | None = None
-    is_reviewed = place.field_id in orders.reviewed
+    is_reviewed = file_of(place.field_id) in orders.reviewed
     with listening() as heard:
         try:
             previous = reviewed_plan(orders.store, place.field_id) if is_reviewed else None

@@ -247,6 +247,29 @@ def _frame(
     return schema.conform(of, frame, extras=True)
 
 
+def stacked(parts: Sequence[pa.Table]) -> pa.Table:
+    """Parts of a layer as one table; where a column is of two kinds, text holds both."""
+    import pyarrow as pa
+
+    for name in {name for part in parts for name in part.column_names}:
+        kinds = [pa.schema([one.schema.field(name)]) for one in parts if name in one.column_names]
+        try:
+            pa.unify_schemas(kinds, promote_options="permissive")
+        except pa.ArrowTypeError:
+            parts = [_with_text(part, name) for part in parts]
+    return pa.concat_tables(parts, promote_options="permissive")
+
+
+def _with_text(table: pa.Table, name: str) -> pa.Table:
+    import pyarrow as pa
+
+    if name not in table.column_names:
+        return table
+    texts = [None if each is None else str(each) for each in table[name].to_pylist()]
+    at = table.column_names.index(name)
+    return table.set_column(at, name, pa.array(texts, pa.string()))
+
+
 def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
     """A layer of many fields as people use it.
 

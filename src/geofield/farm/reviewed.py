@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 from geofield.errors import FormatError
 from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
 from geofield.farm.folder import file_of as file_in
-from geofield.farm.layers import KEPT, tables_of
+from geofield.farm.layers import KEPT, stacked, tables_of
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
@@ -20,19 +21,25 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _SUFFIX = ".gpkg"
+#: Names of files may have 255 bytes, and what is half written has some more.
+_LONGEST = 200
 #: Of a status row that a person's plan took the place of.
 _SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
 
 
 def file_of(field_id: str) -> str:
     """Where the reviewed plan of a field lies."""
-    return f"{REVIEWED}/{quote(field_id, safe=' ')}{_SUFFIX}"
+    stem = quote(field_id, safe=" ")
+    if stem.startswith("."):  # hidden, and passed over by readers
+        stem = f"%2E{stem[1:]}"
+    if len(stem) > _LONGEST:
+        stem = f"{stem[:_LONGEST]}~{hashlib.sha256(field_id.encode()).hexdigest()[:16]}"
+    return f"{REVIEWED}/{stem}{_SUFFIX}"
 
 
-def reviewed_ids(store: Store) -> frozenset[str]:
-    """The fields that a person put back."""
-    names = store.names(REVIEWED)
-    return frozenset(unquote(n.removesuffix(_SUFFIX)) for n in names if n.endswith(_SUFFIX))
+def reviewed_files(store: Store) -> frozenset[str]:
+    """The plans that a person put back, as :func:`file_of` names them."""
+    return frozenset(f"{REVIEWED}/{name}" for name in store.names(REVIEWED))
 
 
 def reviewed_plan(store: Store, field_id: str) -> Plan:
@@ -111,7 +118,7 @@ def _spliced(old: Any, new: Any, field_id: str, ids: list[str]) -> pa.Table:
 
     rest = None if old is None else old.filter(pc.not_equal(old["field_id"], field_id))
     parts = [part for part in (rest, new) if part is not None]
-    whole = pa.concat_tables(parts, promote_options="permissive")
+    whole = stacked(parts)
     at = pc.index_in(whole["field_id"], pa.array(ids, pa.string()))
     order = pc.sort_indices(pa.table({"at": at, "row": range(len(whole))}),
                             sort_keys=[("at", "ascending"), ("row", "ascending")])  # fmt: skip

@@ -16,7 +16,7 @@ from geofield.farm.engine import Control, Engine
 from geofield.farm.limits import Limits
 from geofield.farm.marks import CHANGED, WORK, excuse_all, forget_all
 from geofield.farm.places import Places
-from geofield.farm.reviewed import reviewed_ids
+from geofield.farm.reviewed import reviewed_files
 from geofield.farm.stac import ITEMS as STAC_ITEMS
 from geofield.farm.store import Store
 from geofield.farm.value import clear
@@ -124,7 +124,9 @@ def run_farm(
         tell(count)
         if hired is not None:
             size, order = record.chunk_fields, places.order()
-            orders = Orders(store, job, places.own.schema, limits or Limits(), reviewed_ids(store))
+            orders = Orders(
+                store, job, places.own.schema, limits or Limits(), reviewed_files(store)
+            )
             tasks = (
                 Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
                 for chunk in missing

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 from geofield import schema
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import folder as place
-from geofield.farm.layers import FIELD_ID, KEPT, LAYERS, PLAN, Tables, frame_of, plan_of, tables_of
+from geofield.farm.layers import (
+    FIELD_ID,
+    KEPT,
+    LAYERS,
+    PLAN,
+    Tables,
+    frame_of,
+    plan_of,
+    stacked,
+    tables_of,
+)
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.model.card import card, field_drawn, words
@@ -131,8 +141,6 @@ class Farm:
             `field`, `obstacles`, `tracks`, `segments`, `gaps`, `headland`, `headland_tracks`,
             `route`, `turns` or `alternatives`.
         """
-        import pyarrow as pa
-
         if name not in {each.name for each in LAYERS}:
             raise FormatError(
                 f"A farm has no layer {name!r}.",
@@ -142,7 +150,7 @@ class Farm:
         parts = [part for part in found if part is not None]
         if not parts:
             return frame_of(name, _nothing(name))
-        return frame_of(name, pa.concat_tables(parts, promote_options="permissive"))
+        return frame_of(name, stacked(parts))
 
     @cached_property
     def fields(self) -> gpd.GeoDataFrame:

@@ -13,7 +13,8 @@ import numpy as np
 import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
-from geofield.errors import FieldError, GeofieldWarning
+from geofield.earlier import drew_outline
+from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_obstacles
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
 
 #: Side of the window around a place where no size was asked for; it grows with the field.
 WINDOW_M = 400.0
+#: Share of the smaller outline that a place and its reviewed plan have in common at least.
+_SHARED = 0.1
+#: Share by which they may differ before it is told.
+_PARTED = 0.01
 #: Ground around a parcel that its window shows, metres.
 _AROUND_M = 20.0
 
@@ -83,10 +88,10 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     settings = as_settings(job.settings, place.settings)
     if not (np.isfinite(place.lat) and np.isfinite(place.lon)):
         raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
-    if previous is not None and _same_stages(previous.settings, settings):
-        # As the person left it, their names and columns too.
-        field = replace(previous.field, field_id=place.field_id)
-        return replace(previous, field=field, scene=None)
+    if previous is not None:
+        place = _as_reviewed(place, previous)
+        if _same_stages(previous.settings, settings):
+            return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)
     if job.imagery is not None:
         plan = _on_picture(place, boundary, settings, job, previous)
@@ -108,6 +113,60 @@ def _named(plan: Plan, place: Place) -> Plan:
     return replace(plan, field=field, scene=None)
 
 
+def _as_reviewed(place: Place, previous: Plan) -> Place:
+    """A place with the name and columns that a person left, at a point of their outline.
+
+    Raises
+    ------
+    FieldError
+        When what they reviewed is another field of that id.
+    """
+    field = previous.field
+    if not (_holds(previous, place) if place.outline is None else _overlaps(previous, place)):
+        raise FieldError(
+            f"The plan that was reviewed as {place.field_id!r} is of a field elsewhere.",
+            hint="Give this place an id of its own, or take that plan out of the farm's reviewed/.",
+        )
+    inside = field.polygon_lonlat.representative_point()
+    known = {name for name, _ in field.own}
+    own = (*field.own, *(each for each in place.own if each[0] not in known))
+    return replace(place, lat=inside.y, lon=inside.x, name=field.name or place.name, own=own)
+
+
+def _holds(previous: Plan, place: Place) -> bool:
+    """Whether a reviewed plan is of the field at a point, or was looked for there."""
+    x, y = transformer(LONLAT, previous.field.crs).transform(place.lon, place.lat)
+    if shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)):
+        return True
+    told = previous.evidence.point
+    return told is not None and np.allclose(told, (place.lat, place.lon), rtol=0.0, atol=1e-6)
+
+
+def _overlaps(previous: Plan, place: Place) -> bool:
+    """Whether a reviewed field is that of a parcel; where that was changed since, it is told.
+
+    Warns
+    -----
+    FieldWarning
+        With the area by which they differ.
+    """
+    parcel = parcel_of(place)
+    there = reproject(previous.field.polygon, previous.field.crs, parcel.crs)
+    if not np.isfinite(there.bounds).all():
+        return False  # too far away for its metric CRS
+    least = min(parcel.polygon.area, there.area)
+    apart = parcel.polygon.symmetric_difference(there).area
+    if parcel.polygon.intersection(there).area < _SHARED * least:
+        return False
+    if apart > _PARTED * least and not drew_outline(previous):
+        warnings.warn(
+            f"The reviewed outline stands; that of the places differs by {apart / 10_000:.2f} ha.",
+            FieldWarning,
+            stacklevel=2,
+        )
+    return True
+
+
 def _same_stages(one: Settings | None, other: Settings) -> bool:
     """Whether both would have the stages do the same."""
     return one is not None and (one.field, one.obstacles, one.tracks) == (
@@ -120,8 +179,9 @@ def _on_picture(
 ) -> Plan:
     """Outline, unless it is given, and obstacles."""
     size_m = settings.imagery.size_m or WINDOW_M
-    if boundary is not None:
-        size_m = max(size_m, _reach_m(boundary, place))
+    outline = boundary if previous is None else previous.field
+    if outline is not None:
+        size_m = max(size_m, _reach_m(outline, place))
     seen = settings.model_copy(
         update={"imagery": settings.imagery.model_copy(update={"size_m": size_m})}
     )
@@ -143,10 +203,10 @@ def _around(plan: Plan, job: Job) -> Plan:
     return with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
 
 
-def _reach_m(boundary: Field, place: Place) -> float:
-    """Side of the window around a place that shows all of a parcel."""
-    x, y = transformer(LONLAT, boundary.crs).transform(place.lon, place.lat)
-    away = shapely.get_coordinates(boundary.polygon) - (x, y)
+def _reach_m(outline: Field, place: Place) -> float:
+    """Side of the window around a place that shows all of an outline."""
+    x, y = transformer(LONLAT, outline.crs).transform(place.lon, place.lat)
+    away = shapely.get_coordinates(outline.polygon) - (x, y)
     return float(2.0 * (np.abs(away).max() + _AROUND_M))
 
 
