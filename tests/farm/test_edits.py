@@ -159,13 +159,31 @@ def test_what_a_person_keeps_beside_the_farm(folder: Path) -> None:
     fields = pyogrio.read_dataframe(path, layer="field")
     notes = fields[["geometry"]].assign(text="wet", geometry=fields.geometry.centroid)
     pyogrio.write_dataframe(notes, path, layer="notes")
-    pyogrio.write_dataframe(fields.assign(sown="May"), path, layer="field", geometry_name="geom")
     _edit(folder, "obstacles", _tree_grown)
     for more in ((), ("--fresh",)):
-        said = _batch(folder, *more)
-        assert "columns sown of layer 'field' are not the farm's" in said or more
+        _batch(folder, *more)
         kept = pyogrio.read_dataframe(path, layer="notes")[["text", "geometry"]]
         assert kept.equals(notes[["text", "geometry"]])
+
+
+def test_columns_of_a_person_stay(folder: Path) -> None:
+    path = folder / "farm" / "farm.gpkg"
+    fields = pyogrio.read_dataframe(path, layer="field")
+    fields["sown"] = [None, 5, None, 7.5]
+    fields.loc[fields["field_id"] == "c", "crop"] = "oats"
+    pyogrio.write_dataframe(fields, path, layer="field", geometry_name="geom")
+    trees = pyogrio.read_dataframe(path, layer="obstacles")
+    trees["species"] = ["oak" if one == 1 else None for one in trees["obstacle_no"]]
+    pyogrio.write_dataframe(trees, path, layer="obstacles", geometry_name="geom")
+    said = _batch(folder)
+    assert [one for one in "abcd" if f"{one} as edited" in said] == list("abcd")
+    assert "as edited" not in _batch(folder, "--fresh", "--spacing", 8)
+    farm = gf.read_farm(folder / "farm")
+    for found in (farm.fields, pyogrio.read_dataframe(path, layer="field")):
+        rows = found.set_index("field_id")
+        assert rows["sown"].fillna(0).to_dict() == {"a": 0, "b": 5, "c": 0, "d": 7.5}
+        assert rows["crop"].to_dict() == {"a": "rye", "b": "rye", "c": "oats", "d": "rye"}
+    assert farm["a"].obstacles["species"].fillna("").tolist() == ["oak", ""]
 
 
 def _sql(path: Path, statement: str) -> None:
@@ -224,3 +242,78 @@ def test_any_id_can_be_reviewed(folder: Path) -> None:
     assert set(farm.status["field_id"]) == set(ids)
     assert farm.status["reviewed"].all()
     assert set(farm.obstacles["status"]) == {"rejected"}
+
+
+def test_edits_wait_for_the_plan_of_their_field(folder: Path) -> None:
+    """A run that was killed leaves an overview with fields that are not planned anew yet."""
+    path = folder / "farm" / "farm.gpkg"
+    _edit(folder, "obstacles", _tree_grown)
+    before = path.read_bytes()
+    shutil.rmtree(folder / "farm" / "status")
+    _parcels(folder, lambda table: table[table["id"] != "c"])
+    said = _batch(folder, "--fresh")
+    assert "b as edited" in said
+    assert "has edits of fields without a plan (c)" in " ".join(said.split())
+    assert path.read_bytes() == before
+    path.unlink()
+    _batch(folder)
+    farm = gf.read_farm(folder / "farm")
+    assert farm.ids == ["a", "b", "d"]
+    assert farm["b"].obstacles.geometry.area.max() > 100
+
+
+def test_a_field_edited_in_two_places_is_refused(folder: Path) -> None:
+    farm, path = folder / "farm", folder / "farm" / "farm.gpkg"
+    geofield("farm", "get", farm, "b", "-o", folder / "b.gpkg")
+    _sql(folder / "b.gpkg", "UPDATE obstacles SET status = 'rejected' WHERE obstacle_no = 4")
+    unedited = path.read_bytes()
+    _edit(folder, "obstacles", _tree_grown)
+    edited = path.read_bytes()
+    said = geofield("farm", "put", folder / "b.gpkg", farm, code=1)
+    assert "b is edited in farm.gpkg, too" in " ".join(said.split())
+    # Put back while the overview had no edits; it is edited as it was before that.
+    path.write_bytes(unedited)
+    geofield("farm", "put", folder / "b.gpkg", farm)
+    path.write_bytes(edited)
+    said = " ".join(_batch(folder, code=1).split())
+    assert "b was edited in farm.gpkg, and changed in the farm since" in said
+    assert path.read_bytes() == edited
+    geofield("farm", "put", path, farm)
+    assert set(gf.read_farm(farm)["b"].obstacles["status"]) == {"added"}
+    assert "as edited" not in _batch(folder)
+
+
+def test_an_obstacle_copied_to_another_field_is_of_that_one(folder: Path) -> None:
+    def copied(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        row = table[table["field_id"] == "a"].iloc[[0]]
+        row = row.set_geometry(row.geometry.translate(170, 20))
+        return gpd.GeoDataFrame(gpd.pd.concat([table, row]), crs=table.crs)
+
+    _edit(folder, "obstacles", copied)
+    _batch(folder)
+    farm = gf.read_farm(folder / "farm")
+    assert farm.obstacles["field_id"].value_counts().to_dict() == {"a": 2, "b": 3, "c": 2, "d": 2}
+    assert farm["b"].obstacles["obstacle_no"].is_unique
+
+
+def test_fields_deleted_or_split_in_the_overview_are_told(folder: Path) -> None:
+    _sql(folder / "farm" / "farm.gpkg", "DELETE FROM field WHERE field_id = 'a'")
+    assert "1 fields are deleted there (a)" in " ".join(_batch(folder).split())
+
+    def split(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        return gpd.GeoDataFrame(gpd.pd.concat([table, table.iloc[[-1]]]), crs=table.crs)
+
+    _edit(folder, "field", split)
+    said = " ".join(_batch(folder, code=1).split())
+    assert "several outlines of field 'd'" in said
+
+
+def test_tracks_of_many_parcels_keep_what_was_edited(folder: Path) -> None:
+    asked = ("tracks", folder / "parcels.gpkg", "--obstacles", folder / "trees.gpkg")
+    geofield(*asked, "--spacing", 6, "-o", folder / "tracks")
+    (folder / "farm").rename(folder / "first")
+    (folder / "tracks").rename(folder / "farm")
+    _edit(folder, "obstacles", _tree_grown)
+    said = geofield(*asked, "--spacing", 8, "-o", folder / "farm", "--overwrite")
+    assert "c as edited" in said
+    assert "rejected" in set(gf.read_farm(folder / "farm")["c"].obstacles["status"])

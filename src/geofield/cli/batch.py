@@ -113,10 +113,8 @@ def batch(
     What a person edited in the farm's overview (farm.gpkg) is taken in first and kept.
     Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.
     """
-    from geofield.farm.edits import put_edits
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
-    from geofield.farm.overview import OVERVIEW
     from geofield.farm.run import run_farm
     from geofield.farm.store import Store
     from geofield.farm.work import Job
@@ -136,17 +134,15 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("Name --workers or --scheduler, not both.")
     say(f"Places     {len(found)} of {places.name}")
-    edited = [] if store.folder is None else put_edits(store.folder, store.folder / OVERVIEW)
-    for one in edited:
-        say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
+    waiting = take_in(store)
     with progress_bar(quiet=as_json) as progress, two_interrupts() as control:
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
             imagery=about, control=control, tell=lambda at: _show(progress, at),
         )  # fmt: skip
-    anew = bool(edited) or count.done > count.before
-    files = finish(store, found, anew=anew, overview=overview)
+    waiting = waiting and take_in(store, waiting)
+    files = finish(store, found, anew=count.done > count.before, overview=overview and not waiting)
     if as_json:
         echo_json({"farm": store.shown, "places": count.total, **count.statuses, "files": files})
     else:
@@ -158,6 +154,28 @@ def batch(
         )
     if count.failed == count.total:
         raise GeofieldError("No place could be planned.", hint="The reasons are in failed.csv.")
+
+
+def take_in(store: Store, only: list[str] | None = None) -> list[str]:
+    """Take in what was edited in the overview; edited fields that have no plan.
+
+    Before a run all edits; after it `only` those of fields that had no plan before.
+    """
+    from geofield.farm.edits import put_edits
+    from geofield.farm.overview import OVERVIEW
+
+    if store.folder is None:
+        return []
+    overview = store.folder / OVERVIEW
+    edited, waiting = put_edits(store.folder, overview, only=only, anyway=only is not None)
+    for one in edited:
+        say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
+    if waiting and only is not None:
+        say_note(
+            f"{OVERVIEW} stays as it is: it has edits of fields without a plan "
+            f"({', '.join(waiting[:5])}). Move it out of the farm to have it written anew."
+        )
+    return waiting
 
 
 def _imagery(

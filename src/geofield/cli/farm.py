@@ -64,19 +64,29 @@ def put(plan_file: Path, folder: str) -> None:
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
     what a person said.
     """
+    from geofield.errors import FormatError
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
     from geofield.farm.overview import OVERVIEW
     from geofield.farm.reviewed import put_back
     from geofield.farm.store import Store
+    from geofield.plan import read_plan
 
     alone, store = not is_overview(plan_file), Store.of(folder)
     place = store.folder
     if place is not None and place.is_dir():
         claim_folder(place)
-    overview = plan_file if place is None else place / OVERVIEW
-    # Edits in the overview first: it is written anew below.
-    ids = [] if place is None else put_edits(place, overview if alone else plan_file)
+    ids: list[str] = []
+    if place is not None:
+        # Edits in the overview first: it is written anew below.
+        overview = place / OVERVIEW if alone else plan_file
+        but = read_plan(plan_file).field.field_id if alone else None
+        ids, waiting = put_edits(place, overview, but=but, anyway=not alone)
+        if waiting:
+            raise FormatError(
+                f"{overview.name} has edits of field {waiting[0]}, of which {folder} has no plan.",
+                hint="Go on with `geofield batch`: it takes them in when the field is planned.",
+            )
     if alone:
         ids.append(put_back(plan_file, folder))
     if ids:

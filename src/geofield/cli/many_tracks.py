@@ -86,6 +86,7 @@ def of_many(places: Places, job: Job, wanted: Wanted) -> Told:
 
 
 def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool) -> Farm:
+    from geofield.cli.batch import take_in
     from geofield.farm.engine import Here
     from geofield.farm.finish import finish
     from geofield.farm.pool import Pool, cores
@@ -96,15 +97,17 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     def engine() -> Engine:
         return Here() if len(places) <= _FEW else Pool(cores())
 
-    store = Store.of(folder)
+    store, stays = Store.of(folder), folder == wanted.output
+    waiting = take_in(store) if stays else []
     with progress_bar(quiet=wanted.quiet) as progress:
 
         def tell(count: Count) -> None:
             progress(count.done, count.total, "fields")
 
         count = run_farm(places, job, store, engine, fresh=fresh, tell=tell)
-    if folder == wanted.output:
-        finish(store, places, anew=count.done > count.before)
+    waiting = waiting and take_in(store, waiting)
+    if stays:
+        finish(store, places, anew=count.done > count.before, overview=not waiting)
     return read_farm(folder)
 
 

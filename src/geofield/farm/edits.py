@@ -1,8 +1,9 @@
 """What a person edited in a farm's overview, taken into the farm before anything is written anew.
 
-``farm.gpkg`` remembers a digest of each field as it was written. A field whose outline, name or
-obstacles differ from it was edited: its plan takes the edits in, its tracks are planned again, and
-it counts as reviewed from then on, like one put back with ``geofield farm put``.
+``farm.gpkg`` remembers digests of each field as it was written. A field whose outline, name,
+obstacles or columns of a person's own differ from them was edited: its plan takes the edits in, its
+tracks are planned again, and it counts as reviewed from then on, like one put back with ``geofield
+farm put``.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-import tempfile
 import warnings
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping
+from contextlib import closing
+from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +25,16 @@ import shapely
 
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning, GeofieldError
+from geofield.farm.folder import REVIEWED
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.farm.marks import CHANGED
+from geofield.farm.reviewed import put_plans
+from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.formats.gpkg_read import opened
+from geofield.model import Field
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
-from geofield.plan_files import save_plan
 from geofield.settings import Settings
 
 if TYPE_CHECKING:
@@ -40,6 +46,12 @@ if TYPE_CHECKING:
 DIGESTS = "fields_as_written"
 #: And whether it has obstacles at all: those of large farms are left out.
 DETAILS = "has_obstacles"
+#: What stands in columns of a person's own: their names by layer, and a digest per field.
+OWN = "own_as_written"
+#: The edits that the farm holds already, while the overview is older than it.
+TAKEN = f"{REVIEWED}/.taken.json"
+#: Outlines that differ by less, in the units of the overview, are the same.
+_SAME = 1e-9
 #: What a person may change, besides shapes.
 _FIELD_WORDS = ("name",)
 _OBSTACLE_WORDS = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
@@ -61,45 +73,161 @@ def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[st
     }
 
 
-def take_edits(farm: Farm, overview: Path) -> list[Plan]:
-    """The plans of the fields that a person edited in the overview, their tracks planned again.
+def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:
+    """A digest per field of what stands in columns of a person's own; none for fields without."""
+    parts: dict[str, list[str]] = {}
+    for of, table in tables.items():
+        names = _own_names(of, table)
+        for one, *values in zip(table[FIELD_ID], *(table[each] for each in names), strict=True):
+            told = {each: _text(value) for each, value in zip(names, values, strict=True)}
+            told = {each: text for each, text in told.items() if text}
+            if told:
+                parts.setdefault(str(one), []).append(of.name + json.dumps(told, sort_keys=True))
+    return {
+        one: hashlib.sha256("\0".join(sorted(rows)).encode()).hexdigest()[:16]
+        for one, rows in parts.items()
+    }
+
+
+def _own_names(of: schema.Layer, table: gpd.GeoDataFrame) -> list[str]:
+    return [each for each in schema.own_columns(of, table) if each not in (FIELD_ID, EPSG)]
+
+
+def _text(value: Any) -> str:
+    """A value as text; 7 is the same where missing ones beside it made it 7.0."""
+    if pd.api.types.is_scalar(value) and pd.isna(value):
+        return ""
+    return repr(float(value)) if isinstance(value, Real) else str(value)
+
+
+def remember_own(overview: Path) -> None:
+    """Note in an overview what its columns of a person's own hold, as they read from the file."""
+    tables = {of: _table(overview, of) for of in (schema.FIELD, schema.OBSTACLES)}
+    names = {of.name: _own_names(of, table) for of, table in tables.items()}
+    with closing(sqlite3.connect(overview)) as file, file:
+        (text,) = file.execute(
+            "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
+        ).fetchone()
+        content = json.loads(text)
+        content["evidence"][OWN] = {"columns": names, "digests": own_digests(tables)}
+        text = json.dumps(content, ensure_ascii=False, indent=1)
+        file.execute(
+            "UPDATE gpkg_metadata SET metadata = ? WHERE md_standard_uri = ?", (text, origin.URI)
+        )
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What a person edited in an overview."""
+
+    #: By field id: the digests before and after.
+    marks: Mapping[str, str]
+    fields: gpd.GeoDataFrame
+    #: None where the overview has none.
+    obstacles: gpd.GeoDataFrame | None
+
+
+def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
+    """What was edited in the overview, but for the edits that were `taken` before.
 
     Raises
     ------
     FormatError
-        When an edit cannot be understood; says which field and why.
+        When an edit cannot be understood, or, unless it is to hold `anyway`, its field was changed
+        elsewhere since the overview was written; says which field and why.
     """
     record = _record(overview)
     written = record[DIGESTS]
     fields, obstacles = (_table(overview, of) for of in (schema.FIELD, schema.OBSTACLES))
-    obstacles = _with_owners(obstacles, fields)
-    _tell_columns(farm, overview, {schema.FIELD: fields, schema.OBSTACLES: obstacles})
+    _refuse_strange(overview, fields, written)
+    obstacles = _with_owners(obstacles, fields, written)
+    tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}
     now = digests_of(fields, obstacles)
-    edited = [one for one, digest in now.items() if written.get(one) not in (None, digest)]
-    unknown = [one for one in now if one not in written]
-    if unknown:
+    gone = sorted(written.keys() - set(fields[FIELD_ID]))
+    if gone:
+        _tell(
+            f"{overview.name}: {len(gone)} fields are deleted there ({', '.join(gone[:5])}), and a "
+            "farm holds every place. Take their rows out of the places file, then --fresh."
+        )
+    own, own_before = own_digests(tables), _own_before(overview, tables, record)
+    marks = {
+        one: f"{written[one]} {now[one]} {own.get(one)}"
+        for one in fields[FIELD_ID]
+        if now[one] != written[one]
+        or (own_before is not None and own.get(one) != own_before.get(one))
+    }
+    marks = {one: mark for one, mark in marks.items() if taken.get(one) != mark}
+    if not anyway:
+        _refuse_double(farm, overview, marks, record, fields)
+    return Edits(marks, fields, obstacles if record[DETAILS] else None)
+
+
+def _tell(words: str) -> None:
+    warnings.warn(words, FormatWarning, stacklevel=4)
+
+
+def _own_before(
+    overview: Path, tables: Mapping[schema.Layer, gpd.GeoDataFrame], record: Mapping[str, Any]
+) -> dict[str, str] | None:
+    """The digests of a person's own columns as they were; None where they tell nothing."""
+    before = record.get(OWN)
+    if before is None:
+        return None
+    for of, table in tables.items():
+        gone = [name for name in before["columns"].get(of.name, ()) if name not in table]
+        if gone:
+            _tell(
+                f"{overview.name}: columns {', '.join(gone)} of layer {of.name!r} are gone and "
+                "come back; what else was written into columns of your own is not taken in."
+            )
+            return None
+    digests: dict[str, str] = before["digests"]
+    return digests
+
+
+def _refuse_strange(overview: Path, fields: gpd.GeoDataFrame, known: Mapping[str, str]) -> None:
+    """Refuse outlines that are of no field of the farm, or several of one."""
+    ids = fields[FIELD_ID]
+    if ids.isna().any() or not set(ids) <= known.keys():
+        strange = ids[~ids.isin(list(known))].iloc[0]
         raise FormatError(
-            f"{overview.name} has a field {unknown[0]!r} that the farm does not know.",
+            f"{overview.name} has an outline without a field_id."
+            if pd.isna(strange)
+            else f"{overview.name} has a field {strange!r} that the farm does not know.",
             hint="Give it its field_id back; new fields are rows of the places file.",
         )
-    standing = obstacles if record[DETAILS] else None
-    return [_edited(farm, one, fields, standing) for one in edited if one in farm]
+    if ids.duplicated().any():
+        raise FormatError(
+            f"{overview.name} has several outlines of field {ids[ids.duplicated()].iloc[0]!r}.",
+            hint="Delete or merge (Edit > Merge Selected Features) all but one; to have two "
+            "fields, give both a row in the places file.",
+        )
 
 
-def _tell_columns(
-    farm: Farm, overview: Path, tables: Mapping[schema.Layer, gpd.GeoDataFrame]
+def _refuse_double(
+    farm: Farm,
+    overview: Path,
+    edited: Collection[str],
+    record: Mapping[str, Any],
+    fields: gpd.GeoDataFrame,
 ) -> None:
-    """That columns which a person added to the overview do not stay, and what does."""
-    for of, table in tables.items():
-        known = {*farm.layer(of.name).columns, FIELD_ID, EPSG}
-        added = [name for name in schema.own_columns(of, table) if name not in known]
-        if added:
-            warnings.warn(
-                f"{overview.name}: columns {', '.join(added)} of layer {of.name!r} are not the "
-                "farm's and do not stay. Add them to the places file, or to a layer of your own.",
-                FormatWarning,
-                stacklevel=3,
-            )
+    """Refuse edits of fields that were changed elsewhere since the overview was written."""
+    ours = farm.layer(schema.FIELD.name) if edited else fields
+    if not edited or ours.crs != fields.crs:
+        return
+    theirs = farm.layer(schema.OBSTACLES.name).to_crs(ours.crs)
+    theirs = theirs if record[DETAILS] else theirs.iloc[:0]
+    there = digests_of(
+        ours[ours[FIELD_ID].isin(list(edited))], theirs[theirs[FIELD_ID].isin(list(edited))]
+    )
+    double = [one for one in there if there[one] != record[DIGESTS][one]]
+    if double:
+        raise FormatError(
+            f"Field {double[0]} was edited in {overview.name}, and changed in the farm since that "
+            "was written.",
+            hint=f"To have the one of {overview.name}: geofield farm put {overview} "
+            f"{overview.parent}; to have the other, move {overview.name} out of the farm.",
+        )
 
 
 def is_overview(path: Path) -> bool:
@@ -135,28 +263,41 @@ def _table(overview: Path, of: schema.Layer) -> gpd.GeoDataFrame:
     return table.assign(**{FIELD_ID: table.pop("_owner")})
 
 
-def _with_owners(obstacles: gpd.GeoDataFrame, fields: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """Obstacles that a person drew belong to the field that they stand in, or nearest to."""
-    drawn = obstacles[FIELD_ID].isna().to_numpy(bool)
-    if not drawn.any():
+def _with_owners(
+    obstacles: gpd.GeoDataFrame, fields: gpd.GeoDataFrame, known: Mapping[str, str]
+) -> gpd.GeoDataFrame:
+    """Obstacles that a person drew or moved belong to the field that they stand in.
+
+    One that stands in none stays with the field that it names, or else is of the nearest.
+    """
+    outlines, ids = fields.geometry.to_numpy(), pd.Index(fields[FIELD_ID])
+    shapes, owners = obstacles.geometry.to_numpy(), obstacles[FIELD_ID].to_numpy(dtype=object)
+    if not len(ids) or not len(shapes):
         return obstacles
-    tree = shapely.STRtree(fields.geometry.to_numpy())
-    nearest = tree.nearest(shapely.centroid(obstacles.geometry.to_numpy()[drawn]))
-    owners = obstacles[FIELD_ID].to_numpy(dtype=object).copy()
-    owners[drawn] = fields[FIELD_ID].to_numpy(dtype=object)[nearest]
+    tree, at = shapely.STRtree(outlines), ids.get_indexer(owners)
+    stands = np.isin(np.arange(len(shapes)), tree.query(shapes, predicate="intersects")[0])
+    elsewhere = (at >= 0) & stands & shapely.disjoint(outlines[at], shapes)
+    nameless = ~np.isin(owners.astype(str), list(known))
+    other = (elsewhere | nameless) & ~shapely.is_missing(shapes) & ~shapely.is_empty(shapes)
+    if not other.any():
+        return obstacles
+    nearest = tree.nearest(shapely.centroid(shapes[other]))
+    owners = owners.copy()
+    owners[other] = ids.to_numpy(dtype=object)[nearest]
     return obstacles.assign(**{FIELD_ID: owners})
 
 
-def _edited(
-    farm: Farm, field_id: str, fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame | None
-) -> Plan:
-    plan = farm[field_id]
+def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
+    """A plan as it was edited, its tracks planned again; `outlines` are the farm's, by id."""
+    field_id = plan.field.field_id
+    fields, obstacles = edits.fields, edits.obstacles
     row = fields[fields[FIELD_ID] == field_id].to_crs(plan.field.crs).iloc[0]
-    ours = farm.layer(schema.FIELD.name)
-    before = ours[ours[FIELD_ID] == field_id].geometry.iloc[0]
+    own = _own_of(plan.field, row, _own_names(schema.FIELD, fields))
+    field = replace(plan.field, own=own)
+    if not pd.isna(row["name"]):
+        field = replace(field, name=str(row["name"]))
     after = fields[fields[FIELD_ID] == field_id].geometry.iloc[0]
-    field = plan.field if pd.isna(row["name"]) else replace(plan.field, name=str(row["name"]))
-    if not np.array_equal(shapely.get_coordinates(before), shapely.get_coordinates(after)):
+    if not shapely.equals_exact(outlines[field_id], after, _SAME):
         field = replace(
             field, polygon=_polygon(row.geometry, field_id), method="drawn", quality=None
         )
@@ -172,6 +313,22 @@ def _edited(
         raise FormatError(f"Field {field_id}, as edited: {error}", hint=error.hint) from error
 
 
+def _own_of(field: Field, row: pd.Series[Any], names: list[str]) -> tuple[tuple[str, Any], ...]:
+    """The columns of a person's own, as they were where the file says the same."""
+    own = dict(field.own)
+    for name in names:
+        before, value = own.get(name), row[name]
+        if _text(before) == _text(value) or str(before) == str(value):
+            own.setdefault(name, None)
+        elif pd.isna(value):
+            own[name] = None
+        elif isinstance(before, int) and isinstance(value, Real) and float(value).is_integer():
+            own[name] = int(float(value))
+        else:
+            own[name] = value.item() if isinstance(value, np.generic) else value
+    return tuple(own.items())
+
+
 def _polygon(shape: Any, field_id: str) -> shapely.Polygon:
     parts = [each for each in shapely.get_parts(shape) if isinstance(each, shapely.Polygon)]
     if len(parts) != 1 or not parts[0].is_valid:
@@ -182,23 +339,54 @@ def _polygon(shape: Any, field_id: str) -> shapely.Polygon:
     return parts[0]
 
 
-def put_edits(folder: Path, overview: Path) -> list[str]:
-    """Take the edits of an overview into the farm; the ids of the fields.
+def put_edits(
+    folder: Path,
+    overview: Path,
+    *,
+    only: Collection[str] | None = None,
+    but: str | None = None,
+    anyway: bool = False,
+) -> tuple[list[str], list[str]]:
+    """Take the edits of an overview into the farm, or `only` those of some fields.
+
+    Fields that were changed elsewhere, too, are refused unless the edits are to hold `anyway`;
+    `but` is a field of which another plan is about to be put back.
+
+    Returns
+    -------
+    ids : list of str
+        The fields that are now as edited.
+    waiting : list of str
+        Edited fields of which the farm has no plan, or not yet.
 
     Raises
     ------
     FormatError
         When an edit cannot be understood; the farm is as it was then.
     """
-    from geofield.farm.reviewed import put_back
     from geofield.farm.value import read_farm
 
     if not overview.is_file():
-        return []
-    plans = take_edits(read_farm(folder), overview)
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        for plan in plans:
-            file = Path(name) / "field.gpkg"
-            save_plan(plan, file, overwrite=True)
-            put_back(file, folder)
-    return [plan.field.field_id for plan in plans]
+        return [], []
+    store, farm = Store.of(folder), read_farm(folder)
+    taken = json.loads(store.get(TAKEN) or b"{}")
+    edits = _edits(farm, overview, taken, anyway=anyway)
+    if but in edits.marks:
+        raise FormatError(
+            f"Field {but} is edited in {overview.name}, too.",
+            hint=f"Take those edits in first: geofield farm put {overview} {folder}. What is put "
+            "back last, holds.",
+        )
+    asked = [one for one in edits.marks if only is None or one in only]
+    here = [one for one in asked if one in farm]
+    outlines = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
+    outlines = outlines.to_crs(edits.fields.crs)
+    plans = [_edited(farm[one], edits, outlines) for one in here]
+
+    def note() -> None:
+        store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
+        store.put(CHANGED, b"")
+
+    if plans:
+        put_plans(plans, store, note)
+    return here, [one for one in asked if one not in farm]

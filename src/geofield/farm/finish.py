@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from geofield.farm.edits import TAKEN
 from geofield.farm.failed import write_failed
 from geofield.farm.marks import CHANGED, WORK
 from geofield.farm.overview import OVERVIEW, write_overview
@@ -54,4 +55,5 @@ def _overview(store: Store) -> list[str]:
         if (store.folder / OVERVIEW).is_file():
             # What a person keeps in it beside the farm comes along.
             bring_guests(store.folder / OVERVIEW, staging / OVERVIEW)
+    store.remove(TAKEN)
     return [file.name for file in files]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
-from geofield.farm.edits import DETAILS, DIGESTS, digests_of
+from geofield.farm.edits import DETAILS, DIGESTS, digests_of, remember_own
 from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined
@@ -61,6 +61,7 @@ def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path
     """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project."""
     with staged_folder(folder, overwrite=True) as staging:
         written = write_gpkg(dataset_of(farm, name), staging, stem=STEM, options={})
+        remember_own(staging / OVERVIEW)
     return [folder / path.name for path in written]
 
 

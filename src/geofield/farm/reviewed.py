@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
+from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -15,6 +16,7 @@ from geofield.farm.layers import KEPT, stacked, tables_of
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
+from geofield.plan_files import save_plan
 from geofield.staging.generations import copy_whole
 
 if TYPE_CHECKING:
@@ -70,19 +72,25 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
     plan = read_plan(plan_file)
     field_id = plan.field.field_id
-    for chunk in committed(store):
-        status = read_part(store, STATUS, chunk)
-        if status is not None and field_id in status["field_id"].to_pylist():
-            break
-    else:
+    if not _chunks_with(store, {field_id}):
         raise FormatError(
             f"{folder} has no field {field_id!r}.",
             hint="The field's id must be that of the farm: see its status table.",
         )
     # First what must not be lost; the tables follow from it.
     store.put(file_of(field_id), _file_bytes(plan_file))
-    _replace(store, chunk, plan, status)
+    _replace(store, [plan])
     return field_id
+
+
+def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None]) -> None:
+    """Put plans of fields of the farm back; `note` is called when none of them can be lost."""
+    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
+        file = Path(name) / "field.gpkg"
+        for plan in plans:
+            save_plan(plan, file, overwrite=True)
+            store.put(file_of(plan.field.field_id), _file_bytes(file))
+    _replace(store, plans, note)
 
 
 def _file_bytes(path: Path) -> bytes:
@@ -93,30 +101,52 @@ def _file_bytes(path: Path) -> bytes:
         return copy.read_bytes()
 
 
-def _replace(store: Store, chunk: int, plan: Plan, status: pa.Table) -> None:
-    """Write a chunk again with one plan in the place of another."""
-    mine, ids, fresh = plan.field.field_id, status["field_id"].to_pylist(), tables_of([plan])
-    tables = {name: read_part(store, name, chunk) for name in KEPT}
-    merged = {
-        name: _spliced(tables[name], fresh.get(name), mine, ids)
-        for name in KEPT
-        if name in fresh or tables[name] is not None
+def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
+    """The status of the chunks in which fields are."""
+    found = {chunk: read_part(store, STATUS, chunk) for chunk in committed(store)}
+    return {
+        chunk: status
+        for chunk, status in found.items()
+        if status is not None and not ids.isdisjoint(status["field_id"].to_pylist())
     }
-    said = outcome_words(plan) | _SAID
-    rows = [
-        Outcome(**row | said if row["field_id"] == mine else row) for row in outcomes_of(status)
-    ]
-    # Rows of layers that are no longer there must not stay.
-    store.remove(file_in(STATUS, chunk))
-    write_chunk(store, chunk, merged, status_table(rows))
 
 
-def _spliced(old: Any, new: Any, field_id: str, ids: list[str]) -> pa.Table:
-    """A table with one field's rows exchanged, the fields in their order."""
+def _replace(store: Store, plans: Sequence[Plan], note: Callable[[], None] | None = None) -> None:
+    """Write chunks again with plans in the place of others."""
+    by_id = {plan.field.field_id: plan for plan in plans}
+    chunks = _chunks_with(store, by_id.keys())
+    for chunk in chunks:
+        # Without it a chunk does not count: where all ends here, it is planned again.
+        store.remove(file_in(STATUS, chunk))
+    if note is not None:
+        note()
+    for chunk, status in chunks.items():
+        ids = status["field_id"].to_pylist()
+        mine = {one: by_id[one] for one in ids if one in by_id}
+        fresh = tables_of(mine.values())
+        tables = {name: read_part(store, name, chunk) for name in KEPT}
+        merged = {
+            name: _spliced(tables[name], fresh.get(name), list(mine), ids)
+            for name in KEPT
+            if name in fresh or tables[name] is not None
+        }
+        rows = [
+            row | outcome_words(mine[row["field_id"]]) | _SAID if row["field_id"] in mine else row
+            for row in outcomes_of(status)
+        ]
+        write_chunk(store, chunk, merged, status_table([Outcome(**row) for row in rows]))
+
+
+def _spliced(old: Any, new: Any, mine: list[str], ids: list[str]) -> pa.Table:
+    """A table with the rows of some fields exchanged, the fields in their order."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    rest = None if old is None else old.filter(pc.not_equal(old["field_id"], field_id))
+    rest = (
+        None
+        if old is None
+        else old.filter(pc.invert(pc.is_in(old["field_id"], pa.array(mine, pa.string()))))
+    )
     parts = [part for part in (rest, new) if part is not None]
     whole = stacked(parts)
     at = pc.index_in(whole["field_id"], pa.array(ids, pa.string()))
