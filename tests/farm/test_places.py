@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
+import shapely.affinity
 
 import geofield as gf
 from geofield.errors import CRSError, FormatError
@@ -208,3 +209,59 @@ def test_a_place_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
     with pytest.warns(gf.GeofieldWarning, match="b .*500 m is larger than the field"):
         plans = list(gf.plan_fields(tmp_path / "wide.gpkg"))
     assert {plan.field.field_id for plan in plans} == {"a", "c"}
+
+
+def test_a_parcel_across_the_180th_meridian_is_one_place(tmp_path: Path) -> None:
+    """Cut there as GeoJSON asks for, jumping there, or with longitudes from 0 to 360."""
+    south, north = -17.0, -16.998
+    cut = shapely.MultiPolygon(
+        [shapely.box(179.999, south, 180, north), shapely.box(-180, south, -179.999, north)]
+    )
+    sides = (179.999, -179.999, -179.999, 179.999)
+    jumping = shapely.Polygon(list(zip(sides, (south, south, north, north), strict=True)))
+    turned = shapely.box(179.999, south, 180.001, north)
+    gpd.GeoDataFrame(
+        {"id": ["cut", "jumping", "turned"]}, geometry=[cut, jumping, turned], crs=4326
+    ).to_file(tmp_path / "fiji.gpkg")
+    places = read_places(tmp_path / "fiji.gpkg")
+    assert places.ids.to_pylist() == ["cut", "jumping", "turned"]
+    assert np.abs(places.lon) == pytest.approx(180.0)
+    for plan in gf.plan_fields(places, spacing_m=10):
+        assert plan.field.crs.to_epsg() == 32701
+        assert plan.field.area_ha == pytest.approx(4.714, abs=1e-3)
+
+
+def test_rows_without_shape_and_ids_of_parts(tmp_path: Path) -> None:
+    one = shapely.box(15, 47, 15.001, 47.001)
+    two = shapely.MultiPolygon([one, shapely.affinity.translate(one, 0.01)])
+    gpd.GeoDataFrame(
+        {"id": ["a", "a.1", "b", "c"]}, geometry=[two, one, None, shapely.Polygon()], crs=4326
+    ).to_file(tmp_path / "odd.gpkg")
+    places = read_places(tmp_path / "odd.gpkg")
+    assert places.ids.to_pylist() == ["a.1-2", "a.2", "a.1", "b", "c"]
+    # They fail, and say so.
+    assert np.isfinite(places.lat).tolist() == [True, True, True, False, False]
+    assert not any("left out" in note for note in places.notes)
+
+
+def test_text_shapes_are_in_the_crs_that_is_named(tmp_path: Path) -> None:
+    shape = shapely.box(500_000, 5_300_000, 500_100, 5_300_100)
+    (tmp_path / "utm.csv").write_text(f'id,wkt\n1,"{shape.wkt}"\n')
+    places = read_places(tmp_path / "utm.csv", crs="EPSG:32633")
+    assert places.lat[0] == pytest.approx(47.8538, abs=1e-3)
+    with pytest.raises(FormatError, match="no position on earth"):
+        read_places(tmp_path / "utm.csv")
+
+
+def test_layers_and_rows_that_are_none(tmp_path: Path) -> None:
+    kml = '<kml xmlns="http://www.opengis.net/kml/2.2"><Document></Document></kml>'
+    (tmp_path / "none.kml").write_text(kml)
+    with pytest.raises(FormatError, match="holds no layers"):
+        read_places(tmp_path / "none.kml")
+    as_frame(POINTS).to_file(tmp_path / "a.gpkg", layer="fields")
+    with pytest.raises(FormatError, match=r"no layer 'felds'.*fields"):
+        read_places(tmp_path / "a.gpkg", layer="felds")
+    (tmp_path / "a.csv").write_text("id,lat,lon\n1,47.5,15.3,a,b\n")
+    with pytest.raises(FormatError) as told:
+        read_places(tmp_path / "a.csv")
+    assert "as many values as the first" in str(told.value.hint)

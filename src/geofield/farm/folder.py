@@ -88,7 +88,10 @@ class Record:
             numbers = (int(content[name]) for name in ("chunk_fields", "chunks"))
             return cls(str(content["digest"]), *plain, *numbers)
         except (KeyError, TypeError, ValueError) as error:
-            raise FormatError(f"{store.shown}/{RECORD} is damaged: {error!r}.") from None
+            raise FormatError(
+                f"{store.shown}/{RECORD} is damaged: {error!r}.",
+                hint="Bring it back from a copy, or choose another --out.",
+            ) from None
 
 
 def file_of(layer: str, chunk: int) -> str:

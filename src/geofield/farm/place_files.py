@@ -14,6 +14,7 @@ import shapely
 from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
 from geofield.strangers import check_vector
+from geofield.wording import nearest
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -36,6 +37,8 @@ class RawPlaces:
     geometry_name: str = ""
     #: Of the geometry, as the file says; None where it does not.
     crs: Any = None
+    #: Whether coordinates without a CRS are degrees.
+    in_degrees: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -110,7 +113,10 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         if "Empty CSV" in str(error):
             raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS) from None
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Save it as UTF-8.") from None
+        hint = "Save it as UTF-8."
+        if "Expected" in str(error) and b"\0" not in head:
+            hint = "Each row has as many values as the first: quote texts that hold commas."
+        raise FormatError(f"{path} cannot be read: {error}.", hint=hint) from None
     if len(set(names)) < len(names):
         raise FormatError(f"{path} has two columns of the same name.")
     column = next((name for name in names if name.lower() in _GEOMETRY), None)
@@ -119,7 +125,7 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     wkt = table[column].to_numpy()
     shapes = shapely.from_wkt(wkt, on_invalid="ignore")
     geometry = pa.array(shapely.to_wkb(shapes), pa.binary(), from_pandas=True)
-    return RawPlaces(path.name, table.drop_columns(column), geometry, column, "EPSG:4326")
+    return RawPlaces(path.name, table.drop_columns(column), geometry, column, in_degrees=True)
 
 
 def _parquet(path: Path) -> RawPlaces:
@@ -159,7 +165,15 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
 
     check_vector(path)
     try:
-        layers = [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        listed = pyogrio.list_layers(path)
+        layers = [str(name) for name, kind in listed if kind is not None]
+        if not len(listed):
+            raise FormatError(f"{path} holds no layers.", hint=_ROWS)
+        if layer is not None and layer not in listed[:, 0]:
+            raise FormatError(
+                f"{path} has no layer {layer!r}.{nearest(layer, layers)}",
+                hint=f"It has {', '.join(layers[:8])}.",
+            )
         if layer is None and "field" in layers:
             layer = "field"
         if layer is None and len(layers) > 1:

@@ -19,6 +19,7 @@ from geofield.errors import CRSError, FormatError
 from geofield.farm.place_files import RawPlaces, raw_of, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
+from geofield.formats.antimeridian import joined
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.names import unlike
 from geofield.model.place import position_words
@@ -130,6 +131,8 @@ def _found(raw: RawPlaces, asked: str | None, usual: Sequence[str]) -> str | Non
 
 
 def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
+    if raw.crs is None and crs is None and raw.in_degrees:
+        return LONLAT
     if raw.crs is None and crs is None:
         raise CRSError(
             f"{raw.name} does not say its CRS.", hint="Name it: --crs EPSG:4326, for instance."
@@ -152,6 +155,8 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
     for begin in range(0, len(geometry), _BATCH):
         binary = geometry.slice(begin, _BATCH).to_numpy(zero_copy_only=False)
         shapes = shapely.force_2d(shapely.from_wkb(binary, on_invalid="fix"))
+        shapes = joined(shapes, source)  # a parcel cut at 180 degrees is one
+        shapes[shapely.is_empty(shapes)] = None
         single, row = shapely.get_parts(shapes, return_index=True)
         # A row without shape is a place that fails and says so.
         absent = np.setdiff1d(np.arange(len(shapes)), row)
@@ -184,10 +189,12 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
         notes.append(
             f"{len(np.unique(rows[parts > 0]))} parcels have several parts: each is a field."
         )
-    joined = pa.concat_arrays(outlines)
+    every = pa.concat_arrays(outlines)
     _refuse_degrees(raw, source, np.concatenate(xs), np.concatenate(ys))
     lon, lat = transformer(source, LONLAT).transform(np.concatenate(xs), np.concatenate(ys))
-    return rows, parts, joined if joined.null_count < len(joined) else None, lat, lon
+    if source.is_geographic:  # longitudes from 0 to 360, as of joined parcels
+        lon = np.where((lon > 180.0) & (lon < 360.0), lon - 360.0, lon)
+    return rows, parts, every if every.null_count < len(every) else None, lat, lon
 
 
 def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
@@ -229,7 +236,10 @@ def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
         Saying whether the two look swapped, or some rows are in another CRS.
     """
     if not (np.isfinite(lat) & np.isfinite(lon)).any():
-        raise FormatError(f"{raw.name} holds no row with a position.")
+        raise FormatError(
+            f"{raw.name} holds no row with a position.",
+            hint="Give each field a latitude and a longitude, or a shape.",
+        )
     wrong = np.flatnonzero((np.abs(lat) > 90) | (np.abs(lon) > 180))
     if not len(wrong):
         return
@@ -282,7 +292,7 @@ def _names(
     taken = {one for one in ids if one}
     for at, one in enumerate(ids):
         if one:
-            ids[at] = f"{one}.{part[at]}" if part[at] else one
+            ids[at] = unlike(f"{one}.{part[at]}", taken, "-", key=str) if part[at] else one
         else:
             ids[at] = unlike(_place_id(lat[at], lon[at], int(kept[at]) + 1), taken, "-", key=str)
     others: Sequence[str | None] = ids
