@@ -317,3 +317,22 @@ def test_tracks_of_many_parcels_keep_what_was_edited(folder: Path) -> None:
     said = geofield(*asked, "--spacing", 8, "-o", folder / "farm", "--overwrite")
     assert "c as edited" in said
     assert "rejected" in set(gf.read_farm(folder / "farm")["c"].obstacles["status"])
+
+
+def test_an_outline_put_back_without_its_tracks_gets_them(folder: Path) -> None:
+    geofield("farm", "get", folder / "farm", "a", "-o", folder / "a.gpkg")
+    plan = pyogrio.read_dataframe(folder / "a.gpkg", layer="field")
+    plan = plan.set_geometry(plan.geometry.scale(0.5, 1))
+    pyogrio.write_dataframe(plan, folder / "a.gpkg", layer="field", geometry_name="geom")
+    said = geofield("farm", "put", folder / "a.gpkg", folder / "farm")
+    assert "planned again" in said
+    after = gf.read_farm(folder / "farm")["a"]
+    assert after.tracks.segments.within(after.field.polygon.buffer(0.01)).all()
+    assert after.field.area_ha == pytest.approx(0.72, abs=0.01)
+    # One that was not edited, and in the other format that holds a plan.
+    geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg")
+    geofield("export", folder / "b.gpkg", "--format", "turtle", "--out", folder / "ttl")
+    assert "planned again" not in geofield(
+        "farm", "put", folder / "ttl" / "field.ttl", folder / "farm"
+    )
+    assert gf.read_plan(folder / "farm" / "reviewed" / "b.gpkg").field.field_id == "b"

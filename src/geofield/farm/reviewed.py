@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
+import warnings
 from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from geofield.errors import FormatError
+from geofield.errors import FieldWarning, FormatError
 from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import KEPT, stacked, tables_of
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
+from geofield.farm.value import read_farm
+from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.staging.generations import copy_whole
@@ -60,45 +63,75 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
 def put_back(plan_file: Path, folder: str | Path) -> str:
     """Put a reviewed plan back into a farm, in the place of the one that is there; the field's id.
 
-    The plan itself is kept in the farm, so that no later run changes what a person said.
+    The plan itself is kept in the farm, so that no later run changes what a person said. Tracks
+    that are still those of the farm, with another outline or other obstacles, are planned again.
 
     Raises
     ------
     FormatError
         When there is no such field in the farm.
+    TrackError
+        When its tracks cannot be planned again.
+
+    Warns
+    -----
+    FieldWarning
+        When its tracks were planned again.
     """
     store = Store.of(folder)
     if Record.read(store) is None:
         raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
-    plan = read_plan(plan_file)
+    plan, farm = read_plan(plan_file), read_farm(folder)
     field_id = plan.field.field_id
     if not _chunks_with(store, {field_id}):
         raise FormatError(
             f"{folder} has no field {field_id!r}.",
             hint="The field's id must be that of the farm: see its status table.",
         )
-    # First what must not be lost; the tables follow from it.
-    store.put(file_of(field_id), _file_bytes(plan_file))
+    before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
+    settings = plan.settings or (before and before.settings)
+    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
+        file = Path(name) / "field.gpkg"
+        whole = plan_file.suffix.lower() == _SUFFIX
+        if whole:
+            # With all that was written to it, also where a program has it open.
+            copy_whole(plan_file, file)
+        if settings is not None and not _has_its_tracks(plan, before):
+            plan, whole = run_tracks(plan, settings=settings), False
+            warnings.warn(
+                f"{plan.field.name}: its tracks were not those of its outline and obstacles, and "
+                "are planned again.",
+                FieldWarning,
+                stacklevel=2,
+            )
+        if not whole:
+            save_plan(plan, file, overwrite=True)
+        # First what must not be lost; the tables follow from it.
+        store.put(file_of(field_id), file.read_bytes())
     _replace(store, [plan])
     return field_id
 
 
-def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None]) -> None:
+def _has_its_tracks(plan: Plan, before: Plan | None) -> bool:
+    """Whether a plan has tracks, and they were planned since its outline or obstacles changed."""
+    if plan.tracks is None or before is None or before.tracks is None:
+        return plan.tracks is not None
+    if not plan.tracks.segments.geometry.equals(before.tracks.segments.geometry):
+        return True
+    same = plan.field.polygon.equals_exact(before.field.polygon, 1e-6)
+    if plan.obstacles is None or before.obstacles is None:
+        return same and plan.obstacles is before.obstacles
+    return same and bool(plan.obstacles.equals(before.obstacles))
+
+
+def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | None = None) -> None:
     """Put plans of fields of the farm back; `note` is called when none of them can be lost."""
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         for plan in plans:
             save_plan(plan, file, overwrite=True)
-            store.put(file_of(plan.field.field_id), _file_bytes(file))
+            store.put(file_of(plan.field.field_id), file.read_bytes())
     _replace(store, plans, note)
-
-
-def _file_bytes(path: Path) -> bytes:
-    """A GeoPackage with all that was written to it, also where a program has it open."""
-    with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
-        copy = Path(folder) / path.name
-        copy_whole(path, copy)
-        return copy.read_bytes()
 
 
 def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
