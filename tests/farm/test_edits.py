@@ -184,6 +184,11 @@ def test_columns_of_a_person_stay(folder: Path) -> None:
         assert rows["sown"].fillna(0).to_dict() == {"a": 0, "b": 5, "c": 0, "d": 7.5}
         assert rows["crop"].to_dict() == {"a": "rye", "b": "rye", "c": "oats", "d": "rye"}
     assert farm["a"].obstacles["species"].fillna("").tolist() == ["oak", ""]
+    _sql(path, "UPDATE field SET sown = NULL WHERE field_id = 'b'")
+    said = _batch(folder, "--spacing", 8)
+    assert [one for one in "abcd" if f"{one} as edited" in said] == ["b"]
+    rows = gf.read_farm(folder / "farm").fields.set_index("field_id")
+    assert rows["sown"].fillna(0).to_dict() == {"a": 0, "b": 0, "c": 0, "d": 7.5}
 
 
 def _sql(path: Path, statement: str) -> None:

@@ -256,18 +256,28 @@ def stacked(parts: Sequence[pa.Table]) -> pa.Table:
         try:
             pa.unify_schemas(kinds, promote_options="permissive")
         except pa.ArrowTypeError:
-            parts = [_with_text(part, name) for part in parts]
+            told = {
+                one[name].type for one in parts if name in one.column_names and _tells(one, name)
+            }
+            kind = told.pop() if len(told) == 1 else pa.string()
+            parts = [_of_kind(part, name, kind) for part in parts]
     return pa.concat_tables(parts, promote_options="permissive")
 
 
-def _with_text(table: pa.Table, name: str) -> pa.Table:
+def _tells(table: pa.Table, name: str) -> bool:
+    """Whether a column has a value."""
+    return bool(table[name].null_count < table.num_rows)
+
+
+def _of_kind(table: pa.Table, name: str, kind: pa.DataType) -> pa.Table:
+    """A table with a column of a kind, which is text where its values are of another."""
     import pyarrow as pa
 
-    if name not in table.column_names:
+    if name not in table.column_names or table[name].type == kind:
         return table
-    texts = [None if each is None else str(each) for each in table[name].to_pylist()]
-    at = table.column_names.index(name)
-    return table.set_column(at, name, pa.array(texts, pa.string()))
+    values = [None if each is None else str(each) for each in table[name].to_pylist()]
+    column = pa.array(values, pa.string()) if _tells(table, name) else pa.nulls(len(table), kind)
+    return table.set_column(table.column_names.index(name), name, column)
 
 
 def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:

@@ -89,7 +89,7 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
             hint="The field's id must be that of the farm: see its status table.",
         )
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
-    settings = plan.settings or (before and before.settings)
+    settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         whole = plan_file.suffix.lower() == _SUFFIX
