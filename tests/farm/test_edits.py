@@ -234,6 +234,9 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
     assert status["notes"]["c"] == (
         "The reviewed outline stands; that of the places differs by 0.14 ha."
     )
+    _parcels(folder, lambda table: table.assign(id=["a", "b", "C", "d"]))
+    said = " ".join(_batch(folder, "--fresh").split())
+    assert "1 reviewed plans are of no id in parcels.gpkg, and wait for one: reviewed/c" in said
 
 
 def test_any_id_can_be_reviewed(folder: Path) -> None:

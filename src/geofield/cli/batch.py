@@ -115,6 +115,7 @@ def batch(
     """
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
+    from geofield.farm.reviewed import without_place
     from geofield.farm.run import run_farm
     from geofield.farm.store import Store
     from geofield.farm.work import Job
@@ -141,6 +142,12 @@ def batch(
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
             imagery=about, control=control, tell=lambda at: _show(progress, at),
         )  # fmt: skip
+    unused = without_place(store, found.ids.to_pylist()) if count.done > count.before else []
+    if unused:
+        say_note(
+            f"{len(unused)} reviewed plans are of no id in {places.name}, and wait for one: "
+            f"{', '.join(unused[:5])}."
+        )
     waiting = waiting and take_in(store, waiting)
     files = finish(store, found, anew=count.done > count.before, overview=overview and not waiting)
     if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -45,6 +45,11 @@ def file_of(field_id: str) -> str:
 def reviewed_files(store: Store) -> frozenset[str]:
     """The plans that a person put back, as :func:`file_of` names them."""
     return frozenset(f"{REVIEWED}/{name}" for name in store.names(REVIEWED))
+
+
+def without_place(store: Store, ids: Iterable[str]) -> list[str]:
+    """The plans that a person put back, and that are of no place with one of these ids."""
+    return sorted(reviewed_files(store) - {file_of(one) for one in ids})
 
 
 def reviewed_plan(store: Store, field_id: str) -> Plan:
