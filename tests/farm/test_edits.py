@@ -252,6 +252,17 @@ def test_any_id_can_be_reviewed(folder: Path) -> None:
     assert set(farm.obstacles["status"]) == {"rejected"}
 
 
+def test_a_column_that_has_another_name_in_the_file(tmp_path: Path) -> None:
+    shape = shapely.box(15, 47, 15.001, 47.001).wkt
+    (tmp_path / "a.csv").write_text(f'id,geom,wkt\na,5,"{shape}"\n')
+    asked = ("batch", tmp_path / "a.csv", "--spacing", 6, "--workers", 1, "--out", tmp_path / "own")
+    geofield(*asked)
+    # The shapes are called geom there.
+    _sql(tmp_path / "own" / "farm.gpkg", "UPDATE field SET geom_2 = 7")
+    geofield(*asked)
+    assert gf.read_farm(tmp_path / "own")["a"].field.own == (("geom", 7),)
+
+
 def test_edits_wait_for_the_plan_of_their_field(folder: Path) -> None:
     """A run that was killed leaves an overview with fields that are not planned anew yet."""
     path = folder / "farm" / "farm.gpkg"

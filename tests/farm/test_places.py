@@ -265,3 +265,14 @@ def test_layers_and_rows_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(FormatError) as told:
         read_places(tmp_path / "a.csv")
     assert "as many values as the first" in str(told.value.hint)
+
+
+def test_columns_of_a_user_are_none_of_ours_and_each_once(tmp_path: Path) -> None:
+    shape = shapely.box(15, 47, 15.001, 47.001)
+    heads = ["id", "area_ha", "place_area_ha", "FID", "geom"]
+    (tmp_path / "own.csv").write_text(f'{",".join(heads)},wkt\n1,2,3,4,5,"{shape.wkt}"\n')
+    places = read_places(tmp_path / "own.csv")
+    told = ["place_area_ha_2", "place_area_ha", "place_FID", "geom"]
+    assert places.own.column_names == told
+    assert places.own.to_pylist() == [dict(zip(told, [2, 3, "4", 5], strict=True))]
+    assert places.parcels

@@ -46,7 +46,8 @@ if TYPE_CHECKING:
 DIGESTS = "fields_as_written"
 #: And whether it has obstacles at all: those of large farms are left out.
 DETAILS = "has_obstacles"
-#: What stands in columns of a person's own: their names by layer, and a digest per field.
+#: What stands in columns of a person's own: by layer their names in the file, with those in the
+#: farm, and a digest per field.
 OWN = "own_as_written"
 #: The edits that the farm holds already, while the overview is older than it.
 TAKEN = f"{REVIEWED}/.taken.json"
@@ -100,10 +101,17 @@ def _text(value: Any) -> str:
     return repr(float(value)) if isinstance(value, Real) else str(value)
 
 
-def remember_own(overview: Path) -> None:
-    """Note in an overview what its columns of a person's own hold, as they read from the file."""
+def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> None:
+    """Note in an overview what its columns of a person's own hold, as they read from the file.
+
+    `written` are the tables that it was made of: in the file some columns have other names.
+    """
     tables = {of: _table(overview, of) for of in (schema.FIELD, schema.OBSTACLES)}
-    names = {of.name: _own_names(of, table) for of, table in tables.items()}
+    names = {
+        of.name: dict(zip(_own_names(of, table), _own_names(of, written[of.name]), strict=True))
+        for of, table in tables.items()
+        if of.name in written
+    }
     with closing(sqlite3.connect(overview)) as file, file:
         (text,) = file.execute(
             "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
@@ -125,6 +133,8 @@ class Edits:
     fields: gpd.GeoDataFrame
     #: None where the overview has none.
     obstacles: gpd.GeoDataFrame | None
+    #: By layer, what columns of a person's own are called in the file, and in the farm.
+    names: Mapping[str, Mapping[str, str]]
 
 
 def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
@@ -159,7 +169,8 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     marks = {one: mark for one, mark in marks.items() if taken.get(one) != mark}
     if not anyway:
         _refuse_double(farm, overview, marks, record, fields)
-    return Edits(marks, fields, obstacles if record[DETAILS] else None)
+    standing = obstacles if record[DETAILS] else None
+    return Edits(marks, fields, standing, record.get(OWN, {}).get("columns", {}))
 
 
 def _tell(words: str) -> None:
@@ -292,7 +303,9 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     field_id = plan.field.field_id
     fields, obstacles = edits.fields, edits.obstacles
     row = fields[fields[FIELD_ID] == field_id].to_crs(plan.field.crs).iloc[0]
-    own = _own_of(plan.field, row, _own_names(schema.FIELD, fields))
+    called = edits.names.get(schema.FIELD.name, {})
+    names = {name: called.get(name, name) for name in _own_names(schema.FIELD, fields)}
+    own = _own_of(plan.field, row, names)
     field = replace(plan.field, own=own)
     if not pd.isna(row["name"]):
         field = replace(field, name=str(row["name"]))
@@ -305,6 +318,7 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     if obstacles is not None:
         table = obstacles[obstacles[FIELD_ID] == field_id].to_crs(field.crs)
         table = table.drop(columns=[name for name in (FIELD_ID, EPSG) if name in table])
+        table = table.rename(columns=edits.names.get(schema.OBSTACLES.name, {}))
         standing = schema.conform(schema.OBSTACLES, table, extras=True)
     settings = plan.settings or Settings()
     try:
@@ -313,11 +327,13 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
         raise FormatError(f"Field {field_id}, as edited: {error}", hint=error.hint) from error
 
 
-def _own_of(field: Field, row: pd.Series[Any], names: list[str]) -> tuple[tuple[str, Any], ...]:
+def _own_of(
+    field: Field, row: pd.Series[Any], names: Mapping[str, str]
+) -> tuple[tuple[str, Any], ...]:
     """The columns of a person's own, as they were where the file says the same."""
     own = dict(field.own)
-    for name in names:
-        before, value = own.get(name), row[name]
+    for there, name in names.items():
+        before, value = own.get(name), row[there]
         if _text(before) == _text(value) or str(before) == str(value):
             own.setdefault(name, None)
         elif pd.isna(value):

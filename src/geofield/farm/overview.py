@@ -60,8 +60,9 @@ _DETAILS = tuple(
 def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path]:
     """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project."""
     with staged_folder(folder, overwrite=True) as staging:
-        written = write_gpkg(dataset_of(farm, name), staging, stem=STEM, options={})
-        remember_own(staging / OVERVIEW)
+        dataset = dataset_of(farm, name)
+        written = write_gpkg(dataset, staging, stem=STEM, options={})
+        remember_own(staging / OVERVIEW, dataset.tables)
     return [folder / path.name for path in written]
 
 

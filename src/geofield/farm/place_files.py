@@ -119,7 +119,8 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
         raise FormatError(f"{path} cannot be read: {error}.", hint=hint) from None
     if len(set(names)) < len(names):
         raise FormatError(f"{path} has two columns of the same name.")
-    column = next((name for name in names if name.lower() in _GEOMETRY), None)
+    texts_in = [name for name in names if pa.types.is_string(table.schema.field(name).type)]
+    column = next((name for name in texts_in if name.lower() in _GEOMETRY), None)
     if column is None:
         return RawPlaces(path.name, table)
     wkt = table[column].to_numpy()

@@ -99,7 +99,7 @@ def read_places(
     ids, names = _names(raw, id_name, name_name, unnamed, kept, part, lat, lon)
     return Places(
         where, ids, names, lat, lon, kept + 1, outlines, source,
-        own.rename_columns([_unlike_ours(name) for name in own.column_names]),
+        own.rename_columns(_unlike_ours(own.column_names)),
         said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip
 
@@ -323,7 +323,10 @@ def _place_id(lat: float, lon: float, row: int) -> str:
     return position_words(lat, lon, 4)
 
 
-def _unlike_ours(name: str) -> str:
-    """A name for a user's column that is none of ours."""
+def _unlike_ours(names: Sequence[str]) -> list[str]:
+    """Names for a user's columns that are none of ours, each once."""
     ours = {*schema.FIELD.column_names, "geometry", "geometry_utm", "utm_epsg", "bbox", "chunk"}
-    return f"place_{name}" if name.lower() in ours or name.lower() == "fid" else name
+    taken = {name for name in names if name.lower() not in {*ours, "fid"}}
+    return [
+        name if name in taken else unlike(f"place_{name}", taken, "_", key=str) for name in names
+    ]
