@@ -8,7 +8,6 @@ farm put``.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sqlite3
 import warnings
@@ -25,6 +24,7 @@ import shapely
 
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning, GeofieldError
+from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
 from geofield.farm.folder import REVIEWED
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.farm.marks import CHANGED
@@ -53,52 +53,6 @@ OWN = "own_as_written"
 TAKEN = f"{REVIEWED}/.taken.json"
 #: Outlines that differ by less, in the units of the overview, are the same.
 _SAME = 1e-9
-#: What a person may change, besides shapes.
-_FIELD_WORDS = ("name",)
-_OBSTACLE_WORDS = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
-
-
-def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[str, str]:
-    """A digest per field of what a person may change of it."""
-    parts: dict[str, list[bytes]] = {str(one): [] for one in fields[FIELD_ID]}
-    for table, words in ((fields, _FIELD_WORDS), (obstacles, _OBSTACLE_WORDS)):
-        flat = shapely.orient_polygons(shapely.force_2d(table.geometry.to_numpy()))
-        shapes = shapely.to_wkb(flat, byte_order=1)
-        told = zip(*(table[name].tolist() for name in words), strict=True)
-        for one, shape, row in zip(table[FIELD_ID], shapes, told, strict=True):
-            plain = ["" if pd.isna(value) else str(value) for value in row]
-            parts.setdefault(str(one), []).append(json.dumps(plain).encode() + (shape or b""))
-    return {
-        one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
-        for one, rows in parts.items()
-    }
-
-
-def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:
-    """A digest per field of what stands in columns of a person's own; none for fields without."""
-    parts: dict[str, list[str]] = {}
-    for of, table in tables.items():
-        names = _own_names(of, table)
-        for one, *values in zip(table[FIELD_ID], *(table[each] for each in names), strict=True):
-            told = {each: _text(value) for each, value in zip(names, values, strict=True)}
-            told = {each: text for each, text in told.items() if text}
-            if told:
-                parts.setdefault(str(one), []).append(of.name + json.dumps(told, sort_keys=True))
-    return {
-        one: hashlib.sha256("\0".join(sorted(rows)).encode()).hexdigest()[:16]
-        for one, rows in parts.items()
-    }
-
-
-def _own_names(of: schema.Layer, table: gpd.GeoDataFrame) -> list[str]:
-    return [each for each in schema.own_columns(of, table) if each not in (FIELD_ID, EPSG)]
-
-
-def _text(value: Any) -> str:
-    """A value as text; 7 is the same where missing ones beside it made it 7.0."""
-    if pd.api.types.is_scalar(value) and pd.isna(value):
-        return ""
-    return repr(float(value)) if isinstance(value, Real) else str(value)
 
 
 def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> None:
@@ -108,7 +62,7 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
     """
     tables = {of: _table(overview, of) for of in (schema.FIELD, schema.OBSTACLES)}
     names = {
-        of.name: dict(zip(_own_names(of, table), _own_names(of, written[of.name]), strict=True))
+        of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
         for of, table in tables.items()
         if of.name in written
     }
@@ -304,7 +258,7 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     fields, obstacles = edits.fields, edits.obstacles
     row = fields[fields[FIELD_ID] == field_id].to_crs(plan.field.crs).iloc[0]
     called = edits.names.get(schema.FIELD.name, {})
-    names = {name: called.get(name, name) for name in _own_names(schema.FIELD, fields)}
+    names = {name: called.get(name, name) for name in own_names(schema.FIELD, fields)}
     own = _own_of(plan.field, row, names)
     field = replace(plan.field, own=own)
     if not pd.isna(row["name"]):
@@ -334,7 +288,7 @@ def _own_of(
     own = dict(field.own)
     for there, name in names.items():
         before, value = own.get(name), row[there]
-        if _text(before) == _text(value) or str(before) == str(value):
+        if text_of(before) == text_of(value) or str(before) == str(value):
             own.setdefault(name, None)
         elif pd.isna(value):
             own[name] = None

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
-from geofield.farm.edits import DETAILS, DIGESTS, digests_of, remember_own
+from geofield.farm.as_written import digests_of
+from geofield.farm.edits import DETAILS, DIGESTS, remember_own
 from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined

@@ -1,0 +1,66 @@
+"""Digests of what a person may change in a farm's overview, field by field."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import shapely
+
+from geofield import schema
+from geofield.farm.layers import EPSG, FIELD_ID
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: What a person may change, besides shapes.
+_FIELD_WORDS = ("name",)
+_OBSTACLE_WORDS = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
+
+
+def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[str, str]:
+    """A digest per field of what a person may change of it."""
+    parts: dict[str, list[bytes]] = {str(one): [] for one in fields[FIELD_ID]}
+    for table, words in ((fields, _FIELD_WORDS), (obstacles, _OBSTACLE_WORDS)):
+        flat = shapely.orient_polygons(shapely.force_2d(table.geometry.to_numpy()))
+        shapes = shapely.to_wkb(flat, byte_order=1)
+        told = zip(*(table[name].tolist() for name in words), strict=True)
+        for one, shape, row in zip(table[FIELD_ID], shapes, told, strict=True):
+            plain = ["" if pd.isna(value) else str(value) for value in row]
+            parts.setdefault(str(one), []).append(json.dumps(plain).encode() + (shape or b""))
+    return {
+        one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
+        for one, rows in parts.items()
+    }
+
+
+def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:
+    """A digest per field of what stands in columns of a person's own; none for fields without."""
+    parts: dict[str, list[str]] = {}
+    for of, table in tables.items():
+        names = own_names(of, table)
+        for one, *values in zip(table[FIELD_ID], *(table[each] for each in names), strict=True):
+            told = {each: text_of(value) for each, value in zip(names, values, strict=True)}
+            told = {each: text for each, text in told.items() if text}
+            if told:
+                parts.setdefault(str(one), []).append(of.name + json.dumps(told, sort_keys=True))
+    return {
+        one: hashlib.sha256("\0".join(sorted(rows)).encode()).hexdigest()[:16]
+        for one, rows in parts.items()
+    }
+
+
+def own_names(of: schema.Layer, table: gpd.GeoDataFrame) -> list[str]:
+    """The columns of a person's own in a layer of many fields."""
+    return [each for each in schema.own_columns(of, table) if each not in (FIELD_ID, EPSG)]
+
+
+def text_of(value: Any) -> str:
+    """A value as text; 7 is the same where missing ones beside it made it 7.0."""
+    if pd.api.types.is_scalar(value) and pd.isna(value):
+        return ""
+    return repr(float(value)) if isinstance(value, Real) else str(value)
