@@ -127,10 +127,9 @@ def plan_tracks(
         crs, polygon = polygon.crs, polygon.polygon
     metric_crs = metric(crs)
     _check_lengths(spacing_m=spacing_m, step_m=step_m)
+    _check_limits(min_segment_m=min_segment_m, straight_tolerance_m=straight_tolerance_m)
     if offset_m is not None and not np.isfinite(offset_m):
         raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
-    if not (np.isfinite(min_segment_m) and min_segment_m >= 0.0):
-        raise TrackError(f"min_segment_m is {min_segment_m}; it must be 0 or more metres.")
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
@@ -218,6 +217,12 @@ def _check_lengths(**lengths: float) -> None:
             raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
 
 
+def _check_limits(**limits: float) -> None:
+    for name, value in limits.items():
+        if not (np.isfinite(value) and value >= 0.0):
+            raise TrackError(f"{name} is {value}; it must be 0 or more metres.")
+
+
 def _why(baseline: Baseline, least: int, count: int) -> str:
     """Why this direction was chosen, and what another would save."""
     if not baseline.why:
@@ -285,10 +290,16 @@ def _positions(
 
 
 def _place(through: Any) -> tuple[float, float]:
-    x, y = (through.x, through.y) if hasattr(through, "x") else tuple(through)
+    try:
+        x, y = (float(c) for c in ((through.x, through.y) if hasattr(through, "x") else through))
+    except (TypeError, ValueError) as error:
+        raise TrackError(
+            f"The place to pass through is not two numbers: {through!r}.",
+            hint="Give x and y in the field's CRS, or a shapely point.",
+        ) from error
     if not (np.isfinite(x) and np.isfinite(y)):
         raise TrackError("The place to pass through is not finite.")
-    return float(x), float(y)
+    return x, y
 
 
 def _tracks(
