@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import geopandas as gpd
@@ -510,3 +511,16 @@ def test_spacing_wider_than_the_field() -> None:
 def test_bad_settings_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(TrackError):
         plan_tracks(box(0, 0, 100, 40), crs=CRS, **wrong)  # type: ignore[arg-type]
+
+
+def test_points_follow_a_segment_that_a_person_bent() -> None:
+    planned = plan_tracks(box(0, 0, 100, 8), crs=CRS, spacing_m=4.0, direction=90, step_m=10.0)
+    bent = shapely.LineString(np.array([(0, 2), (30, 42), (100, 42)]) + np.array((X, Y)))
+    dot = shapely.LineString([(X, Y), (X, Y)])
+    segments = planned.segments.copy()
+    segments["geometry"] = [bent, dot]
+    points = replace(planned, segments=segments).points
+    first = points[points["track_no"] == 1]
+    assert shapely.distance(bent, first.geometry.to_numpy()).max() < 1e-6
+    assert len(first) == 13  # 120 m along it, not 108 m from end to end
+    assert np.isfinite(points[["lat", "lon"]].to_numpy()).all()

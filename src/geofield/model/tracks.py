@@ -248,8 +248,8 @@ class Tracks:
 
     def point_chunks(self, rows: int = 200_000) -> Iterator[gpd.GeoDataFrame]:
         """The track points in tables of about `rows` rows, for streaming."""
-        coordinates = shapely.get_coordinates(self.segments.geometry.to_numpy()).reshape(-1, 2, 2)
-        length = np.hypot(*(coordinates[:, 1] - coordinates[:, 0]).T) / self.ground_scale
+        lines = np.asarray(self.segments.geometry.to_numpy(), dtype=object)
+        length = shapely.length(lines) / self.ground_scale
         counts = points_per_segment(length, self.step_m)
         track_no = self.segments["track_no"].to_numpy(dtype=np.int64)
         segment_no = self.segments["segment_no"].to_numpy(dtype=np.int64)
@@ -263,9 +263,18 @@ class Tracks:
             along = np.minimum(
                 (np.arange(total) - first) * self.step_m, np.repeat(length[part], number)
             )
-            start = np.repeat(coordinates[part, 0], number, axis=0)
-            direction = (coordinates[part, 1] - coordinates[part, 0]) / length[part, None]
-            xy = start + along[:, None] * np.repeat(direction, number, axis=0)
+            if (shapely.get_num_coordinates(lines[part]) == 2).all() and length[part].all():
+                ends = shapely.get_coordinates(lines[part]).reshape(-1, 2, 2)
+                direction = (ends[:, 1] - ends[:, 0]) / length[part, None]
+                xy = np.repeat(ends[:, 0], number, axis=0)
+                xy += along[:, None] * np.repeat(direction, number, axis=0)
+            else:
+                # A person bent a segment, or left one without a length.
+                xy = shapely.get_coordinates(
+                    shapely.line_interpolate_point(
+                        np.repeat(lines[part], number), along * self.ground_scale
+                    )
+                )
             lon, lat = transformer(self.crs, LONLAT).transform(xy[:, 0], xy[:, 1])
             columns = {
                 "point_no": np.arange(done + 1, done + total + 1),
