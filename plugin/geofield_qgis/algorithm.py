@@ -10,6 +10,7 @@ from typing import Any
 from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingException,
+    QgsProcessingFeatureSourceDefinition,
     QgsProcessingOutputFile,
     QgsProcessingOutputVectorLayer,
     QgsProcessingParameterBoolean,
@@ -20,6 +21,7 @@ from qgis.core import (
     QgsProcessingParameterVectorLayer,
     QgsProject,
     QgsProviderRegistry,
+    QgsVectorLayer,
 )
 from qgis.PyQt.QtGui import QIcon
 
@@ -231,9 +233,16 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         source = self.parameterAsSource(values, name, context)
         if source is None:
             return []
-        sources.refuse_unsaved(self.parameterAsVectorLayer(values, name, context))
+        sources.refuse_unsaved(self.source_layer(name, values, context))
         path = sources.written(source, folder, name.lower(), context, feedback)
         return [option, path] if option else [path]
+
+    def source_layer(self, name: str, values: Any, context: Any) -> QgsVectorLayer | None:
+        """The layer that a vector source takes its features from, all or the selected ones."""
+        value = values.get(name)
+        if isinstance(value, QgsProcessingFeatureSourceDefinition):
+            values = {**values, name: value.source}
+        return self.parameterAsVectorLayer(values, name, context)
 
     def plan_path(self, values: Any, context: Any) -> str:
         """The GeoPackage of the plan; edits that are not saved are refused."""
@@ -241,10 +250,16 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         if layer is None:
             raise engine.EngineError(tr("Choose a layer of a plan."))
         path = path_of(layer)
-        for other in (context.project() or QgsProject.instance()).mapLayers().values():
-            if path_of(other) == path:
-                sources.refuse_unsaved(other)
+        if not path:
+            raise engine.EngineError(tr("Choose a layer of a plan."))
+        self.refuse_unsaved_plan(path, context)
         return path
+
+    def refuse_unsaved_plan(self, path: str, context: Any) -> None:
+        """Refuse a plan while any of its layers has edits that lie in no file yet."""
+        for layer in (context.project() or QgsProject.instance()).mapLayers().values():
+            if path_of(layer) == path:
+                sources.refuse_unsaved(layer)
 
     def plan_outputs(self, plan: str | Path, values: Any, context: Any) -> dict[str, Any]:
         """The layers of a plan, and their loading."""

@@ -192,9 +192,16 @@ class TracksAlgorithm(GeofieldAlgorithm):
 
     def words(self, values: Any, context: Any, feedback: Any, folder: str) -> Any:
         """See GeofieldAlgorithm."""
-        layer = self.parameterAsVectorLayer(values, "INPUT", context)
+        layer = self.source_layer("INPUT", values, context)
         sources.refuse_unsaved(layer)
         plan = sources.plan_file(layer)
+        if plan is not None:
+            if sources.is_whole(self.parameterAsSource(values, "INPUT", context), layer):
+                self.refuse_unsaved_plan(plan, context)
+            else:
+                part = tr("Only some fields of {0} are taken: the obstacles in it do not count.")
+                feedback.pushWarning(part.format(plan))
+                plan = None
         obstacles = self.source_words(
             "OBSTACLES_TO_AVOID", "--obstacles", values, context, feedback, folder
         )
@@ -395,13 +402,15 @@ class EvaluateAlgorithm(GeofieldAlgorithm):
         for name in ("DETECTED", "TRUTH"):
             words += self.source_words(name, "", values, context, feedback, folder)
         words += ["--layer", "detected", "--json"]
+        environment: dict[str, str] = {}
         picture = self.parameterAsString(values, "PICTURE", context)
         if picture:
             words += ["--draw", picture]
         scene = self.parameterAsRasterLayer(values, "SCENE", context)
         if scene is not None:
-            words += ["--scene", sources.imagery(scene)[0]]
-        return words, {}
+            picture, environment = sources.imagery(scene)
+            words += ["--scene", picture]
+        return words, environment
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""

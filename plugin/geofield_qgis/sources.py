@@ -65,7 +65,7 @@ def refuse_unsaved(layer: QgsMapLayer | None) -> None:
 
 
 def plan_file(layer: QgsMapLayer | None) -> str | None:
-    """The GeoPackage of geofield that a layer belongs to; None for any other layer."""
+    """The plan whose outlines a layer has; None for any other layer."""
     if not isinstance(layer, QgsVectorLayer) or layer.providerType() != "ogr":
         return None
     decoded = QgsProviderRegistry.instance().decodeUri("ogr", layer.source())
@@ -74,8 +74,12 @@ def plan_file(layer: QgsMapLayer | None) -> str | None:
         return None
     details = QgsProviderRegistry.instance().querySublayers(path)
     own = {"field", "obstacles"} <= {each.name() for each in details}
-    whole = not layer.subsetString() and layer.selectedFeatureCount() == 0
-    return path if own and whole and layer.fields().indexOf("field_id") >= 0 else None
+    return path if own and layer.fields().indexOf("field_id") >= 0 else None
+
+
+def is_whole(source: QgsProcessingFeatureSource, layer: QgsVectorLayer) -> bool:
+    """Whether a source gives all rows of the layer: none filtered, none left unselected."""
+    return not layer.subsetString() and source.featureCount() == layer.featureCount()
 
 
 def written(

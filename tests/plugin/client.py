@@ -77,18 +77,20 @@ def given(values):
         if isinstance(value, dict):
             layer = layer_of(value)
             made[name] = layer
-            if value.get("select"):
+            if value.get("select") and not value.get("whole"):
                 made[name] = QgsProcessingFeatureSourceDefinition(layer.id(), True)
     return made
 
 
-def run(algorithm, values, stop_after_s=None, stop_at_percent=None, project_crs=None):
+def run(algorithm, values, stop_after_s=None, stop_at_percent=None, project_crs=None, beside=None):
     """processing.run, timed; optionally stopped by a person after a while."""
     import processing
     from qgis.core import QgsCoordinateReferenceSystem
 
     if project_crs:
         QgsProject.instance().setCrs(QgsCoordinateReferenceSystem(project_crs))
+    if beside:
+        layer_of(beside)
     feedback = Feedback()
     stopped = []
 

@@ -175,7 +175,7 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         "memory": "trees", "kind": "Point", "crs": "EPSG:32633", "fields": ["radius_m"],
         "rows": [{"wkt": "POINT(500044 45)", "radius_m": 3.0}],
     }  # fmt: skip
-    every, some, edited, filtered = qgis(
+    every, some, edited, chosen, filtered = qgis(
         "several",
         requests=[
             {"do": "run", "algorithm": "geofield:tracks", "values": {
@@ -187,6 +187,9 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {**memory, "edit": True}, "SPACING_M": 10,
                 "OUTPUT": str(tmp_path / "edited")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**memory, "edit": True, "select": "TRUE"}, "SPACING_M": 10,
+                "OUTPUT": str(tmp_path / "chosen")}},
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {"vector": f"{sample_plan}|layername=obstacles",
                           "filter": "obstacle_no < 4"},
@@ -205,7 +208,40 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
     ]
     assert len(read_dataset(tmp_path / "all of them" / "Acker_0.gpkg").table("gaps")) > 0
     assert "not saved" in edited["error"]
+    assert "not saved" in chosen["error"]
     assert filtered["result"]["FIELDS"] == 3
+
+
+def test_the_outlines_of_a_plan_stand_for_the_plan(qgis, sample_plan, tmp_path):
+    """Its obstacles count, whatever row is selected; they are refused while they are edited."""
+    field = {"vector": f"{sample_plan}|layername=field", "select": "TRUE"}
+    obstacles = {"vector": f"{sample_plan}|layername=obstacles"}
+    whole, selected, part, edited, nowhere = qgis(
+        "several",
+        requests=[
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**field, "whole": True}, "SPACING_M": 8,
+                "OUTPUT": str(tmp_path / "whole")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": field, "SPACING_M": 8, "OUTPUT": str(tmp_path / "selected")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**field, "filter": "area_ha > 1", "select": ""}, "SPACING_M": 8,
+                "OUTPUT": str(tmp_path / "part")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {**field, "whole": True}, "OBSTACLES_TO_AVOID": None, "SPACING_M": 8,
+                "OUTPUT": str(tmp_path / "edited")}, "beside": {**obstacles, "edit": True}},
+            {"do": "run", "algorithm": "geofield:export", "values": {
+                "PLAN": {"memory": "drawn", "kind": "Polygon", "crs": "EPSG:32633", "rows": []},
+                "FORMATS": ["kml"], "OUTPUT": str(tmp_path / "nowhere")}},
+        ],
+    )  # fmt: skip
+    known = len(read_dataset(Path(sample_plan)).table("obstacles"))
+    for name, answer in (("whole", whole), ("selected", selected)):
+        assert "Only some fields" not in answer["log"], answer["log"]
+        assert len(read_dataset(tmp_path / name / "sample.gpkg").table("obstacles")) == known
+    assert "Only some fields" in part["log"]
+    assert "not saved" in edited["error"]
+    assert "Choose a layer of a plan" in nowhere["error"]
 
 
 def test_in_a_model(qgis, plan, tmp_path):

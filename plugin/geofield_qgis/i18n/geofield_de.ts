@@ -165,6 +165,11 @@
     </message>
     <message>
       <location filename="algorithms.py" />
+      <source>Only some fields of {0} are taken: the obstacles in it do not count.</source>
+      <translation>Nur ein Teil der Felder von {0} wird genommen: die Hindernisse darin zählen nicht.</translation>
+    </message>
+    <message>
+      <location filename="algorithms.py" />
       <source>Or an extent</source>
       <translation>Oder ein Ausschnitt</translation>
     </message>
