@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import html
 import json
 import os
 import shutil
@@ -101,6 +103,25 @@ def test_no_tag_of_a_name_counts_in_the_map_tip(qgis, tmp_path):
     assert "<img" not in tip
     assert "&lt;script>alert(1)&lt;/script>[% 1+1 %]" in tip
     assert "&lt;img src=x onerror=alert(2)> &amp; more" in tip
+
+
+def test_the_map_tip_says_what_was_not_seen_of_obstacles(qgis, tmp_path):
+    dataset = make_dataset()
+    told = "The picture does not show 37% of <the> field [% 1+1 %]."
+    provenance = dataclasses.replace(dataset.provenance, evidence={"obstacles": {"doubts": [told]}})
+    dataset.tables["field"]["imagery_date"] = None
+    write_dataset(
+        dataclasses.replace(dataset, provenance=provenance), tmp_path, ["gpkg"], tell_drops=False
+    )
+    alone, opened = qgis("several", requests=[
+        {"do": "vector", "uri": f"{tmp_path / 'field.gpkg'}|layername=field"},
+        {"do": "project", "uri": str(tmp_path / "field.qgz")},
+    ])  # fmt: skip
+    for tip in (alone["tip_shown"], opened["layers"]["geofield_field"]["tip_shown"]):
+        said = html.unescape(tip)
+        assert f"Obstacles: {told}" in said.replace("<b>", "").replace("</b>", "")
+        assert "<the>" not in tip
+        assert "imagery of" not in tip
 
 
 def test_points_appear_from_a_readable_scale_on(opened):

@@ -17,7 +17,7 @@ from typing import Any
 from geofield import schema
 from geofield.formats import origin
 from geofield.formats.arrow import gdal_config, write_layer
-from geofield.formats.qgis import add_project, add_styles, frame_strip, project_xml, qgz_bytes
+from geofield.formats.qgis import add_project, add_styles, project_xml, qgz_bytes
 from geofield.model import Dataset
 
 #: GDAL 3.4 and QGIS 3.22 warn about 1.4.
@@ -98,7 +98,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         connection.execute("PRAGMA synchronous = OFF")
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
-        add_styles(connection, dataset.layers(working=True), stamp, frame_strip(dataset))
+        add_styles(connection, dataset, stamp)
         project = qgz_bytes(project_xml(dataset, path.name), stem, stamp)
         add_project(connection, stem, project, stamp)
     with path.open("rb") as file:

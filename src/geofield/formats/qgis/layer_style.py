@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.looks import LOOKS, Look, field_rules
@@ -42,10 +44,18 @@ def look_of(layer: Layer) -> Look:
     return LOOKS.get(layer.name) or LOOKS[plain.get(layer.geometry, "segments")]
 
 
-def style_elements(layer: Layer, frame: str = "") -> list[ET.Element]:
+def style_elements(
+    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = ()
+) -> list[ET.Element]:
     """The elements that a QML file and a project's layer have in common.
 
-    `frame` is the picture's, as :func:`geofield.formats.qgis.looks.field_rules` takes it.
+    Parameters
+    ----------
+    layer : Layer
+    frame : str
+        The picture's, as :func:`geofield.formats.qgis.looks.field_rules` takes it.
+    obstacle_doubts : sequence of str
+        What the picture did not allow when obstacles were looked for, in words.
     """
     look = look_of(layer)
     rules = field_rules(frame) if layer.name == "field" else look.rules
@@ -73,7 +83,7 @@ def style_elements(layer: Layer, frame: str = "") -> list[ET.Element]:
         node("editable", *editable),
         _actions(),
         node("previewExpression", " || ' / ' || ".join(f'"{name}"' for name in layer.key)),
-        node("mapTip", map_tip(layer)),
+        node("mapTip", map_tip(layer, obstacle_doubts)),
     ]
 
 
@@ -92,13 +102,13 @@ def style_attributes(layer: Layer) -> dict[str, str]:
     }
 
 
-def qml(layer: Layer, frame: str = "") -> str:
-    """The style of a layer as a QML document."""
+def qml(layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = ()) -> str:
+    """The style of a layer as a QML document, made as :func:`style_elements`."""
     root = node(
         "qgis",
         {"styleCategories": "AllStyleCategories"},
         style_attributes(layer),
-        *style_elements(layer, frame),
+        *style_elements(layer, frame, obstacle_doubts),
         node("layerGeometryType", _GEOMETRY[layer.geometry.removeprefix("Multi")]),
     )
     return document(root)
@@ -110,9 +120,13 @@ def heading(column: Column) -> str:
     return f"{column.title} ({unit})" if unit and column.unit != "1" else column.title
 
 
-def map_tip(layer: Layer) -> str:
+def map_tip(layer: Layer, obstacle_doubts: Sequence[str] = ()) -> str:
     """What is shown over a shape, with the link to a web map."""
     tip = look_of(layer).tip
+    if layer.name == "field":
+        # QGIS would take [% for the beginning of an expression.
+        said = (html.escape(each).replace("%", "&#37;") for each in obstacle_doubts)
+        tip += "".join(f"<br><b>Obstacles:</b> {each}" for each in said)
     return f'{tip}<br><a href="{WEB_MAP}">Open this spot in a web map</a>'
 
 

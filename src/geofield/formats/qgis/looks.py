@@ -144,7 +144,8 @@ LOOKS: dict[str, Look] = {
         ),
         tip=f"<b>[% {_shown('name')} %]</b><br>"
         '[% format_number("area_ha", 2) %] ha, '
-        '[% format_number("perimeter_m", 0) %] m around, imagery of [% "imagery_date" %]'
+        '[% format_number("perimeter_m", 0) %] m around'
+        "[% if(\"imagery_date\" IS NULL, '', ', imagery of ' || \"imagery_date\") %]"
         "[% if(\"certainty\" IS NULL, '', "
         "'<br>outline ' || round(100 * \"certainty\") || ' % certain') %]"
         "[% if(\"doubts\" IS NULL, '', '<br><b>Check the outline:</b> ' || "
@@ -174,7 +175,7 @@ LOOKS: dict[str, Look] = {
         f"[% {_shown('kind')} %], [% {_shown('status')} %]"
         "[% if(\"confidence\" IS NULL, '', ', confidence ' || round(\"confidence\", 2)) %]"
         "<br>[% if(\"radius_m\" IS NULL, '', 'radius ' || round(\"radius_m\", 1) || ' m + ') %]"
-        'margin [% round("buffer_m", 1) %] m',
+        'margin [% round(coalesce("buffer_m", 0), 1) %] m',
     ),
     "tracks": Look(
         (
@@ -285,8 +286,9 @@ LOOKS: dict[str, Look] = {
                 above=True,
             ),
         ),
-        tip='<b>[% "name" %]</b> [% "field_id" %]: [% "status" %]'
-        "[% if(\"error\" IS NULL, '', '<br>' || \"error\" || ' ' || coalesce(\"hint\", '')) %]",
+        tip=f'<b>[% {_shown("name")} %]</b> [% {_shown("field_id")} %]: [% "status" %]'
+        f"[% if(\"error\" IS NULL, '', '<br>' || {_shown('error')} || ' ' || "
+        f"coalesce({_shown('hint')}, '')) %]",
     ),
     "route": Look(
         (

@@ -65,7 +65,7 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
         node("layerorder", *(node("layer", id=_ID.format(name)) for name in names)),
         node(
             "projectlayers",
-            *(_vector_layer(each, dataset.crs, gpkg_name, frame) for each in layers),
+            *(_vector_layer(each, dataset, gpkg_name, frame) for each in layers),
             *pictures,
         ),
         _properties(),
@@ -153,7 +153,7 @@ def _source(gpkg_name: str, layer: str) -> str:
     return f"./{gpkg_name}|layername={layer}"
 
 
-def _vector_layer(layer: schema.Layer, crs: CRS, gpkg_name: str, frame: str) -> ET.Element:
+def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str, frame: str) -> ET.Element:
     shape = layer.geometry.removeprefix("Multi").removesuffix("String")
     return node(
         "maplayer",
@@ -163,9 +163,9 @@ def _vector_layer(layer: schema.Layer, crs: CRS, gpkg_name: str, frame: str) -> 
         node("datasource", _source(gpkg_name, layer.name)),
         node("layername", layer.title),
         node("abstract", layer.description),
-        node("srs", _system(crs)),
+        node("srs", _system(dataset.crs)),
         node("provider", "ogr", encoding="UTF-8"),
-        *style_elements(layer, frame),
+        *style_elements(layer, frame, dataset.provenance.obstacle_doubts),
     )
 
 

@@ -6,8 +6,9 @@ import json
 import sqlite3
 
 from geofield.formats.qgis.layer_style import qml
+from geofield.formats.qgis.project import frame_strip
 from geofield.formats.qgis.sld import sld
-from geofield.schema import Layer
+from geofield.model import Dataset
 
 _STYLES = """
 CREATE TABLE layer_styles (
@@ -29,12 +30,11 @@ CREATE TABLE layer_styles (
 _PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, content BLOB);"
 
 
-def add_styles(
-    connection: sqlite3.Connection, layers: list[Layer], timestamp: str, frame: str = ""
-) -> None:
+def add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str) -> None:
     """The table `layer_styles`: one default style per layer, as QML and SLD."""
     connection.execute(_STYLES)
-    for layer in layers:
+    frame, doubts = frame_strip(dataset), dataset.provenance.obstacle_doubts
+    for layer in dataset.layers(working=True):
         connection.execute(
             "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
             "f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, description, owner, "
@@ -42,7 +42,7 @@ def add_styles(
             (
                 layer.name,
                 layer.title[:30],
-                qml(layer, frame),
+                qml(layer, frame, doubts),
                 sld(layer),
                 layer.description,
                 timestamp,
