@@ -257,6 +257,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
 
     def refuse_unsaved_plan(self, path: str, context: Any) -> None:
         """Refuse a plan while any of its layers has edits that lie in no file yet."""
+        path = str(results.settled(path))
         for layer in (context.project() or QgsProject.instance()).mapLayers().values():
             if path_of(layer) == path:
                 sources.refuse_unsaved(layer)
@@ -280,11 +281,12 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
 
 
 def path_of(layer: Any) -> str:
-    """The file that a layer lies in; empty for none."""
+    """The file that a layer lies in, as :func:`results.settled` names it; empty for none."""
     if layer is None or layer.dataProvider() is None:
         return ""
     decoded = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
-    return str(decoded.get("path") or "")
+    path = str(decoded.get("path") or "")
+    return str(results.settled(path)) if path else ""
 
 
 def _progress_of(feedback: Any) -> Any:

@@ -7,11 +7,12 @@ from typing import Any
 from qgis.core import QgsDataProvider, QgsProject, QgsVectorLayer, QgsWkbTypes
 
 from .algorithm import path_of
+from .results import settled
 
 
 def layers_of(path: str) -> dict[str, QgsVectorLayer]:
     """The project's layers of a plan's GeoPackage, by their names in it."""
-    found = {}
+    found, path = {}, str(settled(path))
     for layer in QgsProject.instance().mapLayers().values():
         if isinstance(layer, QgsVectorLayer) and path_of(layer) == path:
             found[layer.source().rpartition("layername=")[2].split("|")[0]] = layer

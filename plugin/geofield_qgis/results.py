@@ -34,6 +34,12 @@ class Entry:
         return QgsVectorLayer(self.source, self.name, "ogr")
 
 
+def settled(path: str | Path) -> Path:
+    """A file's path with the links of its folders followed: the same text for the same file."""
+    path = Path(path)
+    return path.parent.resolve() / path.name
+
+
 def entries(plan: str | Path) -> tuple[str, list[Entry]]:
     """The name of a plan and its layers from top to bottom, as its QGIS project lists them."""
     plan = Path(plan)
@@ -49,7 +55,7 @@ def entries(plan: str | Path) -> tuple[str, list[Entry]]:
     for number in range(nodes.count()):
         node = nodes.at(number).toElement()
         path, bar, rest = node.attribute("source").partition("|")
-        file = (plan.parent / path).resolve()
+        file = settled(plan.parent / path)
         if file.is_file():
             found.append(
                 Entry(

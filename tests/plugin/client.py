@@ -120,6 +120,14 @@ def run(algorithm, values, stop_after_s=None, stop_at_percent=None, project_crs=
     }
 
 
+def shown(plan):
+    """The names of a plan's layers as they are found again, by its path, after it was shown."""
+    from geofield_qgis import plan_files, results
+
+    results.show(plan)
+    return sorted(plan_files.layers_of(plan))
+
+
 def parameters():
     from geofield_qgis import description
     from geofield_qgis import parameters as own
@@ -290,6 +298,7 @@ def several(requests):
 
 ACTIONS = {
     "run": run,
+    "shown": shown,
     "parameters": parameters,
     "model": model,
     "loaded": loaded,

@@ -244,6 +244,25 @@ def test_the_outlines_of_a_plan_stand_for_the_plan(qgis, sample_plan, tmp_path):
     assert "Choose a layer of a plan" in nowhere["error"]
 
 
+def test_a_plan_in_a_folder_behind_a_link_is_one_plan(qgis, plan, tmp_path):
+    shutil.copytree(plan, tmp_path / "disk")
+    (tmp_path / "documents").symlink_to(tmp_path / "disk")
+    linked = tmp_path / "documents" / "field.gpkg"
+    layers, edited = qgis(
+        "several",
+        requests=[
+            {"do": "shown", "plan": str(linked)},
+            {"do": "run", "algorithm": "geofield:export", "values": {
+                "PLAN": f"{linked}|layername=field", "FORMATS": ["kml"],
+                "OUTPUT": str(tmp_path / "out")},
+             "beside": {"vector": f"{tmp_path}/disk/field.gpkg|layername=obstacles",
+                        "edit": True}},
+        ],
+    )  # fmt: skip
+    assert {"field", "obstacles", "tracks"} <= set(layers)
+    assert "not saved" in edited["error"]
+
+
 def test_in_a_model(qgis, plan, tmp_path):
     qgis("model", folder=str(tmp_path), imagery=str(SAMPLE), point=POINT)
     made = read_dataset(tmp_path / "tracks" / "obstacles.gpkg")
