@@ -90,9 +90,11 @@ def written(
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName, options.layerName = "GPKG", name
     fields = source.fields()
-    if fields.indexOf("fid") >= 0:
-        # The file numbers its rows itself; two sources joined may have the same number.
-        fields.remove(fields.indexOf("fid"))
+    for own in ("fid", "geom"):
+        # The file numbers its rows itself; two sources joined may have the same number. And its
+        # names of number and shape are taken, in whatever case a column has them.
+        if fields.lookupField(own) >= 0:
+            fields.remove(fields.lookupField(own))
     kept = [source.fields().indexOf(each.name()) for each in fields]
     writer = QgsVectorFileWriter.create(
         str(path),

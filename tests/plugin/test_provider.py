@@ -175,7 +175,10 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         "memory": "trees", "kind": "Point", "crs": "EPSG:32633", "fields": ["radius_m"],
         "rows": [{"wkt": "POINT(500044 45)", "radius_m": 3.0}],
     }  # fmt: skip
-    every, some, edited, chosen, filtered = qgis(
+    own = {**memory, "fields": ["FID", "Geom"], "rows": [
+        {**row, "FID": 1, "Geom": "Polygon"} for row in memory["rows"]
+    ]}  # fmt: skip
+    every, some, edited, chosen, named, filtered = qgis(
         "several",
         requests=[
             {"do": "run", "algorithm": "geofield:tracks", "values": {
@@ -190,6 +193,8 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {**memory, "edit": True, "select": "TRUE"}, "SPACING_M": 10,
                 "OUTPUT": str(tmp_path / "chosen")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": own, "SPACING_M": 10, "OUTPUT": str(tmp_path / "named")}},
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {"vector": f"{sample_plan}|layername=obstacles",
                           "filter": "obstacle_no < 4"},
@@ -209,6 +214,7 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
     assert len(read_dataset(tmp_path / "all of them" / "Acker_0.gpkg").table("gaps")) > 0
     assert "not saved" in edited["error"]
     assert "not saved" in chosen["error"]
+    assert named["result"]["FIELDS"] == 4
     assert filtered["result"]["FIELDS"] == 3
 
 
