@@ -176,7 +176,8 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         "rows": [{"wkt": "POINT(500044 45)", "radius_m": 3.0}],
     }  # fmt: skip
     own = {**memory, "fields": ["FID", "Geom"], "rows": [
-        {**row, "FID": 1, "Geom": "Polygon"} for row in memory["rows"]
+        {"wkt": square.format(500000 + 200 * n, 500080 + 200 * n), "FID": 1, "Geom": "Polygon"}
+        for n in range(4)
     ]}  # fmt: skip
     every, some, edited, chosen, named, filtered = qgis(
         "several",
