@@ -524,3 +524,15 @@ def test_points_follow_a_segment_that_a_person_bent() -> None:
     assert shapely.distance(bent, first.geometry.to_numpy()).max() < 1e-6
     assert len(first) == 13  # 120 m along it, not 108 m from end to end
     assert np.isfinite(points[["lat", "lon"]].to_numpy()).all()
+    figures = replace(planned, segments=segments).statistics
+    strip = bent.buffer(2.0, cap_style="flat").intersection(planned.outline)
+    assert figures.worked_ha == pytest.approx(strip.area / 1e4, rel=0.01)
+
+
+def test_tips_of_sharp_corners_are_not_worked() -> None:
+    spike: Any = Polygon([(X, Y), (X + 300, Y), (X, Y + 40)])
+    tracks = plan_tracks(spike, crs=CRS, spacing_m=10.0, headland_m=10.0)
+    lines = [*tracks.segments.geometry, *tracks.headland_tracks.geometry]
+    near = shapely.union_all(shapely.buffer(np.array(lines), 5.0))
+    share = 100.0 * near.intersection(spike).area / spike.area
+    assert tracks.statistics.coverage_percent == pytest.approx(share, abs=1.0)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import geopandas as gpd
+
+#: Of headland tracks and their strips: corners stay corners (an implement is turned there), but a
+#: spike's corner is cut off.
+MITRE_LIMIT = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +112,10 @@ def worked(
 
 def _apart(segments: gpd.GeoDataFrame, width: float) -> bool:
     """Whether neighbouring tracks lie a width apart, and the segments of each behind each other."""
+    if not len(segments) or not _is_straight(segments.geometry.to_numpy()).all():
+        return False
     ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
     number = segments["track_no"].to_numpy(dtype=np.int64)
-    if not len(ends):
-        return False
     along = ends[0, 1] - ends[0, 0]
     along /= np.hypot(*along)
     start, end = ((ends - ends[0, 0]) @ along).T
@@ -126,18 +131,24 @@ def _strips(
     segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, width: float
 ) -> np.ndarray:
     """The strip that each segment works, as a rectangle; those of the headland, as they bend."""
-    ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
-    if not len(ends):
-        return np.empty(0, dtype=object)
+    lines = segments.geometry.to_numpy()
+    straight = _is_straight(lines)
+    ends = shapely.get_coordinates(lines[straight]).reshape(-1, 2, 2)
+    bent = lines[~straight & (shapely.length(lines) > 0.0)]
     along = ends[:, 1] - ends[:, 0]
     along /= np.hypot(along[:, 0], along[:, 1])[:, None]
     side = np.column_stack((-along[:, 1], along[:, 0])) * (width / 2.0)
     corners = np.stack(
         (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
     )
-    strips = np.asarray(shapely.polygons(corners))
-    if headland_tracks is None:
-        return strips
-    lines = headland_tracks.geometry.to_numpy()
-    around = shapely.buffer(lines, width / 2.0, cap_style="flat", join_style="mitre")
-    return np.concatenate((strips, around))
+    if headland_tracks is not None:
+        bent = np.concatenate((bent, headland_tracks.geometry.to_numpy()))
+    around = shapely.buffer(
+        bent, width / 2.0, cap_style="flat", join_style="mitre", mitre_limit=MITRE_LIMIT
+    )
+    return np.concatenate((np.asarray(shapely.polygons(corners)), around))
+
+
+def _is_straight(lines: Any) -> NDArray[np.bool_]:
+    """Which segments are as planned; a person may have bent one, or left it without a length."""
+    return np.asarray((shapely.get_num_coordinates(lines) == 2) & (shapely.length(lines) > 0.0))

@@ -12,9 +12,8 @@ from geofield import schema
 from geofield.errors import TrackError
 from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
 from geofield.model.rows import Rows
+from geofield.model.track_statistics import MITRE_LIMIT
 
-# Corners stay corners (an implement is turned there), but a spike's corner is cut off.
-_MITRE_LIMIT = 2.0
 _MIN_PIECE_M = 1e-3
 #: A border is moved without what stands out less than this: where many vertices lie closer than
 #: GEOS rounds a buffer, it takes up to 15 times longer over them.
@@ -33,7 +32,7 @@ def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometr
         plain if plain.is_valid and not plain.is_empty else moved,
         -width,
         join_style="mitre",
-        mitre_limit=_MITRE_LIMIT,
+        mitre_limit=MITRE_LIMIT,
     )
     return inner if holes or not outline.interiors else shapely.intersection(inner, outline)
 

@@ -163,7 +163,9 @@ def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:
 
 def ends_of(lines: gpd.GeoDataFrame) -> list[list[float]]:
     """First and last place of each line: x0, y0, x1, y1."""
-    xy = shapely.get_coordinates(lines.geometry.to_numpy()).reshape(-1, 4)
+    shapes = lines.geometry.to_numpy()
+    ends = [shapely.get_coordinates(shapely.get_point(shapes, at)) for at in (0, -1)]
+    xy = np.hstack(ends)
     rounded: list[list[float]] = np.round(xy, _DIGITS).tolist()
     return rounded
 
