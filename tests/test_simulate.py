@@ -71,7 +71,16 @@ def test_without_near_infrared_there_are_three_bands() -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [{"width_px": 10}, {"radius_m": (5, 2)}, {"resolution_m": 0}, {"climate": "moon"}]
+    "settings",
+    [
+        {"width_px": 10},
+        {"radius_m": (5, 2)},
+        {"radius_m": (2.0, float("inf"))},
+        {"resolution_m": 0},
+        {"resolution_m": float("inf")},
+        {"obstacles": -5},
+        {"climate": "moon"},
+    ],
 )
 def test_impossible_settings_are_refused(settings: dict[str, object]) -> None:
     with pytest.raises(SettingsError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -50,9 +51,11 @@ class SimulationSettings:
     def __post_init__(self) -> None:
         if min(self.width_px, self.height_px) < 64:
             raise SettingsError("A simulated picture has at least 64 x 64 px.")
-        if not 0 < self.radius_m[0] <= self.radius_m[1]:
-            raise SettingsError(f"The radius range {self.radius_m} is empty.")
-        if not self.resolution_m > 0:
-            raise SettingsError("The resolution must be above zero.")
+        if not 0 < self.radius_m[0] <= self.radius_m[1] < math.inf:
+            raise SettingsError(f"The radius range {self.radius_m} is empty or endless.")
+        if not 0 < self.resolution_m < math.inf:
+            raise SettingsError("The resolution must be above zero and finite.")
+        if self.obstacles is not None and self.obstacles < 0:
+            raise SettingsError(f"{self.obstacles} obstacles are fewer than none.")
         if self.climate is not None and self.climate not in CLIMATES:
             raise SettingsError(f"Unknown climate {self.climate!r}.", hint=f"Use {CLIMATES}.")
