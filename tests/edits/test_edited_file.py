@@ -229,3 +229,18 @@ def test_a_layer_of_tracks_that_is_gone_is_planned_again(folder: Path) -> None:
     tracks = plan_in(folder).tracks
     assert tracks is not None
     assert tracks.spacing_m == 6
+
+
+def test_what_a_crash_left_in_the_log_is_no_other_program(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    crash = (
+        "import os, sqlite3, sys; c = sqlite3.connect(sys.argv[1]); "
+        "c.execute('PRAGMA journal_mode=WAL'); "
+        "c.execute(\"UPDATE gpkg_contents SET description = 'mine'\"); c.commit(); os._exit(0)"
+    )
+    subprocess.run([sys.executable, "-c", crash, str(file)], check=True)
+    assert file.with_name("field.gpkg-wal").stat().st_size > 0
+    geofield("tracks", file, "--spacing", 12, "-o", file)
+    tracks = plan_in(folder).tracks
+    assert tracks is not None
+    assert tracks.spacing_m == 12

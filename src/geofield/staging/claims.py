@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
 import stat
 import time
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,6 +63,7 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
             sweep(target, certain=certain)
             refuse_claimed(target, chosen)
             try:
+                _fold_in_logs(target)
                 sign = held.enter_context(working_folder(target))
                 claim = _Claim(target.resolve(), sign, seen(target))
                 _write(sign, chosen)
@@ -150,6 +152,19 @@ def _listed(folder: Path) -> list[Path]:
         return list(folder.iterdir())
     except OSError:
         return []
+
+
+def _fold_in_logs(folder: Path) -> None:
+    """Take in what a program that ended badly left in SQLite's write-ahead logs.
+
+    Whoever reads such a file does so: it would look as if another program had written meanwhile.
+    """
+    for log in folder.glob("*-wal"):
+        file = log.with_name(log.name.removesuffix("-wal"))
+        if not (file.is_file() and log.stat().st_size):
+            continue
+        with suppress(sqlite3.Error), closing(sqlite3.connect(file)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master")
 
 
 def _write(sign: Path, names: frozenset[str] | None) -> None:
