@@ -17,7 +17,7 @@ from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.evidence import Evidence
 from geofield.model.field import Field
-from geofield.model.frame import with_outside
+from geofield.model.frame import along_frame, with_outside
 from geofield.model.rows import Rows
 from geofield.model.scene import ImagerySource, Scene
 from geofield.model.tracks import Tracks
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     import rdflib
     from matplotlib.axes import Axes
+    from shapely import LineString
 
     from geofield.settings import Settings
     from geofield.web.html import PlanPage
@@ -141,11 +142,16 @@ class Plan:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the outline, in words; that it goes on outside is always told."""
+        told = () if self.outline_edited else self.field.doubts
+        return with_outside(told, self.field.polygon, self.frame_lines)
+
+    @property
+    def frame_lines(self) -> list[LineString]:
+        """Where the outline is the picture's frame; a parcel of the user's own is whole."""
         one = self.field
-        told = () if self.outline_edited else one.doubts
-        if one.method == "boundary":
-            return told
-        return with_outside(told, one.polygon, one.crs, self.grid)
+        if one.method == "boundary" and not self.outline_edited:
+            return []
+        return along_frame(one.polygon, one.crs, self.grid)
 
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""

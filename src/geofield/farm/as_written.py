@@ -32,24 +32,27 @@ def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[st
         for one, shape, row in zip(table[FIELD_ID], shapes, told, strict=True):
             plain = ["" if pd.isna(value) else str(value) for value in row]
             parts.setdefault(str(one), []).append(json.dumps(plain).encode() + (shape or b""))
-    return {
-        one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
-        for one, rows in parts.items()
-    }
+    return _hashed(parts)
 
 
 def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:
     """A digest per field of what stands in columns of a person's own; none for fields without."""
-    parts: dict[str, list[str]] = {}
+    parts: dict[str, list[bytes]] = {}
     for of, table in tables.items():
         names = own_names(of, table)
         for one, *values in zip(table[FIELD_ID], *(table[each] for each in names), strict=True):
             told = {each: text_of(value) for each, value in zip(names, values, strict=True)}
             told = {each: text for each, text in told.items() if text}
             if told:
-                parts.setdefault(str(one), []).append(of.name + json.dumps(told, sort_keys=True))
+                row = of.name + json.dumps(told, sort_keys=True)
+                parts.setdefault(str(one), []).append(row.encode())
+    return _hashed(parts)
+
+
+def _hashed(parts: Mapping[str, list[bytes]]) -> dict[str, str]:
+    """A digest per field of its parts, whatever their order."""
     return {
-        one: hashlib.sha256("\0".join(sorted(rows)).encode()).hexdigest()[:16]
+        one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
         for one, rows in parts.items()
     }
 

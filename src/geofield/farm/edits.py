@@ -60,11 +60,13 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
 
     `written` are the tables that it was made of: in the file some columns have other names.
     """
-    tables = {of: _table(overview, of) for of in (schema.FIELD, schema.OBSTACLES)}
+    layers = [of for of in (schema.FIELD, schema.OBSTACLES) if of.name in written]
+    if not any(own_names(of, written[of.name]) for of in layers):
+        return
+    tables = {of: _table(overview, of) for of in layers}
     names = {
         of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
         for of, table in tables.items()
-        if of.name in written
     }
     with closing(sqlite3.connect(overview)) as file, file:
         (text,) = file.execute(
@@ -177,8 +179,10 @@ def _refuse_double(
     fields: gpd.GeoDataFrame,
 ) -> None:
     """Refuse edits of fields that were changed elsewhere since the overview was written."""
-    ours = farm.layer(schema.FIELD.name) if edited else fields
-    if not edited or ours.crs != fields.crs:
+    if not edited:
+        return
+    ours = farm.layer(schema.FIELD.name)
+    if ours.crs != fields.crs:
         return
     theirs = farm.layer(schema.OBSTACLES.name).to_crs(ours.crs)
     theirs = theirs if record[DETAILS] else theirs.iloc[:0]
@@ -256,15 +260,15 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     """A plan as it was edited, its tracks planned again; `outlines` are the farm's, by id."""
     field_id = plan.field.field_id
     fields, obstacles = edits.fields, edits.obstacles
-    row = fields[fields[FIELD_ID] == field_id].to_crs(plan.field.crs).iloc[0]
+    mine = fields[fields[FIELD_ID] == field_id]
+    row = mine.to_crs(plan.field.crs).iloc[0]
     called = edits.names.get(schema.FIELD.name, {})
     names = {name: called.get(name, name) for name in own_names(schema.FIELD, fields)}
     own = _own_of(plan.field, row, names)
     field = replace(plan.field, own=own)
     if not pd.isna(row["name"]):
         field = replace(field, name=str(row["name"]))
-    after = fields[fields[FIELD_ID] == field_id].geometry.iloc[0]
-    if not shapely.equals_exact(outlines[field_id], after, _SAME):
+    if not shapely.equals_exact(outlines[field_id], mine.geometry.iloc[0], _SAME):
         field = replace(
             field, polygon=_polygon(row.geometry, field_id), method="drawn", quality=None
         )
@@ -349,6 +353,9 @@ def put_edits(
         )
     asked = [one for one in edits.marks if only is None or one in only]
     here = [one for one in asked if one in farm]
+    waiting = [one for one in asked if one not in farm]
+    if not here:
+        return here, waiting
     outlines = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
     outlines = outlines.to_crs(edits.fields.crs)
     plans = [_edited(farm[one], edits, outlines) for one in here]
@@ -357,6 +364,5 @@ def put_edits(
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
         store.put(CHANGED, b"")
 
-    if plans:
-        put_plans(plans, store, note)
-    return here, [one for one in asked if one not in farm]
+    put_plans(plans, store, note)
+    return here, waiting

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from geofield import __version__, schema
 from geofield.crs import LONLAT
 from geofield.farm.as_written import digests_of
-from geofield.farm.edits import DETAILS, DIGESTS, remember_own
+from geofield.farm.edits import DETAILS, DIGESTS, OWN, remember_own
 from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined
@@ -85,6 +85,7 @@ def dataset_of(farm: Farm, name: str) -> Joined:
     evidence = {
         DIGESTS: digests_of(fields, obstacles.assign(**({} if details else {FIELD_ID: []}))),
         DETAILS: details,
+        OWN: {"columns": {}, "digests": {}},
     }
     origin = Provenance(f"geofield {__version__}", _source(fields), {}, evidence)
     return Joined(tables, crs, name, origin, further=(PLACES,))

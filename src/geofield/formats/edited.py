@@ -19,7 +19,7 @@ from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
 from geofield.formats.many import Joined
 from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
-from geofield.model.frame import with_outside
+from geofield.model.frame import along_frame, with_outside
 from geofield.model.review import reconcile
 
 if TYPE_CHECKING:
@@ -112,7 +112,8 @@ def _judged(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
     parts = shapely.get_parts(field.geometry.to_numpy())
     if len(parts) != 1 or not Evidence.from_json(dataset.provenance.evidence).moved(parts[0]):
         return field
-    doubts = "; ".join(with_outside((), parts[0], dataset.crs, dataset.grid))
+    along = along_frame(parts[0], dataset.crs, dataset.grid)
+    doubts = "; ".join(with_outside((), parts[0], along))
     return field.assign(method="drawn", certainty=np.nan, doubts=doubts or None)
 
 

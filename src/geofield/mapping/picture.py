@@ -6,57 +6,35 @@ tracks as dotted lines. It is a picture for people; the geodata are in the other
 
 from __future__ import annotations
 
-import itertools
 import math
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from geofield import schema, theme
 from geofield.grid import Grid
-from geofield.mapping.fonts import written
 from geofield.mapping.labels import OBSTACLE_LOOK, TRACK_LOOK, Label, Look, draw_labels
+from geofield.mapping.panel import FRAME_DASH, GROUND, Colour, Dash, dashes, with_panel
 from geofield.model.dataset import Dataset
-from geofield.model.map_words import (
-    credit_in_words,
-    doubts_in_words,
-    figures_in_words,
-    frame_lines,
-    length_in_words,
-    round_length_m,
-)
+from geofield.model.map_words import frame_lines
 from geofield.model.scene import Scene
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: Red, green and blue; a fourth number is the opacity.
-Colour = tuple[int, ...]
-_Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-#: Line and space, pixels.
-Dash = tuple[float, float]
 #: Left, top, right and bottom of a picture, its pixels.
 Margins = tuple[int, int, int, int]
 
 _CASING: Colour = (0, 0, 0, 150)
-#: Where an outline is the picture's frame.
-_FRAME_DASH = (9.0, 7.0)
-_INK: Colour = (255, 255, 255, 255)
-_PANEL: Colour = (20, 24, 28, 215)
-_GROUND: Colour = (70, 74, 70)
 
 #: The long side of the picture's map part, pixels.
 LONG_SIDE_PX = 1400
 #: Drawn this much larger, then reduced: smooth lines.
 _OVERSAMPLING = 2
-_DOUBT_SIZE = 14
-#: A map of a narrower field has plain ground on both sides: its panel needs room for words.
-_NARROWEST_PX = 560
 #: At most this many numbers along the tracks' starts.
 _MAX_LABELS = 40
 
@@ -78,7 +56,7 @@ def draw_map(
         canvas.picture(scene, margins)
     canvas.tables()
     picture = canvas.finish()
-    return _with_panel(picture, dataset, grid, scale)
+    return with_panel(picture, dataset, grid, scale)
 
 
 def _plain_grid(dataset: Dataset) -> Grid:
@@ -124,7 +102,7 @@ class _Canvas:
         self.grid, self.size, self.dataset = grid, size, dataset
         self.large = (size[0] * _OVERSAMPLING, size[1] * _OVERSAMPLING)
         self.factor = self.large[0] / grid.width_px
-        self.image = Image.new("RGB", self.large, _GROUND)
+        self.image = Image.new("RGB", self.large, GROUND)
         self.draw = ImageDraw.Draw(self.image, "RGBA")
         self.labels: list[Label] = []
 
@@ -155,7 +133,7 @@ class _Canvas:
         self.outlines(outline, theme.OUTLINE, 2.4 * _OVERSAMPLING)
         frame = frame_lines(self.dataset)
         self.lines(frame, "#000000", 3.2 * _OVERSAMPLING)
-        self.lines(frame, theme.DOUBT, 2.8 * _OVERSAMPLING, dash=_FRAME_DASH)
+        self.lines(frame, theme.DOUBT, 2.8 * _OVERSAMPLING, dash=FRAME_DASH)
         self.numbers(obstacles, segments)
 
     def pixels(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -189,7 +167,7 @@ class _Canvas:
         points = self.pixels(shapely.get_coordinates(line))
         if dash is None:
             return [points.ravel().tolist()]
-        return _dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING)
+        return dashes(points, dash[0] * _OVERSAMPLING, dash[1] * _OVERSAMPLING)
 
     def numbers(self, obstacles: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> None:
         if len(obstacles) and len(obstacles) <= 150:
@@ -211,162 +189,3 @@ class _Canvas:
         image = self.image.reduce(_OVERSAMPLING)
         draw_labels(image, self.labels)
         return image
-
-
-def _dashes(points: NDArray[np.float64], on: float, off: float) -> list[list[float]]:
-    """The drawn pieces of a dashed line through points, each x, y, x, y."""
-    pieces: list[list[float]] = []
-    for a, b in itertools.pairwise(points):
-        length = float(np.hypot(*(b - a)))
-        if length == 0:
-            continue
-        starts = np.arange(0.0, length, on + off)
-        ends = np.minimum(starts + on, length)
-        direction = (b - a) / length
-        pieces += np.hstack([a + at[:, None] * direction for at in (starts, ends)]).tolist()
-    return pieces
-
-
-def _with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float) -> Image.Image:
-    """The picture with a panel below it, wide enough for the panel's words."""
-    width = max(picture.width, _NARROWEST_PX)
-    entries = _legend_entries(dataset)
-    step, rows = _legend_size(entries, width)
-    legend_right = 16 + step * math.ceil(len(entries) / rows)
-    figures = [written(text, _figure_size(n)) for n, text in enumerate(figures_in_words(dataset))]
-    beside = legend_right + max(font.getlength(text) for text, font in figures) + 16 <= width
-    below = (
-        [] if beside else [(t, font) for text, font in figures for t in _wrapped(text, font, width)]
-    )
-    doubt_font = ImageFont.load_default(_DOUBT_SIZE)
-    doubts = [
-        line for told in doubts_in_words(dataset) for line in _wrapped(told, doubt_font, width)
-    ]
-    credit, credit_font = written(credit_in_words(dataset), 12)
-    owners = _wrapped(credit, credit_font, width)
-    legend_height = 26 + 22 * rows
-    panel_height = (
-        legend_height + 22 * len(below) + 18 * len(doubts) + 16 * max(len(owners) - 1, 0) + 14
-    )
-    image = Image.new("RGB", (width, picture.height + panel_height), _PANEL[:3])
-    draw = ImageDraw.Draw(image)
-    top, left = picture.height, (width - picture.width) // 2
-    draw.rectangle([0, 0, width, top - 1], fill=_GROUND)
-    image.paste(picture, (left, 0))
-    _scale_bar(draw, grid, scale, left + picture.width - 30, top - 22)
-    _north_arrow(draw, grid, left + picture.width - 42, 46)
-    _legend(draw, entries, 16, top + 14, step, rows)
-    if beside:
-        for index, (text, font) in enumerate(figures):
-            place = (width - 16, top + 14 + 22 * index)
-            draw.text(place, text, font=font, fill=_INK[:3], anchor="rm")
-    top += legend_height - 12
-    for text, font in below:
-        draw.text((16, top), text, font=font, fill=_INK[:3], anchor="lm")
-        top += 22
-    for number, line in enumerate(doubts):
-        place = (16, top + 12 + 18 * number)
-        draw.text(place, line, font=doubt_font, fill=theme.rgb(theme.DOUBT), anchor="ls")
-    for number, line in enumerate(reversed(owners)):
-        place = (16, image.height - 12 - 16 * number)
-        draw.text(place, line, font=credit_font, fill=(190, 195, 200), anchor="ls")
-    return image
-
-
-def _figure_size(number: int) -> int:
-    """The size of the letters of a line of figures: the first one holds the field's name."""
-    return 16 if number == 0 else 14
-
-
-def _legend_size(entries: Sequence[tuple[str, str, Dash | None]], width: int) -> tuple[int, int]:
-    """Width of a column, pixels, and rows of a legend that fits a width."""
-    font = ImageFont.load_default(14)
-    step = max(190, *(math.ceil(34 + font.getlength(text) + 16) for _, text, _ in entries))
-    columns = max(1, (width - 32) // step)
-    return step, max(3, math.ceil(len(entries) / columns))
-
-
-def _legend(
-    draw: ImageDraw.ImageDraw,
-    entries: Iterable[tuple[str, str, Dash | None]],
-    left: int,
-    top: int,
-    step: int,
-    rows: int,
-) -> None:
-    font = ImageFont.load_default(14)
-    for index, (color, text, dash) in enumerate(entries):
-        x, y = left + step * (index // rows), top + 22 * (index % rows)
-        for piece in _dashes(np.array([[x, y], [x + 26.0, y]]), *(dash or (26.0, 0.0))):
-            draw.line(piece, fill=theme.rgb(color), width=3)
-        draw.text((x + 34, y), text, font=font, fill=_INK[:3], anchor="lm")
-
-
-def _legend_entries(dataset: Dataset) -> list[tuple[str, str, Dash | None]]:
-    """Colour, words and dashes of what the map shows."""
-    statuses = set(dataset.table("obstacles")["status"])
-    turns = dataset.table("turns")
-    unfit = int((turns["fits"] == "no").sum())
-    entries: list[tuple[object, str, str, Dash | None]] = [
-        (True, theme.OUTLINE, "field", None),
-        (frame_lines(dataset), theme.DOUBT, "goes on outside", _FRAME_DASH),
-        *(
-            (status in statuses, look.color, f"obstacle, {status}", look.dash)
-            for status, look in theme.STATUS.items()
-        ),
-        (dataset.has("segments"), theme.TRACK, "track", (9.0, 4.0)),
-        (dataset.has("gaps"), theme.GAP, "gap", (5.0, 5.0)),
-        (dataset.has("headland_tracks"), theme.HEADLAND, "headland", None),
-        (len(turns) > unfit, theme.TURN, "turn", None),
-        (unfit, theme.UNFIT, f"turn that does not fit ({unfit})", None),
-    ]
-    return [(color, text, dash) for shown, color, text, dash in entries if shown]
-
-
-def _wrapped(text: str, font: _Font, width: int) -> list[str]:
-    """A text in lines that fit a picture's width, pixels; the further ones are indented."""
-    lines: list[str] = []
-    line = ""
-    for word in re.findall(r"\S+\s*", text):
-        if line.strip() and font.getlength((line + word).rstrip()) > width - 32:
-            lines.append(line.rstrip())
-            line = "    "
-        for letter in word:
-            # A word that is longer than a line, or a script without spaces.
-            if font.getlength((line + letter).rstrip()) > width - 32:
-                lines.append(line)
-                line = "    "
-            line += letter
-    return [*lines, line.rstrip()] if line.strip() else lines
-
-
-def _scale_bar(
-    draw: ImageDraw.ImageDraw, grid: Grid, scale: float, right: float, bottom: float
-) -> None:
-    metres_per_px = grid.ground_resolution_m / scale
-    length = round_length_m(180 * metres_per_px)
-    left = right - length / metres_per_px
-    for width, colour in ((7, (0, 0, 0)), (3, _INK[:3])):
-        draw.line([left, bottom, right, bottom], fill=colour, width=width)
-    _outlined(draw, ((left + right) / 2, bottom - 7), length_in_words(length), 14, "ms")
-
-
-def _north_arrow(draw: ImageDraw.ImageDraw, grid: Grid, x: float, y: float) -> None:
-    lon, lat = grid.centre_lonlat
-    px, py = grid.from_lonlat(lon, min(lat + 1e-4, 90.0))
-    dx, dy = px - grid.width_px / 2, py - grid.height_px / 2
-    length = math.hypot(dx, dy) or 1.0
-    ux, uy = dx / length, dy / length
-    tip = (x + 20 * ux, y + 20 * uy)
-    left, right = ((x - 20 * ux + s * 9 * uy, y - 20 * uy - s * 9 * ux) for s in (1, -1))
-    notch = (x - 11 * ux, y - 11 * uy)
-    draw.polygon([tip, left, notch, right], fill=_INK[:3], outline=(0, 0, 0))
-    _outlined(draw, (x + 31 * ux, y + 31 * uy), "N", 15, "mm")
-
-
-def _outlined(
-    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, size_px: int, anchor: str
-) -> None:
-    """Write light letters with a dark rim, to be read on any ground."""
-    font, rim = ImageFont.load_default(size_px), (0, 0, 0)
-    draw.text(at, text, _INK[:3], font, anchor, stroke_width=2, stroke_fill=rim)

@@ -16,6 +16,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import CRSMismatchError
 from geofield.grid import Grid
+from geofield.model.evidence import obstacle_doubts
 from geofield.model.scene import ImagerySource
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Provenance:
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
         """What the picture did not allow when obstacles were looked for, in words."""
-        return tuple(self.evidence.get("obstacles", {}).get("doubts", ()))
+        return obstacle_doubts(self.evidence)
 
 
 @dataclass(frozen=True, eq=False)

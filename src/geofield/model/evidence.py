@@ -29,6 +29,11 @@ class Evidence:
     #: The obstacles as the last stage left them; None where nobody recorded them.
     written: Written | None = None
 
+    @property
+    def obstacle_doubts(self) -> tuple[str, ...]:
+        """What the picture did not allow when obstacles were looked for, in words."""
+        return tuple(self.detection.get("doubts", ()))
+
     def moved(self, outline: shapely.Polygon) -> bool:
         """Whether a person moved an outline since a stage wrote it; not, where nobody knows."""
         return self.outline is not None and self.outline != outline_digest(outline)
@@ -66,6 +71,11 @@ def outline_digest(outline: shapely.Polygon) -> str:
     """A fingerprint of an outline, to tell whether a person has moved it since."""
     ring = shapely.normalize(outline)
     return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
+
+
+def obstacle_doubts(value: Mapping[str, Any]) -> tuple[str, ...]:
+    """The doubts about obstacles in the JSON of :meth:`Evidence.to_json`, in words."""
+    return tuple(value.get("obstacles", {}).get("doubts", ()))
 
 
 def quality_from_json(value: Mapping[str, Any]) -> FieldQuality | None:

@@ -43,10 +43,9 @@ def _crosses(line: LineString, picture: Polygon, near: float) -> bool:
 
 
 def with_outside(
-    doubts: tuple[str, ...], polygon: Polygon, crs: CRS, grid: Grid | None
+    doubts: tuple[str, ...], polygon: Polygon, along: list[LineString]
 ) -> tuple[str, ...]:
-    """Doubts of an outline, and that it goes on outside the picture where it does."""
-    along = along_frame(polygon, crs, grid)
+    """Doubts of an outline, and that it goes on outside where it is :func:`along_frame`."""
     if not along or any("outside the picture" in reason for reason in doubts):
         return doubts
     share = sum(line.length for line in along) / polygon.exterior.length

@@ -18,6 +18,7 @@ from typing import Any
 
 from geofield.errors import GeofieldError
 from geofield.review.session import Session
+from geofield.staging import log_of
 
 SUFFIX = ".review.jsonl"
 
@@ -33,11 +34,6 @@ def fingerprint(plan_path: Path) -> str:
     with suppress(FileNotFoundError):
         version.update(log_of(plan_path).read_bytes())
     return version.hexdigest()
-
-
-def log_of(plan_path: Path) -> Path:
-    """The write-ahead log of SQLite, where QGIS puts what it saves while the file is open there."""
-    return plan_path.with_name(plan_path.name + "-wal")
 
 
 class Journal:

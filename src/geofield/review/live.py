@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from geofield.errors import GeofieldError
-from geofield.review.journal import log_of
 from geofield.review.session import Step, planned
+from geofield.staging import log_of
 from geofield.web.view import ends_of
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from geofield.model.frame import along_frame
 from geofield.settings import Settings
 from geofield.web.view import obstacles_view, outline_view, rings_of, tracks_view
 
@@ -22,7 +21,7 @@ def state_of(session: Session) -> dict[str, Any]:
         "field_id": plan.field.field_id,
         "crs": plan.field.crs.name,
         "field": field_of(plan),
-        "doubts": list(plan.evidence.detection.get("doubts", ())),
+        "doubts": list(plan.evidence.obstacle_doubts),
         "obstacles": obstacles_view(plan.obstacles, plan.tracks),
         "settings": (plan.settings or Settings()).tracks.model_dump(mode="json"),
         "detected_from": _detected_from(plan),
@@ -54,9 +53,7 @@ def field_of(plan: Plan) -> dict[str, Any]:
         method="drawn" if drawn else field.method,
         certainty=None if quality is None else quality.score,
         doubts=plan.doubts,
-        frame=[]
-        if field.method == "boundary" and not plan.outline_edited
-        else along_frame(field.polygon, field.crs, plan.grid),
+        frame=plan.frame_lines,
     )
     others = [
         {"rings": rings_of(one.polygon), "certainty": round(one.certainty, 3)}

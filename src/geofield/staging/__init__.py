@@ -4,11 +4,11 @@ What comes in is a folder, or a file in it; what goes out is a hidden folder bes
 whose files come into place together when the work ends well. Begin at `staged`, the one way in
 which products are written; `claims` is who works on a folder, `leftovers` are the hidden folders
 of those who were killed, `generations` the plan before the last run, `folders` how a folder is
-made and why it cannot be written.
+made, why it cannot be written, and what belongs to a file in it.
 """
 
 from geofield.staging.claims import claimed
-from geofield.staging.folders import cannot_write
+from geofield.staging.folders import cannot_write, log_of
 from geofield.staging.leftovers import PREFIX, unstopped
 from geofield.staging.staged import refuse_locked, staged_file, staged_folder
 
@@ -16,6 +16,7 @@ __all__ = [
     "PREFIX",
     "cannot_write",
     "claimed",
+    "log_of",
     "refuse_locked",
     "staged_file",
     "staged_folder",

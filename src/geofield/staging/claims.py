@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from geofield.errors import OutputExistsError
-from geofield.staging.folders import cannot_write, made_folder
+from geofield.staging.folders import cannot_write, log_of, made_folder
 from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_folder
 
 _CLAIM = "claim"
@@ -159,9 +159,9 @@ def _fold_in_logs(folder: Path) -> None:
 
     Whoever reads such a file does so: it would look as if another program had written meanwhile.
     """
-    for log in folder.glob("*-wal"):
-        file = log.with_name(log.name.removesuffix("-wal"))
-        if not (file.is_file() and log.stat().st_size):
+    for file in folder.glob("*.gpkg"):
+        log = log_of(file)
+        if not (log.is_file() and log.stat().st_size):
             continue
         with suppress(sqlite3.Error), closing(sqlite3.connect(file)) as connection:
             connection.execute("SELECT count(*) FROM sqlite_master")

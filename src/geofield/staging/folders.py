@@ -38,6 +38,11 @@ def made_folder(target: Path) -> Iterator[None]:
                 break  # something is in it
 
 
+def log_of(file: Path) -> Path:
+    """The write-ahead log of SQLite, where QGIS puts what it saves while the file is open there."""
+    return file.with_name(file.name + "-wal")
+
+
 def cannot_write(target: Path, error: OSError) -> FormatError:
     """Why a folder takes no products, in words."""
     place = error.filename or target
