@@ -43,9 +43,24 @@ def test_what_is_near_a_track_is_driven_through():
     assert (lost.things, lost.driven_through) == (3, 2)
     # Chords of circles of 2 m, 1 and 0.5 m from their centres.
     chords = 2 * np.sqrt(4 - 1) + 2 * np.sqrt(4 - 0.25)
-    assert lost.driven_through_m == pytest.approx(chords, rel=0.01)
+    assert lost.driven_through_m == pytest.approx(chords, rel=0.001)
     assert lost.driven_m == pytest.approx(300, rel=1e-3)
     assert lost.share_lost == 0
+
+
+@pytest.mark.parametrize("angle", np.radians([0.0, 5.625, 22.5, 40.0]))
+@pytest.mark.parametrize(("away", "met"), [(1.996, 1), (2.004, 0)])
+def test_a_disc_has_no_corners(angle, away, met):
+    """Two metres are two metres in every direction."""
+    normal, along = (
+        np.array([np.cos(angle), np.sin(angle)]),
+        np.array([-np.sin(angle), np.cos(angle)]),
+    )
+    place = np.array([EAST + 50, NORTH + 50]) + normal * away / 1.0004
+    track = LineString([place - 30 * along, place + 30 * along])
+    segments = gpd.GeoDataFrame(geometry=[track], crs=UTM)
+    truth = points((50, 50))
+    assert driving(segments, around("detected", 0.9), truth, FIELD).driven_through == met
 
 
 def test_ground_is_lost_only_where_nothing_stands():

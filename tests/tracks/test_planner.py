@@ -422,8 +422,12 @@ def test_obstacles_in_another_crs_and_of_other_kinds() -> None:
         plan_tracks(field, nameless, crs=CRS, spacing_m=4.0)
 
 
-def test_an_obstacle_over_the_whole_field() -> None:
-    tracks = plan_tracks(box(0, 0, 100, 40), [box(-5, -5, 105, 45)], crs=CRS, spacing_m=4.0)
+@pytest.mark.parametrize("settings", [{}, {"min_segment_m": 5.0}])
+def test_an_obstacle_over_the_whole_field(settings: dict[str, float]) -> None:
+    with pytest.warns(TrackWarning, match="covers the field" + ".*5 m" * len(settings)):
+        tracks = plan_tracks(
+            box(0, 0, 100, 40), [box(-5, -5, 105, 45)], crs=CRS, spacing_m=4.0, **settings
+        )
     assert len(tracks.segments) == len(tracks.gaps) == len(tracks.lines) == len(tracks.points) == 0
     assert tracks.blocked_count == 10
     assert tracks.statistics.coverage_percent == 0.0
@@ -536,3 +540,27 @@ def test_tips_of_sharp_corners_are_not_worked() -> None:
     near = shapely.union_all(shapely.buffer(np.array(lines), 5.0))
     share = 100.0 * near.intersection(spike).area / spike.area
     assert tracks.statistics.coverage_percent == pytest.approx(share, abs=1.0)
+
+
+@pytest.mark.parametrize("spacing_m", [6.0, 7.0])
+def test_passes_around_the_field_are_as_wide_as_the_machine(spacing_m: float) -> None:
+    """Also where the straight tracks were moved together to fill the rest evenly."""
+    tracks = plan_tracks(
+        box(X, Y, X + 100, Y + 100),
+        crs=CRS,
+        spacing_m=spacing_m,
+        headland_m=2 * spacing_m,
+        last_strip="spread",
+    )
+    assert tracks.spacing_m < spacing_m - 0.1
+    assert tracks.statistics.coverage_percent == pytest.approx(100.0, abs=1e-6)
+
+
+def test_a_headland_that_passes_do_not_fill_is_told() -> None:
+    field = box(X, Y, X + 100, Y + 100)
+    with pytest.warns(TrackWarning, match=r"4 passes of 3 m and leaves a strip of 2\.00 m"):
+        tracks = plan_tracks(field, crs=CRS, spacing_m=3.0, headland_m=14.0)
+    assert "12 m or 15 m would leave none" in tracks.notes[0]
+    assert tracks.statistics.coverage_percent < 95.0
+    for headland_m in (2.0, 3.0, 15.0):  # narrower than one pass, one, five
+        assert not plan_tracks(field, crs=CRS, spacing_m=3.0, headland_m=headland_m).notes

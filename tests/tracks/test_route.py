@@ -214,7 +214,8 @@ def test_a_wall_is_never_driven_through(radius_m: float | None) -> None:
 
 def test_fields_with_nothing_to_drive() -> None:
     field = shapely.box(500000, 5600000, 500100, 5600060)
-    empty = plan_tracks(field, [shapely.buffer(field, 5.0)], crs=CRS, spacing_m=5.0)
+    with pytest.warns(TrackWarning, match="Nothing is left to drive"):
+        empty = plan_tracks(field, [shapely.buffer(field, 5.0)], crs=CRS, spacing_m=5.0)
     planned = plan_route(empty, turning_radius_m=5.0)
     assert planned.route is not None
     assert len(planned.route) == 0

@@ -159,14 +159,10 @@ def _say_tracks(tracks: Tracks) -> None:
         f"{segments['length_m'].sum() / 1000:.2f} km, "
         f"heading {tracks.heading_deg:.1f} degrees"
     )
-    if segments.empty:
-        say("           nothing is left to drive: what stands there covers the field", fg="yellow")
     if tracks.turns is not None:
         _say_turns(tracks.turns)
     if tracks.direction_why:
         say(f"           {tracks.direction_why}")
-    for note in tracks.notes:
-        say(f"           {note}")
 
 
 def _say_turns(turns: Any) -> None:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 DEFAULT_REACH_M = 2.0
 """A wheel this near to a trunk is in its crown."""
+#: The chords of a disc of so many sides are .03 % short, of the usual 32 sides 1 %.
+_QUARTER_SEGMENTS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +106,12 @@ def driving(
     crs = segments.crs
     lines = _shapes(segments)
     centres = shapely.centroid(_shapes(truth.to_crs(crs)))
-    all_discs = shapely.buffer(centres, reach_m * float(ground_scale_of(field, crs)))
-    discs = all_discs[shapely.covers(field, centres)]
-    met = np.unique(shapely.STRtree(lines).query(discs, predicate="intersects")[0])
+    reach = reach_m * float(ground_scale_of(field, crs))
+    all_discs = shapely.buffer(centres, reach, quad_segs=_QUARTER_SEGMENTS)
+    here = shapely.covers(field, centres)
+    discs = all_discs[here]
+    tree = shapely.STRtree(lines)
+    met = np.unique(tree.query(centres[here], predicate="dwithin", distance=reach)[0])
     inside = shapely.intersection(shapely.union_all(lines), shapely.union_all(discs[met]))
     table = obstacles.to_crs(crs)
     avoided = active(table)

@@ -44,7 +44,7 @@ class TrackStatistics:
     track_count, segment_count, gap_count, point_count : int
         Tracks with at least one segment; segments; gaps between segments; track points.
     blocked_count : int
-        Tracks that obstacles leave nothing of.
+        Tracks that obstacles leave nothing of, or only pieces that are too short.
     length_m : float
         Of all segments: the path without turns.
     gap_length_m : float
@@ -83,6 +83,7 @@ def worked(
     headland_tracks: gpd.GeoDataFrame | None,
     outline: shapely.Polygon,
     width: float,
+    scale: float,
 ) -> tuple[float, float]:
     """Area of the outline within a strip: counted once, and once for every strip.
 
@@ -94,8 +95,10 @@ def worked(
         The field, in the same.
     width : float
         Of a strip, units of that CRS.
+    scale : float
+        Units of that CRS per metre on the ground.
     """
-    strips = _strips(segments, headland_tracks, width)
+    strips = _strips(segments, headland_tracks, width, scale)
     if headland_tracks is None and _apart(segments, width):
         # Strips of every other track do not even touch: their union is the list of them.
         even = segments["track_no"].to_numpy(dtype=np.int64) % 2 == 0
@@ -128,7 +131,7 @@ def _apart(segments: gpd.GeoDataFrame, width: float) -> bool:
 
 
 def _strips(
-    segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, width: float
+    segments: gpd.GeoDataFrame, headland_tracks: gpd.GeoDataFrame | None, width: float, scale: float
 ) -> np.ndarray:
     """The strip that each segment works, as a rectangle; those of the headland, as they bend."""
     lines = segments.geometry.to_numpy()
@@ -141,12 +144,27 @@ def _strips(
     corners = np.stack(
         (ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side), axis=1
     )
+    around = [_beside(bent, width)]
     if headland_tracks is not None:
-        bent = np.concatenate((bent, headland_tracks.geometry.to_numpy()))
-    around = shapely.buffer(
-        bent, width / 2.0, cap_style="flat", join_style="mitre", mitre_limit=MITRE_LIMIT
+        ring_width = max(width, _ring_width_m(headland_tracks) * scale)
+        around.append(_beside(headland_tracks.geometry.to_numpy(), ring_width))
+    return np.concatenate((np.asarray(shapely.polygons(corners)), *around))
+
+
+def _beside(lines: Any, width: float) -> Any:
+    """The strips along lines that bend."""
+    return shapely.buffer(
+        lines, width / 2.0, cap_style="flat", join_style="mitre", mitre_limit=MITRE_LIMIT
     )
-    return np.concatenate((np.asarray(shapely.polygons(corners)), around))
+
+
+def _ring_width_m(headland_tracks: gpd.GeoDataFrame) -> float:
+    """What a pass around the field works: twice as wide as the first is away from the border.
+
+    It is wider than a strip of tracks that were moved together to fill the field evenly.
+    """
+    first = headland_tracks.loc[headland_tracks["pass_no"] == 1, "offset_m"].to_numpy(np.float64)
+    return float(np.nanmax([0.0, *(2.0 * first)]))
 
 
 def _is_straight(lines: Any) -> NDArray[np.bool_]:

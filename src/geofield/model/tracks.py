@@ -70,7 +70,8 @@ class Tracks:
     outline : shapely.Polygon or None
         The field planned in, metric CRS; None where it is not known.
     blocked_count : int
-        Tracks of the layout that obstacles leave nothing of; their numbers stay free.
+        Tracks of the layout that obstacles leave nothing of, or only pieces that are too short;
+        their numbers stay free.
     losses : tuple of ObstacleLoss
         What each obstacle costs.
     shapes : ObstacleShapes or None
@@ -217,7 +218,7 @@ class Tracks:
         if self.outline is not None:
             area = float(self.outline.area)
             width = self.spacing_m * scale
-            once, every = worked(self.segments, self.headland_tracks, self.outline, width)
+            once, every = worked(self.segments, self.headland_tracks, self.outline, width, scale)
         return TrackStatistics(
             track_count=len(self.lines),
             segment_count=len(length),

@@ -18,6 +18,8 @@ _MIN_PIECE_M = 1e-3
 #: A border is moved without what stands out less than this: where many vertices lie closer than
 #: GEOS rounds a buffer, it takes up to 15 times longer over them.
 _STANDS_OUT_M = 1e-3
+#: What a headland is wider than its passes is not worth a word below this.
+_REST_M = 0.05
 
 
 def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometry:
@@ -95,7 +97,7 @@ def headland_track_table(
     As many as fit the headland (at least one), cut where obstacles stand. A ring that nothing
     cuts stays closed.
     """
-    passes = max(1, int(np.floor(width_m / spacing_m + 1e-9)))
+    passes = _passes(width_m, spacing_m)
     offsets_m = [min((index + 0.5) * spacing_m, width_m) for index in range(passes)]
     areas = [inset(outline, offset_m * scale, holes=holes) for offset_m in offsets_m]
     blocked = _blocked(shapes, shapely.union_all(shapely.boundary(areas)))
@@ -130,6 +132,25 @@ def headland_track_table(
         lines,
         crs,
     )
+
+
+def unworked_note(width_m: float, spacing_m: float) -> tuple[str, ...]:
+    """That a strip between the last pass and the straight tracks stays unworked, where one does."""
+    passes = _passes(width_m, spacing_m)
+    rest_m = width_m - passes * spacing_m
+    if rest_m < _REST_M:
+        return ()
+    many = f"{passes} passes" if passes > 1 else "one pass"
+    return (
+        f"A headland of {width_m:g} m takes {many} of {spacing_m:g} m and leaves a strip of "
+        f"{rest_m:.2f} m unworked; {passes * spacing_m:g} m or {(passes + 1) * spacing_m:g} m "
+        "would leave none.",
+    )
+
+
+def _passes(width_m: float, spacing_m: float) -> int:
+    """How many passes a headland takes."""
+    return max(1, int(np.floor(width_m / spacing_m + 1e-9)))
 
 
 def _blocked(shapes: ObstacleShapes, rings: BaseGeometry) -> BaseGeometry:

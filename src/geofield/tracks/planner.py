@@ -23,7 +23,12 @@ from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
 from geofield.tracks.fewest import fewest_tracks
 from geofield.tracks.frame import FloatArray, TrackFrame
-from geofield.tracks.headland import headland_table, headland_track_table, main_area
+from geofield.tracks.headland import (
+    headland_table,
+    headland_track_table,
+    main_area,
+    unworked_note,
+)
 from geofield.tracks.layout import LastStrip, Strips
 from geofield.tracks.losses import obstacle_losses
 from geofield.tracks.outline import clean_outline, metric
@@ -159,8 +164,10 @@ def plan_tracks(
     edges = polygon_edges(inner, frame, FIELD)
     positions, spacing_m, more = _positions(edges, frame, baseline, strips, inset_m=headland_m)
     pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
+    told = () if len(pieces.track) else (_nothing_left(min_segment_m),)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
+        told = (*unworked_note(headland_m, wanted_m), *told)
         optional["headland"] = headland_table(
             outline, inner, headland_m, crs=metric_crs, scale=scale
         )
@@ -173,6 +180,8 @@ def plan_tracks(
             scale=scale,
             holes=headland_holes,
         )
+    for note in told:
+        warnings.warn(note, TrackWarning, stacklevel=2)
     return _tracks(
         pieces,
         crossings,
@@ -185,7 +194,7 @@ def plan_tracks(
         step_m=step_m,
         grid=grid,
         outline=outline,
-        notes=(*notes, *more),
+        notes=(*notes, *more, *told),
         direction_why=_why(baseline, fewest_tracks(inner, strips, scale), len(positions)),
         **optional,
     )
@@ -221,6 +230,12 @@ def _check_limits(**limits: float) -> None:
     for name, value in limits.items():
         if not (np.isfinite(value) and value >= 0.0):
             raise TrackError(f"{name} is {value}; it must be 0 or more metres.")
+
+
+def _nothing_left(min_segment_m: float) -> str:
+    """That no track has a piece."""
+    but = f", or leaves no piece of {min_segment_m:g} m" if min_segment_m else ""
+    return f"Nothing is left to drive: what stands there covers the field{but}."
 
 
 def _why(baseline: Baseline, least: int, count: int) -> str:
