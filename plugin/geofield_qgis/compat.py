@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from qgis.core import QgsProcessing, QgsProcessingParameterDefinition, QgsProcessingParameterNumber
+from qgis.core import (
+    QgsFeatureRequest,
+    QgsProcessing,
+    QgsProcessingFeatureSource,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterNumber,
+)
 
 try:  # Qt 6
     from qgis.PyQt.QtGui import QAction, QShortcut
@@ -30,3 +36,12 @@ FILES = _enum(QgsProcessing, "SourceType", "TypeFile", "File")
 ADVANCED = _enum(QgsProcessingParameterDefinition, "Flag", "FlagAdvanced", "Advanced")
 REAL = _enum(QgsProcessingParameterNumber, "Type", "Double")
 WHOLE = _enum(QgsProcessingParameterNumber, "Type", "Integer")
+STOP_AT_INVALID = _enum(
+    QgsFeatureRequest, "InvalidGeometryCheck", "GeometryAbortOnInvalid", "AbortOnInvalid"
+)
+UNCHECKED = _enum(
+    QgsProcessingFeatureSource,
+    "Flag",
+    "FlagSkipGeometryValidityChecks",
+    "SkipGeometryValidityChecks",
+)

@@ -10,6 +10,8 @@ from urllib.parse import parse_qs, unquote
 from qgis.core import (
     QgsDataSourceUri,
     QgsFeatureRequest,
+    QgsField,
+    QgsFields,
     QgsMapLayer,
     QgsProcessingFeatureSource,
     QgsProviderRegistry,
@@ -19,6 +21,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from . import compat
 from .engine import EngineError
 from .words import tr
 
@@ -89,27 +92,22 @@ def written(
     path = Path(folder) / f"{name}.gpkg"
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName, options.layerName = "GPKG", name
-    fields = source.fields()
-    for own in ("fid", "geom"):
-        # The file numbers its rows itself; two sources joined may have the same number. And its
-        # names of number and shape are taken, in whatever case a column has them.
-        if fields.lookupField(own) >= 0:
-            fields.remove(fields.lookupField(own))
-    kept = [source.fields().indexOf(each.name()) for each in fields]
+    fields, kept = _columns(source.fields())
     writer = QgsVectorFileWriter.create(
         str(path),
         fields,
-        QgsWkbTypes.multiType(source.wkbType()),
+        QgsWkbTypes.linearType(QgsWkbTypes.multiType(source.wkbType())),
         source.sourceCrs(),
         context.transformContext(),
         options,
     )
     count = 0
-    for feature in source.getFeatures(QgsFeatureRequest()):
+    for feature in _features(source, context):
         if feedback.isCanceled():
             break
         values = feature.attributes()
         geometry = feature.geometry()
+        geometry.convertToStraightSegment()  # the engine knows no arcs
         geometry.convertToMultiType()
         feature.setFields(fields, True)
         feature.setAttributes([values[each] for each in kept])
@@ -121,3 +119,34 @@ def written(
     if not count:
         raise EngineError(tr("{0} has no features to work on.").format(source.sourceName()))
     return str(path)
+
+
+def _columns(fields: QgsFields) -> tuple[QgsFields, list[int]]:
+    """The columns that a GeoPackage takes, and the place of each among those of the source.
+
+    The file numbers its rows itself (two sources joined may have the same number), its names of
+    number and shape are taken, and no two names may differ in their case only.
+    """
+    made, kept, taken = QgsFields(), [], {"fid", "geom"}
+    for place, theirs in enumerate(fields):
+        field, name, number = QgsField(theirs), theirs.name(), 1
+        if name.lower() in ("fid", "geom"):
+            continue
+        while field.name().lower() in taken:
+            number += 1
+            field.setName(f"{name}_{number}")
+        taken.add(field.name().lower())
+        made.append(field)
+        kept.append(place)
+    return made, kept
+
+
+def _features(source: QgsProcessingFeatureSource, context: Any) -> Any:
+    """All features; the engine itself tells or mends what is not valid.
+
+    QGIS stops at an invalid shape with an exception that passes through Python's own loop and can
+    end QGIS as a whole; leaving such shapes out, where a person chose that, is safe.
+    """
+    if context.invalidGeometryCheck() == compat.STOP_AT_INVALID:
+        return source.getFeatures(QgsFeatureRequest(), compat.UNCHECKED)
+    return source.getFeatures(QgsFeatureRequest())

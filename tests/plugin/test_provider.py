@@ -175,11 +175,19 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
         "memory": "trees", "kind": "Point", "crs": "EPSG:32633", "fields": ["radius_m"],
         "rows": [{"wkt": "POINT(500044 45)", "radius_m": 3.0}],
     }  # fmt: skip
-    own = {**memory, "fields": ["FID", "Geom"], "rows": [
-        {"wkt": square.format(500000 + 200 * n, 500080 + 200 * n), "FID": 1, "Geom": "Polygon"}
+    own = {**memory, "fields": ["FID", "Geom", "Name", "name"], "rows": [
+        {"wkt": square.format(500000 + 200 * n, 500080 + 200 * n), "FID": 1, "Geom": "Polygon",
+         "Name": f"Acker {n}", "name": "x"}
         for n in range(4)
     ]}  # fmt: skip
-    every, some, edited, chosen, named, filtered = qgis(
+    arc = "CIRCULARSTRING(500080 0, 500100 45, 500080 90)"
+    curved = {"memory": "arc", "kind": "CurvePolygon", "crs": "EPSG:32633", "rows": [
+        {"wkt": f"CURVEPOLYGON(COMPOUNDCURVE({arc}, (500080 90, 500000 90, 500000 0, 500080 0)))"}
+    ]}  # fmt: skip
+    crossed = {"memory": "crossed", "kind": "Polygon", "crs": "EPSG:32633", "rows": [
+        {"wkt": "POLYGON((500000 0, 500080 90, 500080 0, 500000 90, 500000 0))"}
+    ]}  # fmt: skip
+    every, some, edited, chosen, named, arced, invalid, filtered = qgis(
         "several",
         requests=[
             {"do": "run", "algorithm": "geofield:tracks", "values": {
@@ -196,6 +204,10 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
                 "OUTPUT": str(tmp_path / "chosen")}},
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": own, "SPACING_M": 10, "OUTPUT": str(tmp_path / "named")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": curved, "SPACING_M": 10, "OUTPUT": str(tmp_path / "arced")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": crossed, "SPACING_M": 10, "OUTPUT": str(tmp_path / "invalid")}},
             {"do": "run", "algorithm": "geofield:tracks", "values": {
                 "INPUT": {"vector": f"{sample_plan}|layername=obstacles",
                           "filter": "obstacle_no < 4"},
@@ -216,6 +228,11 @@ def test_any_polygon_layer(qgis, sample_plan, tmp_path):
     assert "not saved" in edited["error"]
     assert "not saved" in chosen["error"]
     assert named["result"]["FIELDS"] == 4
+    assert arced["result"]["FIELDS"] == 1
+    (curve,) = (tmp_path / "arced").glob("*.gpkg")
+    bow = read_dataset(curve).table("field").geometry.iloc[0].area - 80 * 90
+    assert bow == pytest.approx(1246.0, abs=0.5)  # the segment of the circle
+    assert "cannot be repaired without a guess" in invalid["error"]
     assert filtered["result"]["FIELDS"] == 3
 
 
