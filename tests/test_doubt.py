@@ -21,6 +21,7 @@ from geofield.model.field import FieldQuality
 from geofield.model.frame import along_frame
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
+from geofield.review.live import LivePlans
 from geofield.settings import load_settings
 from geofield.simulate import SimulatedField
 
@@ -145,6 +146,8 @@ def test_ground_that_nobody_saw_is_told_wherever_a_plan_is_looked_at(parcel: Pat
     start = page.index('id="plan">') + len('id="plan">')
     values = json.loads(page[start : page.index("</script>", start)])
     assert unseen in values["doubts"][0]
+    shown = LivePlans().answer({"do": "plan", "file": str(parcel / "field.gpkg")})
+    assert unseen in shown["doubts"][0]
     # A parcel is whole: it only leads out of the picture.
     assert values["field"]["frame"] == []
 

@@ -60,6 +60,8 @@ class ReviewDock(QDockWidget):
             "gaps": band(self.canvas, lines, "#ff80ab", 2),
         }
         self._hidden: list[str] = []
+        #: What the picture did not allow when obstacles were looked for.
+        self._obstacle_doubts: list[str] = []
         self._build()
         self._keys()
         self._timer = QTimer(self)
@@ -175,7 +177,8 @@ class ReviewDock(QDockWidget):
         if certainty is not None:
             text += tr(", outline {0:.0%} certain").format(certainty)
         self.title.setText(text)
-        self.doubts.setText(str(value(row, "doubts", "")))
+        outline = [value(row, "doubts")] if value(row, "doubts") else []
+        self.doubts.setText("\n".join([*outline, *self._obstacle_doubts]))
 
     # -- which plan --------------------------------------------------------------------------
 
@@ -215,7 +218,7 @@ class ReviewDock(QDockWidget):
             except (TypeError, RuntimeError):
                 continue  # the layer is gone
         self._connections = []
-        self.review, self.current = None, None
+        self.review, self.current, self._obstacle_doubts = None, None, []
         self._timer.stop()
         self._clear_preview()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
@@ -362,11 +365,12 @@ class ReviewDock(QDockWidget):
             self._trouble(answer["error"]["message"])
             return False
         figures = answer["figures"]
-        self.figures.setText(
-            tr("{0} tracks in {1} segments, {2:.2f} km").format(
-                figures["tracks"], figures["segments"], figures["length_m"] / 1000
-            )
+        text = tr("{0} tracks in {1} segments, {2:.2f} km").format(
+            figures["tracks"], figures["segments"], figures["length_m"] / 1000
         )
+        self.figures.setText("\n".join([text, *answer.get("notes", [])]))
+        self._obstacle_doubts = answer.get("doubts", [])
+        self._tell_outline()
         return True
 
     def _clear_preview(self) -> None:

@@ -170,6 +170,13 @@ def work():
             if item.level() in (Qgis.MessageLevel.Warning, Qgis.MessageLevel.Critical)
         ],
     }
+    # What the engine has to tell stands in the panel, as long as it tells it.
+    outline = dock.doubts.text()
+    figures = {"tracks": 2, "segments": 3, "length_m": 450.0}
+    dock._show_figures({"figures": figures, "doubts": ["Hazy."], "notes": ["A strip is left."]})
+    ANSWER["told"] = [dock.doubts.text().removeprefix(outline), dock.figures.text()]
+    dock._show_figures({"figures": figures})
+    ANSWER["told"].append(dock.doubts.text() == outline)
     # All the rest by keys, timed.
     begun, presses = time.monotonic(), 0
     while any(each in ("detected", "possible") for each in statuses(layer).values()):

@@ -131,6 +131,13 @@ def test_saving_plans_again_in_the_open_file(seen):
     assert saved["statuses"][str(seen["moved"][0])] == "confirmed"
 
 
+def test_the_panel_tells_what_the_engine_tells(seen):
+    doubts, figures, again = seen["told"]
+    assert doubts.strip() == "Hazy."
+    assert figures.splitlines()[1:] == ["A strip is left."]
+    assert again
+
+
 def test_a_whole_review_by_keys(seen):
     presses, wall_s = seen["by_keys"]
     assert seen["count_after"].startswith("0 left to look at")

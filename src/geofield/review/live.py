@@ -124,4 +124,5 @@ def _told(step: Step) -> dict[str, Any]:
             "length_m": float(tracks.segments["length_m"].sum()),
         },
         "notes": [*step.notes, *tracks.notes],
+        "doubts": list(step.plan.evidence.obstacle_doubts),
     }
