@@ -20,10 +20,12 @@ import pytest
 import rasterio
 import shapely
 from affine import Affine
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from geofield.cli.main import cli
 from geofield.crs import parse_crs
 from geofield.errors import (
     ImageryError,
@@ -633,6 +635,26 @@ def test_sheets_of_another_zone_fit_to_a_pixel(tmp_path: Path) -> None:
     assert np.percentile(difference, 99) < 3.0
 
 
+def test_a_geopackage_that_is_the_picture_itself(tmp_path: Path) -> None:
+    """As QGIS and GDAL write one; other GeoPackages are indexes."""
+    from .pictures import ground, write
+
+    plain = write(tmp_path / "plain.tif", ground())
+    rasterio.shutil.copy(plain, tmp_path / "tiled.gpkg", driver="GPKG", TILE_FORMAT="PNG")
+    there, here = read_scene(plain), read_scene(tmp_path / "tiled.gpkg")
+    assert here.grid.to_native(3, 4) == pytest.approx(there.grid.to_native(3, 4), abs=1e-6)
+    height, width = there.bands.shape[1:]
+    assert np.array_equal(here.bands[:3, :height, :width], there.bands)
+    told = CliRunner().invoke(cli, ["info", str(tmp_path / "tiled.gpkg")])
+    assert "bands: red uint8" in told.stdout
+    # Of several pictures in one file, which one is for the person to say.
+    more = {"driver": "GPKG", "RASTER_TABLE": "b", "APPEND_SUBDATASET": "YES"}
+    rasterio.shutil.copy(plain, tmp_path / "tiled.gpkg", **more)
+    with pytest.raises(ImageryError, match="2 others") as caught:
+        read_scene(tmp_path / "tiled.gpkg")
+    assert "gdal_translate 'GPKG:" in caught.value.hint
+
+
 def test_an_index_and_a_vrt(tmp_path: Path) -> None:
     import fiona
 
@@ -759,8 +781,12 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
 
     with rasterio.open(done.path) as opened:
         assert np.array_equal(opened.read(), expected(done.grid, 16))
+    # What the file does not show is no picture, as beyond the edge of any other one.
+    wide = acquire(source, replace(where, size_px=1500), tmp_path / "b.tif")
+    with rasterio.open(wide.path) as opened:
+        assert 0.2 < opened.dataset_mask().mean() / 255 < 0.3  # 768 of 1500 px
     with pytest.raises(ImageryError, match="not in the file"):
-        acquire(source, replace(where, size_px=1500), tmp_path / "b.tif")
+        acquire(source, replace(where, lat=LAT + 0.1), tmp_path / "c.tif")
     (tmp_path / "bad.mbtiles").write_text("nothing")
     with pytest.raises(ImageryError, match="not an MBTiles file"):
         find_source(str(tmp_path / "bad.mbtiles"))

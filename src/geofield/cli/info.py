@@ -43,8 +43,9 @@ def _facts(file: Path, crs: str | None) -> dict[str, Any]:
     """What a file holds; one of no vector format that is known may be a picture of any kind."""
     from geofield.errors import FormatError, ImageryError
     from geofield.formats import detect
+    from geofield.imagery.pictures import holds_tiles
 
-    if file.suffix.lower() in (".tif", ".tiff"):
+    if file.suffix.lower() in (".tif", ".tiff") or holds_tiles(file):
         return _picture(file)
     try:
         detect(file)

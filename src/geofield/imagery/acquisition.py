@@ -145,8 +145,10 @@ def acquire(
         # Closed before the cache is: what has arrived when the work stops is still kept.
         staging.fill(stack.enter_context(closing(fetcher.rows(block, progress))))
         report = fetcher.report
-        if report.absent and (options.missing == "error" or report.absent == report.wanted):
-            raise absence_error(source.name, report, offline=options.offline)
+        # A file of one's own shows what it shows, as any picture; a server may have had more.
+        masked = options.missing == "mask" or not (report.failed or isinstance(source, TileSource))
+        if report.absent and (not masked or report.absent == report.wanted):
+            raise absence_error(source, report, offline=options.offline)
         provenance = _provenance(source, block, report)
         if progress is not None:
             progress(block.count, block.count, "writing")

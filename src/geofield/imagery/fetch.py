@@ -212,12 +212,23 @@ class TileFetcher:
         self._cache.put((t.zoom, t.column, t.row, body) for t, body in done if body is not None)
 
 
-def absence_error(name: str, report: FetchReport, *, offline: bool) -> ImageryError:
-    """The error for a product with holes."""
-    repeat = "Work without --offline" if offline else "Repeat"
+def absence_error(
+    source: TileSource | MBTilesSource, report: FetchReport, *, offline: bool
+) -> ImageryError:
+    """The error for a product with holes, or with nothing in it."""
     parts = [f"{count} x {reason}" for reason, count in report.reasons.most_common(4)]
-    return ImageryError(
-        f"{report.absent} of {report.wanted} tiles of {name} could not be had "
-        f"({report.missing} are not there, {report.failed} failed): {'; '.join(parts)}.",
-        hint=f"{repeat} to fetch only these, or use --missing mask to leave them as no-data.",
+    told = (
+        f"{report.absent} of {report.wanted} tiles of {source.name} could not be had "
+        f"({report.missing} are not there, {report.failed} failed): {'; '.join(parts)}."
     )
+    if isinstance(source, MBTilesSource):
+        hint = (
+            "Check the place; --missing mask (of `geofield tiles`) leaves damaged ones as no-data."
+        )
+    else:
+        repeat = "Work without --offline" if offline else "Repeat"
+        hint = (
+            f"{repeat} to fetch only these, or use --missing mask (of `geofield tiles`) to leave "
+            "them as no-data."
+        )
+    return ImageryError(told, hint=hint)

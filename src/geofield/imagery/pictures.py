@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +47,7 @@ def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneR
         return open_collection(pictures_in(file), options, name=file.name)
     if file.suffix.lower() in (".json", ".geojson") and file.is_file() and is_stac(file):
         return open_stac(file, options)
-    if file.suffix.lower() in _INDEXES and file.is_file():
+    if file.suffix.lower() in _INDEXES and file.is_file() and not holds_tiles(file):
         located = pictures_of_index(file)
         for each in located:
             options.reach.of(path).require(each, file.name)
@@ -67,6 +69,18 @@ def pictures_in(folder: Path) -> list[str]:
             hint="Give a folder with GeoTIFF, VRT or JPEG 2000 files.",
         )
     return found
+
+
+def holds_tiles(file: Path) -> bool:
+    """Whether a GeoPackage is a picture itself, as QGIS and GDAL write them, not an index."""
+    if file.suffix.lower() != ".gpkg":
+        return False
+    asked = "SELECT 1 FROM gpkg_contents WHERE data_type IN ('tiles', '2d-gridded-coverage')"
+    try:
+        with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as db:
+            return db.execute(asked).fetchone() is not None
+    except sqlite3.DatabaseError:
+        return False
 
 
 def pictures_of_index(index: Path) -> list[str]:

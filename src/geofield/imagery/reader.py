@@ -102,7 +102,7 @@ class SceneReader:
                 inner, told, hint = dataset.subdatasets, "", "Give a raster file."
                 if inner:
                     told = f", but {len(inner)} others"
-                    hint = f"Open one of them, for instance {inner[0]!r}."
+                    hint = f"Take one out of it: gdal_translate {inner[0]!r} picture.tif"
                 raise ImageryError(
                     f"The file {display_name(path)} holds no picture itself{told}.", hint=hint
                 )
