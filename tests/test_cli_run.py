@@ -111,8 +111,10 @@ def test_an_own_boundary_is_taken_as_it_is(
     table = gpd.GeoDataFrame({"name": ["mine"]}, geometry=[shape], crs=simulated.field.crs)
     table.to_crs(4326).to_file(parcels, driver="GeoJSON", COORDINATE_PRECISION=9)
     out = tmp_path / "out"
-    run = ["run", simulated_tif, *point(simulated), "--spacing", 8, "--out", out]
-    assert geofield(*run, "--boundary", parcels) == 0
+    # One parcel needs no point beside it; half a point is a slip.
+    run = ["run", simulated_tif, "--boundary", parcels, "--spacing", 8, "--out", out]
+    assert geofield(*run, "--lon", simulated.lon) == 2
+    assert geofield(*run) == 0
     plan = read_plan(out / "field.gpkg")
     assert plan.field.method == "boundary"
     assert plan.field.polygon.symmetric_difference(shape).area < 0.01 * shape.area

@@ -15,6 +15,7 @@ import shapely
 from pyproj import CRS
 
 import geofield as gf
+from geofield.crs import parse_crs, transformer
 from geofield.model.obstacles import circle_polygons
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
@@ -105,3 +106,13 @@ def run_other(plan: Plan) -> Plan:
     from dataclasses import replace
 
     return replace(plan, field=replace(plan.field, name="another"))
+
+
+def test_a_place_in_a_field_that_180_degrees_runs_through() -> None:
+    polygon = shapely.box(817_500, 8_007_000, 817_900, 8_007_200)
+    field = gf.Field(polygon, parse_crs("EPSG:32760"))
+    longitudes = shapely.get_coordinates(field.polygon_lonlat)[:, 0]
+    assert longitudes.min() < -179 < 179 < longitudes.max()
+    lat, lon = Plan(field).point
+    there = shapely.Point(transformer(parse_crs(4326), field.crs).transform(lon, lat))
+    assert polygon.contains(there)

@@ -131,12 +131,8 @@ def open_scene(path: str | Path, lat: float, lon: float, settings: Settings) -> 
 
 def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
     """Read the picture that a plan was made from, at the point it was made for."""
-    point = plan.evidence.point
-    if point is None:
-        inside = plan.field.polygon_lonlat.representative_point()
-        point = (inside.y, inside.x)
     imagery = (plan.settings or settings).imagery
-    return open_scene(path, *point, settings.model_copy(update={"imagery": imagery}))
+    return open_scene(path, *plan.point, settings.model_copy(update={"imagery": imagery}))
 
 
 def run_field(

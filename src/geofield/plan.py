@@ -153,6 +153,14 @@ class Plan:
             return []
         return along_frame(one.polygon, one.crs, self.grid)
 
+    @property
+    def point(self) -> tuple[float, float]:
+        """Latitude and longitude that the field was looked for at, or of a place in it."""
+        if self.evidence.point is not None:
+            return self.evidence.point
+        lon, lat = self.field.inside_lonlat
+        return lat, lon
+
     def to_dataset(self) -> Dataset:
         """The tables of the plan, as formats write them."""
         return Dataset(

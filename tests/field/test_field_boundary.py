@@ -35,6 +35,16 @@ def test_a_parcel_by_name_or_number():
         field_from_boundary(parcels(), lat=LAT, lon=LON, name="C")
 
 
+def test_a_parcel_without_a_point():
+    """The only one, or the one named: the CRS is that of its own place."""
+    alone = field_from_boundary(parcels().iloc[:1])
+    assert (alone.name, alone.crs.utm_zone) == ("A", "32N")
+    assert field_from_boundary(parcels(), name="B").name == "B"
+    with pytest.raises(FieldError, match="holds 2 polygons") as caught:
+        field_from_boundary(parcels())
+    assert "--boundary-name" in caught.value.hint
+
+
 def test_the_smallest_of_overlapping_parcels():
     nested = parcels()
     nested.loc[1, "geometry"] = shapely.box(9.9995, 49.9995, 10.0005, 50.0005)

@@ -320,6 +320,11 @@
     </message>
     <message>
       <location filename="dock.py" />
+      <source>{0} tracks in {1} segments, {2:.2f} km</source>
+      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
       <source>The outline has edits that are not saved: save them, too.</source>
       <translation>Der Umriss hat Änderungen, die nicht gespeichert sind: speichern Sie auch diese.</translation>
     </message>
@@ -342,11 +347,6 @@
       <location filename="dock.py" />
       <source>, outline {0:.0%} certain</source>
       <translation>, Umriss zu {0:.0%} sicher</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>{0} tracks in {1} segments, {2:.2f} km</source>
-      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
     </message>
     <message>
       <location filename="dock.py" />
@@ -1095,7 +1095,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Latitude of a point in the field.</source>
+      <source>Latitude of a point in the field; not needed for the only parcel of --boundary, or one named.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1105,7 +1105,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Longitude of a point in the field.</source>
+      <source>Longitude of a point in the field; not needed for the only parcel of --boundary, or one named.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1175,7 +1175,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Your own parcels (any vector file, any CRS): the one with the point is taken.</source>
+      <source>Your own parcels (any vector file, any CRS): the only one is taken, or the one with the point.</source>
       <translation type="unfinished" />
     </message>
     <message>

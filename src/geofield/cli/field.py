@@ -13,11 +13,11 @@ from geofield.cli.files import FILE, FOLDER, claim_plan
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
     name_option,
-    point_options,
+    point_or_parcel_options,
     stage_options,
     tell_idle,
 )
-from geofield.cli.parcels import boundary_options, own_parcel
+from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ Examples (on the project's own sample):
 """,
 )
 @click.argument("imagery", type=click.Path(path_type=str))
-@point_options
+@point_or_parcel_options
 @click.option(
     "-o",
     "--output",
@@ -83,8 +83,8 @@ Examples (on the project's own sample):
 @stage_options("imagery", "field")
 def field(
     imagery: str,
-    lat: float,
-    lon: float,
+    lat: float | None,
+    lon: float | None,
     output: Path | None,
     overwrite: bool,
     fresh: bool,
@@ -113,7 +113,7 @@ def field(
     from geofield.settings import with_values
 
     _refuse_at_odds(click.get_current_context().params)
-    parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
+    parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
     chosen = with_values(settings, method="study") if regions else settings
     tell_idle(chosen, parcel=parcel is not None)
     previous = None

@@ -77,14 +77,16 @@ class NearestChoice(click.Choice[str]):
             raise click.BadParameter(error.message + near, ctx, param) from None
 
 
-def point_options(command: Command) -> Command:
-    """Add ``--lat`` and ``--lon``, both required."""
-    command = click.option(
-        "--lon", type=Degrees(180), required=True, help="Longitude of a point in the field."
-    )(command)
-    return click.option(
-        "--lat", type=Degrees(90), required=True, help="Latitude of a point in the field."
-    )(command)
+def point_or_parcel_options(command: Command) -> Command:
+    """Add ``--lat`` and ``--lon``, which a parcel of the user's own may stand for."""
+    for name, what, limit in (("lon", "Longitude", 180), ("lat", "Latitude", 90)):
+        command = click.option(
+            f"--{name}",
+            type=Degrees(limit),
+            help=f"{what} of a point in the field; not needed for the only parcel of --boundary, "
+            "or one named.",
+        )(command)
+    return command
 
 
 def settings_option(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -25,22 +25,27 @@ def boundary_options(command: Command) -> Command:
         click.option(
             "--boundary",
             type=OLD_PATH,
-            help="Your own parcels (any vector file, any CRS): the one with the point is taken.",
+            help="Your own parcels (any vector file, any CRS): the only one is taken, or the one "
+            "with the point.",
         ),
     ):
         command = option(command)
     return command
 
 
-def own_parcel(
-    path: Path | None, layer: str | None, name: str | None, lat: float, lon: float
-) -> Field | None:
-    """The user's own parcel from any vector file; None without one."""
+def parcel_and_point(
+    path: Path | None, layer: str | None, name: str | None, lat: float | None, lon: float | None
+) -> tuple[Field | None, float, float]:
+    """The user's own parcel from any vector file, None without one, and a point in the field."""
     if path is None:
         if layer or name:
             given = "--boundary-layer" if layer else "--boundary-name"
             raise click.UsageError(f"{given} is of a file of parcels: name it with --boundary.")
-        return None
+        if lat is None or lon is None:
+            raise _missing(lat)
+        return None, lat, lon
+    if (lat is None) != (lon is None):
+        raise _missing(lat)
     from geofield.field import field_from_boundary
     from geofield.formats.foreign import read_vector
 
@@ -51,4 +56,11 @@ def own_parcel(
             f"The boundary: {error.message}",
             hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
         ) from None
-    return field_from_boundary(table, lat=lat, lon=lon, name=name)
+    parcel = field_from_boundary(table, lat=lat, lon=lon, name=name)
+    if lat is None or lon is None:
+        lon, lat = parcel.inside_lonlat
+    return parcel, lat, lon
+
+
+def _missing(lat: float | None) -> click.UsageError:
+    return click.UsageError(f"Missing option '{'--lat' if lat is None else '--lon'}'.")

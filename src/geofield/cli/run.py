@@ -14,11 +14,11 @@ from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
     acknowledge_option,
     name_option,
-    point_options,
+    point_or_parcel_options,
     stage_options,
     tell_idle,
 )
-from geofield.cli.parcels import boundary_options, own_parcel
+from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
 
 if TYPE_CHECKING:
@@ -34,12 +34,12 @@ Examples (on the project's own sample):
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/ \\
       --buffer 2 --format gpkg --format geojson --overwrite
-  geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out own/ \\
+  geofield run sample_data/field_1.tif --out own/ \\
       --boundary sample_data/field_1.gpkg --boundary-layer field
 """,
 )
 @click.argument("imagery", type=click.Path(path_type=str))
-@point_options
+@point_or_parcel_options
 @click.option(
     "--out",
     required=True,
@@ -69,8 +69,8 @@ Examples (on the project's own sample):
 )
 def run(
     imagery: str,
-    lat: float,
-    lon: float,
+    lat: float | None,
+    lon: float | None,
     out: Path,
     overwrite: bool,
     fresh: bool,
@@ -82,7 +82,7 @@ def run(
     as_json: bool,
     settings: Settings,
 ) -> None:
-    """From a picture and a point in a field to outline, obstacles and tracks.
+    """From a picture and a point in a field, or its boundary, to outline, obstacles and tracks.
 
     IMAGERY is a GeoTIFF, a folder of them, or any other source that `geofield tiles` takes.
     Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
@@ -94,8 +94,8 @@ def run(
     from geofield.plan import read_plan
     from geofield.staging import PREFIX
 
+    parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
     claim_folder(out)
-    parcel = own_parcel(boundary, boundary_layer, boundary_name, lat, lon)
     tell_idle(settings, parcel=parcel is not None)
     if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
         # Said at once, not after the work.

@@ -291,8 +291,7 @@ class _Memory:
 
 
 def _outcome(plan: Plan) -> Outcome:
-    inside = plan.field.polygon_lonlat.representative_point()
-    lat, lon = plan.evidence.point or (inside.y, inside.x)
+    lat, lon = plan.point
     field = plan.field
     return Outcome(field.field_id, field.name, lat=lat, lon=lon, **outcome_words(plan))
 

@@ -127,10 +127,10 @@ def _as_reviewed(place: Place, previous: Plan) -> Place:
             f"The plan that was reviewed as {place.field_id!r} is of a field elsewhere.",
             hint="Give this place an id of its own, or take that plan out of the farm's reviewed/.",
         )
-    inside = field.polygon_lonlat.representative_point()
+    lon, lat = field.inside_lonlat
     known = {name for name, _ in field.own}
     own = (*field.own, *(each for each in place.own if each[0] not in known))
-    return replace(place, lat=inside.y, lon=inside.x, name=field.name or place.name, own=own)
+    return replace(place, lat=lat, lon=lon, name=field.name or place.name, own=own)
 
 
 def _holds(previous: Plan, place: Place) -> bool:

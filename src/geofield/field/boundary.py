@@ -22,23 +22,27 @@ _NAME_COLUMNS = ("name", "Name", "NAME", "field_name", "field_id", "id", "fid")
 
 
 def field_from_boundary(
-    parcels: gpd.GeoDataFrame, *, lat: float, lon: float, name: str | None = None
+    parcels: gpd.GeoDataFrame,
+    *,
+    lat: float | None = None,
+    lon: float | None = None,
+    name: str | None = None,
 ) -> Field:
-    """The parcel that contains a point, or the one of a name.
+    """The parcel that contains a point, the one of a name, or the only one.
 
     Parameters
     ----------
     parcels : GeoDataFrame
         Polygons in any CRS; other geometries are passed over.
-    lat, lon : float
-        A point in the field, degrees, WGS 84.
+    lat, lon : float, optional
+        A point in the field, degrees, WGS 84; not needed for one parcel, or with its name.
     name : str, optional
         Take the parcel with this value in any column instead.
 
     Returns
     -------
     Field
-        Method ``boundary``, in the metric CRS of the point.
+        Method ``boundary``, in the metric CRS of the point, or of a place in the parcel.
 
     Raises
     ------
@@ -58,32 +62,65 @@ def field_from_boundary(
     if rows.empty:
         raise FieldError("The boundary file holds no polygon.")
     if name is not None:
-        chosen = rows[_named(rows, name)]
-        what = f"is named {name!r}"
+        chosen = _of_name(rows, name)
+    elif lat is not None and lon is not None:
+        chosen = _around(rows, own, lat, lon)
     else:
-        x, y = transformer(LONLAT, own).transform(lon, lat)
-        chosen = rows[rows.geometry.intersects(shapely.Point(x, y))]
-        what = f"contains lat {lat}, lon {lon}"
-    if chosen.empty and name is None:
-        there = transformer(LONLAT, own).transform(lat, lon) if abs(lon) <= 90 else (np.inf, np.inf)
-        if rows.geometry.intersects(shapely.Point(there)).any():
-            raise FieldError(
-                f"None of the {len(rows)} polygons in the boundary file {what}, but one does with "
-                "latitude and longitude swapped.",
-                hint="Exchange them in the file (`ogr2ogr -swapXY`), or in --lat and --lon where "
-                "the point is wrong.",
-            )
-    if chosen.empty:
-        raise FieldError(
-            f"None of the {len(rows)} polygons in the boundary file {what}.",
-            hint="Check the point and the file's CRS, or name a parcel with --boundary-name.",
-        )
-    if len(chosen) > 1:
-        if name is not None and len(chosen.index.unique()) == 1:
-            raise FieldError(f"The parcel {name!r} has {len(chosen)} parts; a field is one.")
-        # Nested or overlapping parcels: the smallest is the most exact statement.
-        chosen = chosen.iloc[[int(np.argmin(shapely.area(chosen.geometry.to_numpy())))]]
+        chosen = _only(rows)
+    if lat is None or lon is None:
+        inside = chosen.geometry.iloc[0].representative_point()
+        lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
     return _field(chosen, own, lat, lon)
+
+
+def _of_name(rows: gpd.GeoDataFrame, name: str) -> gpd.GeoDataFrame:
+    """The parcel with a value in any of its columns."""
+    chosen = rows[_named(rows, name)]
+    if chosen.empty:
+        raise _none_of(rows, f"is named {name!r}")
+    if len(chosen) > 1 and len(chosen.index.unique()) == 1:
+        raise FieldError(f"The parcel {name!r} has {len(chosen)} parts; a field is one.")
+    return _smallest(chosen)
+
+
+def _around(rows: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> gpd.GeoDataFrame:
+    """The parcel that contains a point."""
+    x, y = transformer(LONLAT, own).transform(lon, lat)
+    chosen = rows[rows.geometry.intersects(shapely.Point(x, y))]
+    if len(chosen):
+        return _smallest(chosen)
+    what = f"contains lat {lat}, lon {lon}"
+    there = transformer(LONLAT, own).transform(lat, lon) if abs(lon) <= 90 else (np.inf, np.inf)
+    if rows.geometry.intersects(shapely.Point(there)).any():
+        raise FieldError(
+            f"None of the {len(rows)} polygons in the boundary file {what}, but one does with "
+            "latitude and longitude swapped.",
+            hint="Exchange them in the file (`ogr2ogr -swapXY`), or in --lat and --lon where "
+            "the point is wrong.",
+        )
+    raise _none_of(rows, what)
+
+
+def _only(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The one parcel that there is."""
+    if len(rows) > 1:
+        raise FieldError(
+            f"The boundary file holds {len(rows)} polygons.",
+            hint="Say which is the field: --lat and --lon of a point in it, or --boundary-name.",
+        )
+    return rows
+
+
+def _none_of(rows: gpd.GeoDataFrame, what: str) -> FieldError:
+    return FieldError(
+        f"None of the {len(rows)} polygons in the boundary file {what}.",
+        hint="Check the point and the file's CRS, or name a parcel with --boundary-name.",
+    )
+
+
+def _smallest(chosen: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Of nested or overlapping parcels the smallest is the most exact statement."""
+    return chosen.iloc[[int(np.argmin(shapely.area(chosen.geometry.to_numpy())))]]
 
 
 def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:

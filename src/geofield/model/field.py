@@ -19,6 +19,7 @@ from geofield.crs import (
     is_metric,
     parse_crs,
     reproject,
+    transformer,
 )
 from geofield.errors import CRSError, FieldError
 from geofield.grid import Grid
@@ -195,6 +196,13 @@ class Field:
         """The polygon in longitude and latitude, degrees."""
         polygon: Polygon = reproject(self.polygon, self.crs, LONLAT)
         return polygon
+
+    @property
+    def inside_lonlat(self) -> tuple[float, float]:
+        """Longitude and latitude of a place in it, degrees; also where 180 degrees runs through."""
+        inside = self.polygon.representative_point()
+        lon, lat = transformer(self.crs, LONLAT).transform(inside.x, inside.y)
+        return float(lon), float(lat)
 
     def polygon_px(self, grid: Grid) -> Polygon:
         """The polygon in the pixel coordinates of `grid`."""

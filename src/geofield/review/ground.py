@@ -63,7 +63,7 @@ class Ground:
         other = [one for one in getattr(said, sides[1]) if _metres_apart(one, place) > _SAME_M]
         points = {sides[0]: (*getattr(said, sides[0]), place), sides[1]: tuple(other)}
         said = said.model_copy(update={**points, "method": "auto"})
-        lat0, lon0 = self._point(plan)
+        lat0, lon0 = plan.point
         if self._scene is None:
             self._scene = self._read(plan)
             self._search = prepare_field(self._scene, lat=lat0, lon=lon0)
@@ -79,13 +79,6 @@ class Ground:
                 plan.evidence, outline=outline_digest(found.polygon), point=(lat0, lon0)
             ),
         )
-
-    def _point(self, plan: Plan) -> tuple[float, float]:
-        """Latitude and longitude that the field was looked for at."""
-        if plan.evidence.point is not None:
-            return plan.evidence.point
-        inside = plan.field.polygon_lonlat.representative_point()
-        return inside.y, inside.x
 
 
 def _metres_apart(one: tuple[float, float], other: tuple[float, float]) -> float:
