@@ -170,7 +170,7 @@ class ReviewDock(QDockWidget):
         row = None if field is None else next(field.getFeatures(), None)
         if row is None:
             self.title.setText(self.path)
-            self.doubts.setText("")
+            self._show_doubts([])
             return
         text = f"{value(row, 'name', '')}, {value(row, 'area_ha', 0.0):.2f} ha"
         certainty = value(row, "certainty")
@@ -178,7 +178,11 @@ class ReviewDock(QDockWidget):
             text += tr(", outline {0:.0%} certain").format(certainty)
         self.title.setText(text)
         outline = [value(row, "doubts")] if value(row, "doubts") else []
-        self.doubts.setText("\n".join([*outline, *self._obstacle_doubts]))
+        self._show_doubts([*outline, *self._obstacle_doubts])
+
+    def _show_doubts(self, doubts: list[str]) -> None:
+        self.doubts.setText("\n".join(doubts))
+        self.doubts.setVisible(bool(doubts))
 
     # -- which plan --------------------------------------------------------------------------
 
