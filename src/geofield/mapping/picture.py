@@ -107,12 +107,17 @@ class _Canvas:
         self.labels: list[Label] = []
 
     def picture(self, scene: Scene, margins: Margins) -> None:
-        rgb = scene.rgb.copy()
-        rgb[~scene.valid] = 70
-        width, height = round(rgb.shape[1] * self.factor), round(rgb.shape[0] * self.factor)
-        picture = Image.fromarray(rgb).resize((width, height), Image.Resampling.BICUBIC)
+        rows, columns = scene.valid.shape
+        size = (round(columns * self.factor), round(rows * self.factor))
+        # Band by band: of a wide picture, the three together take as much memory as it does.
+        small = [
+            Image.fromarray(np.where(scene.valid, band, np.uint8(70))).resize(
+                size, Image.Resampling.BICUBIC
+            )
+            for band in scene.rgb_bands
+        ]
         left, top = (round(margin * self.factor) for margin in margins[:2])
-        self.image.paste(picture, (left, top))
+        self.image.paste(Image.merge("RGB", small), (left, top))
 
     def tables(self) -> None:
         line = 1.4 * _OVERSAMPLING

@@ -129,11 +129,16 @@ class Scene:
     @property
     def rgb(self) -> NDArray[np.uint8]:
         """Red, green and blue (rows, columns, 3); one band repeated where there is no colour."""
+        return np.stack(self.rgb_bands, axis=-1)
+
+    @property
+    def rgb_bands(self) -> list[NDArray[np.uint8]]:
+        """Red, green and blue one by one (rows, columns), as they lie in the scene."""
         if self.is_colour:
             index = [self.roles.index(role) for role in ("red", "green", "blue")]
         else:
             index = [self._grey_index()] * 3
-        return np.ascontiguousarray(np.moveaxis(self.bands[index], 0, -1))
+        return [self.bands[each] for each in index]
 
     @property
     def grey(self) -> NDArray[np.float32]:
