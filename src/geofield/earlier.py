@@ -99,7 +99,7 @@ def of_the_same_field(previous: Plan | None, lat: float, lon: float) -> Plan | N
     FieldError, ObstacleError
         When a person's work would be lost: on another field, or in a layer that is gone.
     """
-    if previous is None or not _holds(previous, lat=lat, lon=lon):
+    if previous is None or not holds(previous, lat=lat, lon=lon):
         if previous is not None:
             _refuse_to_forget(previous, lat, lon)
         return None
@@ -108,7 +108,16 @@ def of_the_same_field(previous: Plan | None, lat: float, lon: float) -> Plan | N
     return previous
 
 
-def _holds(previous: Plan, *, lat: float, lon: float) -> bool:
+def known_outline(
+    boundary: Field | None, previous: Plan | None, lat: float, lon: float
+) -> Field | None:
+    """The outline that is there before a picture is looked at: a parcel, or a person's own."""
+    if previous is not None and holds(previous, lat=lat, lon=lon) and keeps_outline(previous):
+        return previous.field
+    return boundary
+
+
+def holds(previous: Plan, *, lat: float, lon: float) -> bool:
     """Whether an earlier plan is of the field at a point."""
     x, y = transformer(LONLAT, previous.field.crs).transform(lon, lat)
     return bool(shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)))

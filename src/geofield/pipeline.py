@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 import shapely
-from pyproj import Geod
 
 from geofield import schema
 from geofield.earlier import (
     drew_outline,
     keeps_outline,
     kept_outline,
+    known_outline,
     of_the_same_field,
     outline_changed,
     points_said,
@@ -31,7 +31,7 @@ from geofield.earlier import (
     tell_lost_tracks,
     with_points,
 )
-from geofield.errors import FieldError, FieldWarning, GeofieldError, TrackError
+from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarning, TrackError
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.merge import merge
@@ -41,6 +41,7 @@ from geofield.model.tracks import Tracks
 from geofield.model.written import Written
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
+from geofield.windows import first_side_m, open_scene, shows_all, wider
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
@@ -99,12 +100,11 @@ def plan_field(
     tell = progress or (lambda done, total, what: None)
     timings = timings_s if timings_s is not None else {}
     with _timed("picture", timings, tell):
-        picture = scene if isinstance(scene, Scene) else open_scene(scene, lat, lon, settings)
+        known = known_outline(boundary, previous, lat, lon)
+        picture = _seen(scene, lat, lon, settings, known)
     with _timed("field", timings, tell):
-        # A window of a size that was asked for may grow: the stage reads it itself.
-        whole = isinstance(scene, Scene) or settings.imagery.size_m is None
         plan = run_field(
-            picture if whole else scene,
+            scene,
             lat=lat,
             lon=lon,
             settings=settings,
@@ -118,21 +118,6 @@ def plan_field(
         plan = run_obstacles(plan, picture, settings=settings)
     with _timed("tracks", timings, tell):
         return run_tracks(plan, settings=settings)
-
-
-def open_scene(path: str | Path, lat: float, lon: float, settings: Settings) -> Scene:
-    """Read the picture around a point (stage 1)."""
-    from geofield.imagery import read_scene
-
-    return read_scene(
-        path, lat=lat, lon=lon, allow=settings.fetch.allow, **settings.imagery.model_dump()
-    )
-
-
-def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
-    """Read the picture that a plan was made from, at the point it was made for."""
-    imagery = (plan.settings or settings).imagery
-    return open_scene(path, *plan.point, settings.model_copy(update={"imagery": imagery}))
 
 
 def run_field(
@@ -155,11 +140,10 @@ def run_field(
     already. By a person's word come `regions`, numbered by the study's method, and `choose`, one
     of the field's alternatives.
     """
-    if isinstance(picture, Scene):
-        scene = picture
-    else:
-        scene = open_scene(picture, lat, lon, settings) if window is None else window
     previous = of_the_same_field(previous, lat, lon)
+    # Regions have the numbers that a list of them gave, before there was an outline.
+    known = None if regions else known_outline(boundary, previous, lat, lon)
+    scene = _seen(picture, lat, lon, settings, known) if window is None else window
     told = set() if previous is None else points_said(previous.settings)
     said = bool(points_said(settings) - told or regions)
     settings = with_points(settings, previous)
@@ -222,6 +206,15 @@ def _keeps(previous: Plan, boundary: Field | None, *, said: bool) -> bool:
     return keeps_outline(previous) and not (previous.field.method == "chosen" and said)
 
 
+def _seen(
+    picture: Scene | str | Path, lat: float, lon: float, settings: Settings, known: Field | None
+) -> Scene:
+    """The picture around a point, with all of the outline that is known."""
+    if isinstance(picture, Scene):
+        return picture
+    return open_scene(picture, lat, lon, settings, outline=known)
+
+
 def _find(
     picture: Scene | str | Path,
     scene: Scene,
@@ -236,30 +229,23 @@ def _find(
     options = settings.field.model_dump()
     if regions:
         options |= {"method": "study", "include": (), "exclude": ()}
-    if isinstance(picture, Scene) or regions or settings.imagery.size_m is None:
-        # Numbers of regions, and a picture that is used as a whole, do not change.
+    if isinstance(picture, Scene) or regions:
+        # Numbers of regions, and a picture that is given as a value, do not change.
         return extract_field(scene, lat=lat, lon=lon, regions=regions, **options), scene
+    first_m = first_side_m(scene, lat, lon, settings)
 
     def read(size_m: float) -> Scene:
-        if size_m == settings.imagery.size_m:
+        if size_m == first_m:
             return scene
-        wider = settings.imagery.model_copy(update={"size_m": size_m})
-        return open_scene(picture, lat, lon, settings.model_copy(update={"imagery": wider}))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImageryWarning)  # told with the first window
+            if settings.imagery.size_m is None and shows_all(picture, lat, lon, scene, settings):
+                return scene
+            return open_scene(picture, lat, lon, wider(settings, size_m))
 
-    size_m = max(settings.imagery.size_m, _reach_m(lat, lon, settings))
     return grow_field(
-        read, lat=lat, lon=lon, size_m=size_m, largest_m=max(6400.0, size_m), **options
+        read, lat=lat, lon=lon, size_m=first_m, largest_m=max(6400.0, first_m), **options
     )
-
-
-def _reach_m(lat: float, lon: float, settings: Settings) -> float:
-    """Side of the smallest window around a point that holds all further points, metres."""
-    ellipsoid = Geod(ellps="WGS84")
-    away_m = [
-        ellipsoid.line_length((lon, x), (lat, y))
-        for x, y in (*settings.field.include, *settings.field.exclude)
-    ]
-    return 2.1 * max(away_m, default=0.0)
 
 
 def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geofield.errors import FieldWarning, SettingsError
-from geofield.field import grow_field
+from geofield.field import extract_field, grow_field
 from geofield.field.diffusion import diffuse
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -45,6 +45,22 @@ def test_a_picture_that_ends_first_is_told():
         field, _ = grow_field(lambda size: part, lat=truth.lat, lon=truth.lon, size_m=60)
     assert field.quality is not None
     assert any("edge" in reason or "picture" in reason for reason in field.quality.reasons)
+
+
+def test_all_of_a_picture_is_searched_once(monkeypatch):
+    truth = simulate_field(700_021, SimulationSettings(width_px=400, height_px=400))
+    x, y = (int(v) for v in truth.scene.grid.from_lonlat(truth.lon, truth.lat))
+    part = truth.scene.crop(x - 30, y - 30, 60, 60)
+    searched = []
+
+    def counted(scene, **options):
+        searched.append(scene)
+        return extract_field(scene, **options)
+
+    monkeypatch.setattr("geofield.field.grow.extract_field", counted)
+    with pytest.warns(FieldWarning, match="outside the picture"):
+        grow_field(lambda size: part, lat=truth.lat, lon=truth.lon, size_m=60)
+    assert len(searched) == 1
 
 
 def test_impossible_windows_are_refused():

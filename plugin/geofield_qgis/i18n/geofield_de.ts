@@ -550,8 +550,8 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Side of the window read around the point, metres; all of a small picture.</source>
-      <translation>Seite des Ausschnitts um den Punkt, Meter; kleine Bilder ganz.</translation>
+      <source>Side of the window read around the point, metres; all of a small picture without. It grows until it shows the field.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.py" />

@@ -106,11 +106,13 @@ def field(
     touches the window's edge, the window grows as far as the picture reaches.
     """
     from geofield.cli.imagery_tools import as_picture
+    from geofield.earlier import known_outline
     from geofield.errors import OutputExistsError
-    from geofield.pipeline import open_scene, run_field
+    from geofield.pipeline import run_field
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
     from geofield.settings import with_values
+    from geofield.windows import open_scene, showing
 
     _refuse_at_odds(click.get_current_context().params)
     parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
@@ -127,9 +129,10 @@ def field(
                     "kept.",
                 )
             previous = None if fresh else read_plan(output)
+    seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
     with (
         progress_bar(quiet=as_json) as progress,
-        as_picture(imagery, settings, lat=lat, lon=lon, progress=progress) as picture,
+        as_picture(imagery, seen, lat=lat, lon=lon, progress=progress) as picture,
     ):
         if list_regions or regions or pictures is not None:
             scene = open_scene(picture, lat, lon, settings)

@@ -49,9 +49,10 @@ def obstacles(
     next.
     """
     from geofield.errors import OutputExistsError
-    from geofield.pipeline import run_obstacles, scene_of_plan
+    from geofield.pipeline import run_obstacles
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
+    from geofield.windows import scene_of_plan
 
     if imagery.lower().endswith(".gpkg") and plan_file.suffix.lower() != ".gpkg":
         raise click.UsageError("The picture comes first: geofield obstacles IMAGERY FIELD.gpkg.")

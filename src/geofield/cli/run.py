@@ -89,10 +89,12 @@ def run(
     Shapefiles, RDF, a map picture and report.json.
     """
     from geofield.cli.imagery_tools import as_picture
+    from geofield.earlier import known_outline
     from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
     from geofield.staging import PREFIX
+    from geofield.windows import showing
 
     parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
     claim_folder(out)
@@ -109,7 +111,12 @@ def run(
     with (
         progress_bar(quiet=as_json) as progress,
         as_picture(
-            imagery, settings, lat=lat, lon=lon, acknowledged=acknowledge_terms, progress=progress
+            imagery,
+            showing(settings, lat, lon, known_outline(parcel, previous, lat, lon)),
+            lat=lat,
+            lon=lon,
+            acknowledged=acknowledge_terms,
+            progress=progress,
         ) as picture,
     ):
         plan = plan_field(

@@ -19,23 +19,20 @@ from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_obstacles
 from geofield.model.field import Field
-from geofield.pipeline import open_scene, run_field, run_obstacles, run_tracks
+from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
 from geofield.tracks.outline import clean_outline
+from geofield.windows import WINDOW_M, open_scene, showing, wider
 
 if TYPE_CHECKING:
     from geofield.imagery import FetchOptions
     from geofield.imagery.sources import Source
 
-#: Side of the window around a place where no size was asked for; it grows with the field.
-WINDOW_M = 400.0
 #: Share of the smaller outline that a place and its reviewed plan have in common at least.
 _SHARED = 0.1
 #: Share by which they may differ before it is told.
 _PARTED = 0.01
-#: Ground around a parcel that its window shows, metres.
-_AROUND_M = 20.0
 
 
 @dataclass(frozen=True)
@@ -178,13 +175,9 @@ def _on_picture(
     place: Place, boundary: Field | None, settings: Settings, job: Job, previous: Plan | None
 ) -> Plan:
     """Outline, unless it is given, and obstacles."""
-    size_m = settings.imagery.size_m or WINDOW_M
     outline = boundary if previous is None else previous.field
-    if outline is not None:
-        size_m = max(size_m, _reach_m(outline, place))
-    seen = settings.model_copy(
-        update={"imagery": settings.imagery.model_copy(update={"size_m": size_m})}
-    )
+    asked = wider(settings, settings.imagery.size_m or WINDOW_M)
+    seen = showing(asked, place.lat, place.lon, outline)
     with job.imagery.at(place.lat, place.lon, seen) if job.imagery else nullcontext("") as path:
         window = open_scene(path, place.lat, place.lon, seen)
         plan = run_field(
@@ -201,13 +194,6 @@ def _around(plan: Plan, job: Job) -> Plan:
     if job.obstacles is None:
         return plan
     return with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
-
-
-def _reach_m(outline: Field, place: Place) -> float:
-    """Side of the window around a place that shows all of an outline."""
-    x, y = transformer(LONLAT, outline.crs).transform(place.lon, place.lat)
-    away = shapely.get_coordinates(outline.polygon) - (x, y)
-    return float(2.0 * (np.abs(away).max() + _AROUND_M))
 
 
 def parcel_of(place: Place) -> Field:

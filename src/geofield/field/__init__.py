@@ -7,7 +7,7 @@ In comes a scene and points, out a `Field`. Begin with `extract` (what a user ca
 
 from geofield.field.boundary import field_from_boundary
 from geofield.field.extract import extract_field, prepare_field
-from geofield.field.grow import grow_field, touches_edge
+from geofield.field.grow import grow_field
 from geofield.field.views import FieldSearch
 
 __all__ = [
@@ -16,5 +16,4 @@ __all__ = [
     "field_from_boundary",
     "grow_field",
     "prepare_field",
-    "touches_edge",
 ]

@@ -9,9 +9,7 @@ from typing import Any
 from geofield.errors import FieldWarning, SettingsError
 from geofield.field.extract import extract_field
 from geofield.model import Field, Scene
-
-#: Share of the outline on the window's edge from which the field is taken to go on outside.
-TOUCHING_SHARE = 0.02
+from geofield.model.frame import along_frame
 
 
 def grow_field(
@@ -50,9 +48,12 @@ def grow_field(
     if not 0 < size_m <= largest_m:
         raise SettingsError(f"The window must grow from {size_m} m to {largest_m} m.")
     covered: tuple[float, ...] | None = None
+    field: Field | None = None
     while True:
         scene = read(size_m)
         bounds = _extent(scene)
+        if field is not None and bounds == covered and scene.valid.size > 1:
+            break  # all of the picture was searched
         # Two windows narrower than a pixel are the same pixel, not all of the picture.
         ended = (bounds == covered and scene.valid.size > 1) or size_m >= largest_m
         # A window of one pixel, or of evenly white ground, is no empty picture yet.
@@ -60,7 +61,7 @@ def grow_field(
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 field = extract_field(scene, lat=lat, lon=lon, **options)
-            if ended or not touches_edge(field):
+            if ended or not along_frame(field.polygon, field.crs, scene.grid):
                 break
         covered = bounds
         size_m = min(2 * size_m, largest_m)
@@ -72,12 +73,6 @@ def grow_field(
         else:
             warnings.warn(str(warning.message), FieldWarning, stacklevel=2)
     return field, scene
-
-
-def touches_edge(field: Field) -> bool:
-    """Whether an extracted outline runs along the edge of its picture."""
-    figures = dict(field.quality.figures) if field.quality is not None else {}
-    return figures.get("edge_share", 0.0) > TOUCHING_SHARE
 
 
 def _extent(scene: Scene) -> tuple[float, ...]:

@@ -144,6 +144,7 @@ class SceneReader:
         lon: float,
         size_m: float | None = None,
         size_px: int | None = None,
+        least_m: float = 0.0,
     ) -> tuple[int, int, int, int]:
         """The part of the picture around a point, cut at its edges.
 
@@ -154,6 +155,8 @@ class SceneReader:
         size_m, size_px : optional
             Side of the square; without both, all of the picture or, where it is enormous,
             `MAX_SIDE_PX` pixels.
+        least_m : float
+            That part of an enormous picture has at least this side, ground metres.
 
         Returns
         -------
@@ -176,17 +179,20 @@ class SceneReader:
                 raise ImageryError(
                     f"A window of {size_m} m shows nothing.", hint="Give a size above 0."
                 )
-            centred = self.grid.crop(int(x), int(y), 1, 1)
-            size_px = max(1, round(size_m / centred.ground_resolution_m))
+            size_px = max(1, round(size_m / self._resolution_m(x, y)))
         elif max(self.grid.shape) <= MAX_SIDE_PX:
             return 0, 0, self.grid.width_px, self.grid.height_px
         else:
-            size_px = MAX_SIDE_PX
+            size_px = max(MAX_SIDE_PX, round(least_m / self._resolution_m(x, y)))
         column, row = round(x - size_px / 2), round(y - size_px / 2)
         c0, r0 = max(column, 0), max(row, 0)
         c1 = min(column + size_px, self.grid.width_px)
         r1 = min(row + size_px, self.grid.height_px)
         return c0, r0, max(c1 - c0, 1), max(r1 - r0, 1)
+
+    def _resolution_m(self, x: float, y: float) -> float:
+        """Ground metres of a pixel at a place, pixel coordinates."""
+        return self.grid.crop(int(x), int(y), 1, 1).ground_resolution_m
 
     # -- pixels ----------------------------------------------------------------------------
 

@@ -28,6 +28,7 @@ def read_scene(
     scaling: tuple[float, float] | None = None,
     source: ImagerySource | None = None,
     allow: Sequence[str] = (),
+    least_m: float = 0.0,
 ) -> Scene:
     """Read the picture around a point.
 
@@ -62,6 +63,9 @@ def read_scene(
     allow : sequence of str, optional
         Folders and hosts that a VRT, a tile index or a STAC file may lead to besides its own
         folder.
+    least_m : float
+        Of an enormous picture without a size, at least a square of this side is read, ground
+        metres; coarser where that would be more than 4096 pixels.
 
     Raises
     ------
@@ -90,7 +94,9 @@ def read_scene(
             )
         window = (0, 0, reader.grid.width_px, reader.grid.height_px)
     else:
-        window = reader.window_around(lat=lat, lon=lon, size_m=size_m, size_px=size_px)
+        window = reader.window_around(
+            lat=lat, lon=lon, size_m=size_m, size_px=size_px, least_m=least_m
+        )
     shape = _shape(reader, window, resolution_m, exact=size_px is not None)
     scene = reader.read(window, shape_px=shape)
     if not scene.valid.any():

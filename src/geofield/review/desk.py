@@ -17,7 +17,6 @@ from geofield.crs import ground_scale_of
 from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
-from geofield.pipeline import scene_of_plan
 from geofield.plan import Plan, read_plan
 from geofield.review.commands import Command
 from geofield.review.ground import Ground
@@ -28,6 +27,7 @@ from geofield.settings import DirectionName, Settings
 from geofield.staging import refuse_locked
 from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
+from geofield.windows import scene_of_plan
 
 
 class Desk:

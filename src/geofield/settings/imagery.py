@@ -38,7 +38,8 @@ class ImagerySettings(Section):
 
     size_m: PositiveFloat | None = Field(
         None,
-        description="Side of the window read around the point, metres; all of a small picture.",
+        description="Side of the window read around the point, metres; all of a small picture "
+        "without. It grows until it shows the field.",
         json_schema_extra={"option": "--size-m"},
     )
     bands: Annotated[tuple[str, ...] | None, BeforeValidator(words)] = Field(

@@ -1,0 +1,95 @@
+"""Which part of a picture is read: around the point, and so wide that it shows what is known.
+
+A small picture is read as a whole. Of a larger one the window holds the outline that is given or
+was drawn, and the further points that were clicked: what it does not show is not searched.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from pyproj import Geod
+
+from geofield.crs import LONLAT, transformer
+
+if TYPE_CHECKING:
+    from geofield.model import Field, Scene
+    from geofield.plan import Plan
+    from geofield.settings import Settings
+
+#: Side of the first window where nobody asked for one, ground metres.
+WINDOW_M = 400.0
+#: Ground shown around an outline.
+_AROUND_M = 25.0
+
+
+def open_scene(
+    path: str | Path, lat: float, lon: float, settings: Settings, *, outline: Field | None = None
+) -> Scene:
+    """Read the picture around a point, degrees (stage 1), with all of an outline where it can."""
+    from geofield.imagery import read_scene
+
+    asked = settings.imagery.model_dump()
+    shown_m = reach_m(lat, lon, settings, outline)
+    if asked["size_m"] is not None:
+        asked["size_m"] = max(asked["size_m"], shown_m)
+    least_m = max(WINDOW_M, shown_m)
+    return read_scene(path, lat=lat, lon=lon, allow=settings.fetch.allow, least_m=least_m, **asked)
+
+
+def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
+    """Read the picture that a plan was made from, so wide that it shows the plan's field."""
+    imagery = (plan.settings or settings).imagery
+    settings = settings.model_copy(update={"imagery": imagery})
+    return open_scene(path, *plan.point, settings, outline=plan.field)
+
+
+def wider(settings: Settings, size_m: float) -> Settings:
+    """Settings for a window of another side, ground metres."""
+    imagery = settings.imagery.model_copy(update={"size_m": size_m})
+    return settings.model_copy(update={"imagery": imagery})
+
+
+def showing(settings: Settings, lat: float, lon: float, outline: Field | None) -> Settings:
+    """Settings for a picture that is fetched, with all of an outline where there is one."""
+    if outline is None:
+        return settings
+    asked_m = settings.imagery.size_m or WINDOW_M
+    return wider(settings, max(asked_m, reach_m(lat, lon, settings, outline)))
+
+
+def first_side_m(scene: Scene, lat: float, lon: float, settings: Settings) -> float:
+    """Side of the window that a scene was read in, ground metres."""
+    if settings.imagery.size_m is None:
+        return max(scene.grid.shape) * scene.grid.ground_resolution_m
+    return max(settings.imagery.size_m, reach_m(lat, lon, settings, None))
+
+
+def shows_all(path: str | Path, lat: float, lon: float, scene: Scene, settings: Settings) -> bool:
+    """Whether a scene is all of its picture."""
+    from geofield.imagery import open_reader
+
+    imagery = settings.imagery
+    reader = open_reader(
+        str(path), lat=lat, lon=lon, bands=imagery.bands, crs=imagery.crs,
+        allow=settings.fetch.allow,
+    )  # fmt: skip
+    whole, here = reader.grid.corners_lonlat(), scene.grid.corners_lonlat()
+    return bool(np.allclose(whole, here, rtol=0.0, atol=1e-9))
+
+
+def reach_m(lat: float, lon: float, settings: Settings, outline: Field | None) -> float:
+    """Side of a window around a point that shows an outline and all further points, metres."""
+    ellipsoid = Geod(ellps="WGS84")
+    away_m = [
+        1.05 * ellipsoid.line_length((lon, x), (lat, y))
+        for x, y in (*settings.field.include, *settings.field.exclude)
+    ]
+    if outline is not None:
+        x, y = transformer(LONLAT, outline.crs).transform(lon, lat)
+        away = np.hypot(*(shapely.get_coordinates(outline.polygon) - (x, y)).T)
+        away_m.append(float(away.max()) + _AROUND_M)  # whichever way the picture is turned
+    return 2.0 * max(away_m, default=0.0)
