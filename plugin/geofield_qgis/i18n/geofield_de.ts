@@ -551,7 +551,7 @@
     <message>
       <location filename="description.json" />
       <source>Side of the window read around the point, metres; all of a small picture without. It grows until it shows the field.</source>
-      <translation type="unfinished" />
+      <translation>Seite des Ausschnitts um den Punkt, Meter; ohne sie kleine Bilder ganz. Er wächst, bis er den ganzen Schlag zeigt.</translation>
     </message>
     <message>
       <location filename="description.py" />
