@@ -111,10 +111,11 @@ def of_the_same_field(previous: Plan | None, lat: float, lon: float) -> Plan | N
 def known_outline(
     boundary: Field | None, previous: Plan | None, lat: float, lon: float
 ) -> Field | None:
-    """The outline that is there before a picture is looked at: a parcel, or a person's own."""
-    if previous is not None and holds(previous, lat=lat, lon=lon) and keeps_outline(previous):
-        return previous.field
-    return boundary
+    """The outline that is there before a picture is looked at: a person's own, or a parcel."""
+    if previous is None or not holds(previous, lat=lat, lon=lon):
+        return boundary
+    stands = keeps_outline(previous) if boundary is None else drew_outline(previous)
+    return previous.field if stands else boundary
 
 
 def holds(previous: Plan, *, lat: float, lon: float) -> bool:
