@@ -105,7 +105,7 @@ def field(
     IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline
     touches the window's edge, the window grows as far as the picture reaches.
     """
-    from geofield.cli.imagery_tools import as_picture
+    from geofield.cli.imagery_tools import as_picture, say_wider
     from geofield.earlier import known_outline
     from geofield.errors import OutputExistsError
     from geofield.pipeline import run_field
@@ -148,6 +148,7 @@ def field(
         echo_json(_figures(plan, output))
     else:
         _say(plan, output, alternatives=alternatives)
+        say_wider(plan, imagery)
 
 
 def _refuse_at_odds(given: Mapping[str, Any]) -> None:

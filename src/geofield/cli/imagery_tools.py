@@ -20,6 +20,7 @@ from geofield.cli.console import Progress, say
 if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Where
     from geofield.imagery.sources import Source, SourceEntry
+    from geofield.plan import Plan
     from geofield.settings import Settings
 
 #: Settings of a source that are fields of its entry.
@@ -153,6 +154,16 @@ def as_picture(
         progress=progress,
     ) as path:
         yield path
+
+
+def say_wider(plan: Plan, imagery: str) -> None:
+    """How to get more of a source's picture, where the outline goes on outside what was fetched."""
+    from geofield.imagery import is_own_picture
+
+    if plan.grid is None or not plan.frame_lines or is_own_picture(imagery):
+        return
+    side_m = max(plan.grid.shape) * plan.grid.ground_resolution_m
+    say(f"           what lies outside may be had with --size-m {2 * side_m:.0f}", fg="yellow")
 
 
 def describe(done: Acquired) -> None:

@@ -88,7 +88,7 @@ def run(
     Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
     Shapefiles, RDF, a map picture and report.json.
     """
-    from geofield.cli.imagery_tools import as_picture
+    from geofield.cli.imagery_tools import as_picture, say_wider
     from geofield.earlier import known_outline
     from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
@@ -129,6 +129,7 @@ def run(
         echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
     else:
         summarise(plan, files, timings)
+        say_wider(plan, imagery)
         say_outdated(out / "field.gpkg")
 
 
