@@ -33,6 +33,8 @@ _WEAK = 1.6
 #: Borders close inside are told from this strength on, as a share of the outline's own; a
 #: crooked course below this share of long sides.
 _RIVAL, _CROOKED = 0.75, 0.8
+#: No outline from a picture is told as quite certain, and none as "100 %" in rounded words.
+_MOST_CERTAIN = 0.99
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -96,7 +98,8 @@ def likely_outlines(found: Sequence[Candidate], search: WindowSearch) -> list[Li
     best = exact(expected, overlap, exactness, polygons)
     evidence = evidence_of(found[best], float(expected[best]), belief, overlap[best])
     certain, ground, border = (
-        trained(search.part).certainty(what, evidence) for what in ("field", "ground", "border")
+        min(trained(search.part).certainty(what, evidence), _MOST_CERTAIN)
+        for what in ("field", "ground", "border")
     )
     chosen = [Likely(found[best], certain, ground, border)]
     free = overlap[best] < _DIFFERENT
