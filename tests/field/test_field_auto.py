@@ -24,6 +24,8 @@ def test_equal_brightness_is_no_obstacle(seed):
     assert not list(field.polygon.interiors)
     assert field.quality is not None
     assert field.quality.trusted
+    # However plain a field is: nobody was there.
+    assert 0.9 < dict(field.quality.figures)["ground_certainty"] <= 0.99
 
 
 def test_crowns_become_holes_when_asked():
