@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import geopandas as gpd
 import pytest
 
+from geofield.renewal import outdated, written_ns
 from geofield.simulate import SimulatedField
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
@@ -80,3 +84,21 @@ def test_the_study_files_are_renewed_as_such(out: Path, tmp_path: Path) -> None:
     geofield("refresh", plan)
     assert b"www.DLC.org/Obstacle#" in (tmp_path / "obstacles.rdf").read_bytes()[:4096]
     assert not (tmp_path / "map.png").exists()
+
+
+def test_an_edit_that_lies_in_the_log_beside_the_plan_counts(tmp_path: Path) -> None:
+    plan, product = tmp_path / "field.gpkg", tmp_path / "map.png"
+    with closing(sqlite3.connect(plan)) as file:
+        file.execute("PRAGMA journal_mode = WAL")
+        file.execute("CREATE TABLE field (name TEXT)")
+        file.commit()
+        file.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        product.write_bytes(b"")
+        # An empty log is no edit.
+        os.utime(product, ns=(written_ns(plan),) * 2)
+        os.utime(tmp_path / "field.gpkg-wal", ns=(written_ns(plan) + 10**9,) * 2)
+        assert outdated(plan) == []
+        file.execute("INSERT INTO field VALUES ('Home')")
+        file.commit()
+        os.utime(tmp_path / "field.gpkg-wal", ns=(written_ns(product) + 10**9,) * 2)
+        assert outdated(plan) == ["map.png"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from geofield.formats import FORMATS, Format, read_dataset, write_dataset
 from geofield.formats.gpkg_read import scene_beside
 from geofield.products import PLAN_FILE, write_report
-from geofield.staging import staged_folder
+from geofield.staging import log_of, staged_folder
 
 #: What is no product of the plan, but the plan itself and what it was made from.
 _NOT_RENEWED = ("gpkg", "scene")
@@ -33,13 +34,23 @@ def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     return found
 
 
+def written_ns(file: Path) -> int:
+    """When a GeoPackage was written last, also where that still lies in the log beside it."""
+    written = file.stat().st_mtime_ns
+    with suppress(FileNotFoundError):
+        log = log_of(file).stat()
+        if log.st_size:
+            written = max(written, log.st_mtime_ns)
+    return written
+
+
 def outdated(plan_file: Path) -> list[str]:
     """The products beside a plan that are older than it, by their names in the folder."""
     if not plan_file.is_file():
         return []
-    written_ns = plan_file.stat().st_mtime_ns
+    plan_ns = written_ns(plan_file)
     files = [file for files in products_beside(plan_file).values() for file in files]
-    old = [file for file in files if file.stat().st_mtime_ns < written_ns]
+    old = [file for file in files if file.stat().st_mtime_ns < plan_ns]
     names = [file.relative_to(plan_file.parent) for file in old]
     return sorted({str(one.parts[0]) + ("/" if len(one.parts) > 1 else "") for one in names})
 

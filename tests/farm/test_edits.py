@@ -15,8 +15,10 @@ import pyogrio
 import pytest
 import shapely
 import shapely.affinity
+from pyproj import CRS
 
 import geofield as gf
+from geofield.settings import Settings
 
 SIDE_M = 120.0
 
@@ -355,3 +357,62 @@ def test_an_outline_put_back_without_its_tracks_gets_them(folder: Path) -> None:
         "farm", "put", folder / "ttl" / "field.ttl", folder / "farm"
     )
     assert gf.read_plan(folder / "farm" / "reviewed" / "b.gpkg").field.field_id == "b"
+
+
+def _reviewed_edited(folder: Path, one: str, layer: str, change: Callable[[Any], Any]) -> Path:
+    """The reviewed plan of a field, edited where it lies."""
+    geofield("farm", "get", folder / "farm", one, "-o", folder / f"{one}.gpkg")
+    geofield("farm", "put", folder / f"{one}.gpkg", folder / "farm")
+    file = folder / "farm" / "reviewed" / f"{one}.gpkg"
+    table = change(pyogrio.read_dataframe(file, layer=layer))
+    pyogrio.write_dataframe(table, file, layer=layer, geometry_name="geom")
+    return file
+
+
+def test_a_reviewed_plan_that_was_edited_where_it_lies_is_taken_in(folder: Path) -> None:
+    file = _reviewed_edited(
+        folder, "a", "field", lambda one: one.set_geometry(one.geometry.translate(7, 0))
+    )
+    # What is made of the farm before that is told to be without it.
+    geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg")
+    said = geofield("export", folder / "farm", "--format", "geojson", "--out", folder / "out")
+    assert "reviewed/a.gpkg has edits that the farm does not hold yet" in " ".join(said.split())
+    said = _batch(folder)
+    assert "a as edited in reviewed/a.gpkg" in said
+    farm = gf.read_farm(folder / "farm")
+    bounds = (500_007.0, 5_300_000.0, 500_127.0, 5_300_120.0)
+    assert farm["a"].field.polygon.bounds == pytest.approx(bounds)
+    assert farm["a"].tracks.segments.within(farm["a"].field.polygon.buffer(0.01)).all()
+    assert gf.read_plan(file) == farm["a"]
+    shown = pyogrio.read_dataframe(folder / "farm" / "farm.gpkg", layer="field")
+    assert shown.set_index("field_id").geometry["a"].bounds == pytest.approx(bounds)
+    # Once, and not again where the file is merely newer.
+    file.touch()
+    assert "as edited" not in _batch(folder)
+    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg", "--overwrite")
+    assert "has edits" not in said
+
+
+def test_edits_of_the_overview_are_told_where_they_are_not_in(folder: Path) -> None:
+    _edit(folder, "obstacles", _tree_grown)
+    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg")
+    assert "farm.gpkg has edits that the farm does not hold yet" in " ".join(said.split())
+    _batch(folder)
+    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg", "--overwrite")
+    assert "has edits" not in said
+
+
+def test_an_overview_that_was_left_out_is_renewed_by_the_next_run(folder: Path) -> None:
+    _batch(folder, "--no-overview", "--fresh", "--spacing", 12)
+    _batch(folder, "--spacing", 12)
+    shown = pyogrio.read_dataframe(folder / "farm" / "farm.gpkg", layer="tracks")
+    assert len(shown) == len(gf.read_farm(folder / "farm").tracks)
+
+
+def test_a_plan_without_obstacles_goes_back_as_it_is(tmp_path: Path) -> None:
+    shape = shapely.box(500_000, 5_000_000, 500_100, 5_000_100)
+    field = gf.Field(shape, crs=CRS(32633), field_id="a", name="a")
+    tracks = gf.plan_tracks(shape, crs=field.crs, spacing_m=9)
+    gf.Farm([gf.Plan(field, tracks=tracks, settings=Settings())]).write(tmp_path / "farm")
+    geofield("farm", "get", tmp_path / "farm", "a", "-o", tmp_path / "a.gpkg")
+    assert "planned again" not in geofield("farm", "put", tmp_path / "a.gpkg", tmp_path / "farm")

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
+import pyogrio
 import pytest
 from browser import Page, chromium, served
 from selenium import webdriver
@@ -18,6 +21,7 @@ from selenium.common.exceptions import NoAlertPresentException
 import geofield as gf
 from geofield.errors import ChangedError, GeofieldError
 from geofield.farm import read_farm
+from geofield.farm.edits import put_edits
 from geofield.farm.reviewed import put_back
 from geofield.review import Session
 from geofield.review.shelf import Shelf
@@ -61,6 +65,10 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     assert desk.save()["saved_as"] == "farm"
     assert "rejected" in statuses(farm, shown[0])
     assert read_farm(farm)[shown[0]] == desk.session.plan
+    # The overview shows it, too, and knows of no edits of its own.
+    overview = pyogrio.read_dataframe(farm / "farm.gpkg", layer="obstacles")
+    assert set(overview.loc[overview["status"] == "rejected", "field_id"]) == {shown[0]}
+    assert put_edits(farm, farm / "farm.gpkg") == ([], [])
     shelf.open(1)
     shelf.desk.edit({"do": "status", "no": 1, "status": "confirmed"})
     # Killed here: the edit of the second field comes back, and that field comes first.
@@ -91,6 +99,26 @@ def test_a_field_that_was_put_back_by_somebody_else_is_not_replaced(
     desk.reload()
     assert "kept in" in str(desk.brought_back)
     assert desk.session.plan.obstacles["status"].iloc[0] == "rejected"  # type: ignore[index]
+
+
+def test_edits_of_the_overview_are_not_lost_by_a_save(farm: Path) -> None:
+    desk = Shelf(farm).desk
+    with closing(sqlite3.connect(farm / "farm.gpkg")) as file, file:
+        names = [
+            row[0] for row in file.execute("SELECT name FROM sqlite_master WHERE type='trigger'")
+        ]
+        for name in names:
+            file.execute(f'DROP TRIGGER "{name}"')
+        file.execute(
+            "UPDATE field SET name = 'Home' WHERE field_id != ?",
+            (desk.session.plan.field.field_id,),
+        )
+    desk.edit({"do": "status", "no": 1, "status": "rejected"})
+    desk.save()
+    assert "geofield farm put" in str(desk.end())
+    ids, _ = put_edits(farm, farm / "farm.gpkg")
+    assert {read_farm(farm)[one].field.name for one in ids} == {"Home"}
+    assert "rejected" in statuses(farm, desk.session.plan.field.field_id)
 
 
 def test_a_farm_without_a_plan_is_refused(farm: Path) -> None:

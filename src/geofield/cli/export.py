@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json, say
+from geofield.cli.farm import say_waiting
 from geofield.cli.files import FOLDER, PATH, claim_folder
 
 
@@ -87,6 +88,7 @@ def export(
     datasets = []
     for plan_file in plan_files:
         if is_farm(plan_file):
+            say_waiting(plan_file)
             datasets += [plan.to_dataset() for plan in read_farm(plan_file)]
             continue
         dataset = read_dataset(plan_file, crs=crs)

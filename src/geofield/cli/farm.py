@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from geofield.cli.console import say
+from geofield.cli.console import say, say_note
 from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option
 from geofield.wording import nearest
 
@@ -45,8 +45,29 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
             f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
             hint="Its status table tells what became of each place.",
         )
+    say_waiting(folder)
     save_plan(whole[field_id], output, overwrite=overwrite)
     say(f"Plan       {output}")
+
+
+def say_waiting(folder: str | Path) -> None:
+    """Tell of edits beside a farm that it does not hold yet: they are not in what is made of it."""
+    from geofield.farm.edits import is_edited
+    from geofield.farm.overview import OVERVIEW
+    from geofield.farm.reviewed import edited_in_place, file_of
+    from geofield.farm.store import Store
+
+    store = Store.of(folder)
+    if store.folder is None:
+        return
+    edited = [file_of(one) for one in edited_in_place(store)]
+    if is_edited(store.folder, store.folder / OVERVIEW):
+        edited.append(OVERVIEW)
+    for name in edited:
+        say_note(
+            f"{name} has edits that the farm does not hold yet. Take them in: geofield farm put "
+            f"{Path(folder) / name} {folder}"
+        )
 
 
 @farm.command(

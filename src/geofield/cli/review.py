@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from geofield.cli.console import say
+from geofield.cli.farm import say_waiting
 from geofield.cli.files import OLD_FILE, OLD_PATH
 from geofield.cli.refresh import say_outdated
 from geofield.cli.stops import stop_heard
@@ -51,7 +52,9 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     from geofield.review.plans import is_farm, plans_in
     from geofield.review.server import ReviewServer
 
-    if plan_file.is_dir() and not is_farm(plan_file):
+    if is_farm(plan_file):
+        say_waiting(plan_file)
+    elif plan_file.is_dir():
         plans_in(plan_file)  # no browser is opened on nothing
     try:
         server = ReviewServer(port)

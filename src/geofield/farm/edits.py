@@ -27,7 +27,6 @@ from geofield.errors import FormatError, FormatWarning, GeofieldError
 from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
 from geofield.farm.folder import REVIEWED
 from geofield.farm.layers import EPSG, FIELD_ID
-from geofield.farm.marks import CHANGED
 from geofield.farm.reviewed import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
@@ -313,6 +312,21 @@ def _polygon(shape: Any, field_id: str) -> shapely.Polygon:
     return parts[0]
 
 
+def is_edited(folder: Path, overview: Path) -> bool:
+    """Whether an overview has edits that its farm has not taken in, or cannot understand."""
+    from geofield.farm.value import read_farm
+
+    if not overview.is_file():
+        return False
+    taken = json.loads(Store.of(folder).get(TAKEN) or b"{}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FormatWarning)
+        try:
+            return bool(_edits(read_farm(folder), overview, taken, anyway=True).marks)
+        except (FormatError, sqlite3.Error):
+            return True
+
+
 def put_edits(
     folder: Path,
     overview: Path,
@@ -362,7 +376,6 @@ def put_edits(
 
     def note() -> None:
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
-        store.put(CHANGED, b"")
 
     put_plans(plans, store, note)
     return here, waiting

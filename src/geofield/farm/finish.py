@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geofield.farm.edits import TAKEN
+from geofield.farm.edits import TAKEN, is_edited
 from geofield.farm.failed import write_failed
 from geofield.farm.marks import CHANGED, WORK
 from geofield.farm.overview import OVERVIEW, write_overview
@@ -28,9 +28,8 @@ def finish(store: Store, places: Places, *, anew: bool = True, overview: bool = 
         written += _catalogue(store)
     if overview and (anew or OVERVIEW not in there):
         written += _overview(store)
-    store.remove(CHANGED)
-    if not store.names(WORK):
-        store.remove(WORK)
+    if overview or OVERVIEW not in there:
+        _forget_change(store)
     return written
 
 
@@ -41,6 +40,24 @@ def renew(store: Store) -> None:
         _catalogue(store)
     if OVERVIEW in there:
         _overview(store)
+    _forget_change(store)
+
+
+def renew_unless_edited(store: Store) -> bool:
+    """The same; not while the overview has edits that nobody asked to take in.
+
+    The next run then takes these in first, and writes all anew.
+    """
+    if store.folder is not None and is_edited(store.folder, store.folder / OVERVIEW):
+        return False
+    renew(store)
+    return True
+
+
+def _forget_change(store: Store) -> None:
+    store.remove(CHANGED)
+    if not store.names(WORK):
+        store.remove(WORK)
 
 
 def _catalogue(store: Store) -> list[str]:

@@ -5,21 +5,23 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from geofield.errors import FieldWarning, FormatError
+from geofield.errors import FieldWarning, FormatError, GeofieldError
 from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
 from geofield.farm.folder import file_of as file_in
-from geofield.farm.layers import KEPT, stacked, tables_of
+from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
+from geofield.farm.marks import CHANGED
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
+from geofield.renewal import written_ns
 from geofield.staging.generations import copy_whole
 
 if TYPE_CHECKING:
@@ -32,14 +34,19 @@ _LONGEST = 200
 _SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
 
 
-def file_of(field_id: str) -> str:
-    """Where the reviewed plan of a field lies."""
+def name_of(field_id: str) -> str:
+    """What a field's plan is called as a file, whatever its id."""
     stem = quote(field_id, safe=" ")
     if stem.startswith("."):  # hidden, and passed over by readers
         stem = f"%2E{stem[1:]}"
     if len(stem) > _LONGEST:
         stem = f"{stem[:_LONGEST]}~{hashlib.sha256(field_id.encode()).hexdigest()[:16]}"
-    return f"{REVIEWED}/{stem}{_SUFFIX}"
+    return f"{stem}{_SUFFIX}"
+
+
+def file_of(field_id: str) -> str:
+    """Where the reviewed plan of a field lies."""
+    return f"{REVIEWED}/{name_of(field_id)}"
 
 
 def reviewed_files(store: Store) -> frozenset[str]:
@@ -123,10 +130,64 @@ def _has_its_tracks(plan: Plan, before: Plan | None) -> bool:
         return plan.tracks is not None
     if not plan.tracks.segments.geometry.equals(before.tracks.segments.geometry):
         return True
-    same = plan.field.polygon.equals_exact(before.field.polygon, 1e-6)
-    if plan.obstacles is None or before.obstacles is None:
-        return same and plan.obstacles is before.obstacles
-    return same and bool(plan.obstacles.equals(before.obstacles))
+    return _same_ground(plan, before)
+
+
+def _same_ground(plan: Plan, other: Plan) -> bool:
+    """Whether outline and obstacles of two plans are the same."""
+    if not plan.field.polygon.equals_exact(other.field.polygon, 1e-6):
+        return False
+    # A file holds a layer without rows where none was looked for.
+    mine, theirs = (
+        None if one.obstacles is None or one.obstacles.empty else one.obstacles
+        for one in (plan, other)
+    )
+    return mine is theirs if mine is None or theirs is None else bool(mine.equals(theirs))
+
+
+def edited_in_place(store: Store) -> Iterator[str]:
+    """Fields whose plan in `reviewed/` was edited there since the farm took it in.
+
+    Only those that the farm has a plan of; a file that is newer, and says the same, is none.
+
+    Warns
+    -----
+    FieldWarning
+        When such a file cannot be read, or names another field.
+    """
+    names = reviewed_files(store)
+    if store.folder is None or not names:
+        return
+    farm = read_farm(store.place)
+    for chunk in committed(store):
+        taken_in_ns = written_ns(store.folder / file_in(STATUS, chunk))
+        status = read_part(store, STATUS, chunk, [FIELD_ID])
+        for one in [] if status is None else status[FIELD_ID].to_pylist():
+            if file_of(one) not in names or one not in farm:
+                continue
+            file = store.folder / file_of(one)
+            if written_ns(file) <= taken_in_ns:
+                continue
+            try:
+                plan = read_plan(file)
+                if plan.field.field_id != one:
+                    raise FormatError(f"It is named {plan.field.field_id!r}, and not {one!r}.")
+                differs = _is_edited(plan, farm[one])
+            except GeofieldError as error:
+                warnings.warn(f"{file_of(one)} is not taken in: {error}", FieldWarning, 2)
+            else:
+                if differs:
+                    yield one
+
+
+def _is_edited(plan: Plan, before: Plan) -> bool:
+    """Whether a reviewed plan says something else than the one that the farm made of it."""
+    known = dict(before.field.own)
+    return (
+        not _same_ground(plan, before)
+        or plan.field.name != before.field.name
+        or any(known.get(name) != value for name, value in plan.field.own)
+    )
 
 
 def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | None = None) -> None:
@@ -156,6 +217,7 @@ def _replace(store: Store, plans: Sequence[Plan], note: Callable[[], None] | Non
     for chunk in chunks:
         # Without it a chunk does not count: where all ends here, it is planned again.
         store.remove(file_in(STATUS, chunk))
+    store.put(CHANGED, b"")
     if note is not None:
         note()
     for chunk, status in chunks.items():

@@ -11,19 +11,25 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
-from geofield.errors import ChangedError, FormatError
+from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.farm import read_farm
+from geofield.farm.finish import renew_unless_edited
 from geofield.farm.folder import Record
-from geofield.farm.reviewed import put_back
+from geofield.farm.marks import CHANGED
+from geofield.farm.overview import OVERVIEW
+from geofield.farm.reviewed import name_of, put_back
 from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.review.desk import Desk
 from geofield.review.journal import journal_path
+from geofield.staging import claimed
 
 _PLACE = "reviewing"
+#: Fields up to which a farm's overview is written anew (seconds) whenever one is saved; that of a
+#: larger farm when the session ends.
+_AT_ONCE = 1000
 
 
 class FarmDesk(Desk):
@@ -31,6 +37,7 @@ class FarmDesk(Desk):
 
     def __init__(self, folder: Path, field_id: str, picture: Path | None) -> None:
         self._folder, self._field_id = folder, field_id
+        self._put_back = False
         path = _file_of(folder, field_id)
         path.parent.mkdir(exist_ok=True)
         self._fetch(path)
@@ -49,7 +56,7 @@ class FarmDesk(Desk):
         """Put the field back into the farm, or write it under another name."""
         if target is not None:
             return super().save(target)
-        with self.lock:
+        with self.lock, claimed(self._folder):
             if self._in_farm() != self._there:
                 raise ChangedError(
                     f"Another program changed {self._field_id} in the farm since it was opened "
@@ -61,8 +68,12 @@ class FarmDesk(Desk):
                 whole = Path(name) / "field.gpkg"
                 save_plan(self.session.plan, whole)
                 put_back(whole, self._folder)
+            self._put_back = True
             self._there = self._in_farm()
-            return {**super().save(), "saved_as": self._folder.name}
+            saved = {**super().save(), "saved_as": self._folder.name}
+            if len(read_farm(self._folder)) <= _AT_ONCE:
+                self._renewed()
+            return saved
 
     def reload(self) -> dict[str, Any]:
         """Take the field as the farm has it now; edits that were not saved are kept beside it."""
@@ -80,7 +91,26 @@ class FarmDesk(Desk):
             self.path.with_suffix(".qgz").unlink(missing_ok=True)
             if not any(self.path.parent.iterdir()):
                 self.path.parent.rmdir()
-        return words
+        return words or (self._renewed() if self._put_back else None)
+
+    def _renewed(self) -> str | None:
+        """Write the farm's overview anew; why it stays as it is, in words.
+
+        What was saved is safe in the farm then, and the next run writes the overview.
+        """
+        store, overview = Store.of(self._folder), self._folder / OVERVIEW
+        if store.get(CHANGED) is None or not overview.is_file():
+            return None
+        try:
+            with claimed(self._folder):
+                if renew_unless_edited(store):
+                    return None
+        except GeofieldError as error:
+            return f"{overview} does not show yet what was saved: {error}"
+        return (
+            f"{overview} does not show yet what was saved: it has edits of its own. Take them in: "
+            f"geofield farm put {overview} {self._folder}"
+        )
 
 
 def farm_desks(folder: Path, picture: Path | None) -> list[tuple[str, Callable[[], Desk]]]:
@@ -108,7 +138,7 @@ def farm_desks(folder: Path, picture: Path | None) -> list[tuple[str, Callable[[
 
 
 def _file_of(folder: Path, field_id: str) -> Path:
-    return folder / _PLACE / f"{quote(field_id, safe=' ')}.gpkg"
+    return folder / _PLACE / name_of(field_id)
 
 
 def _title(row: Any) -> str:
