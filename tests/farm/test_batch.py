@@ -396,6 +396,21 @@ def test_bad_input_is_told_and_leaves_nothing(
     assert [each.name for each in Path("thesis").iterdir()] == ["text.txt"]
 
 
+def test_parcels_without_shape_fail_alone(tmp_path: Path) -> None:
+    frame = gpd.read_file(parcels(tmp_path / "p.gpkg", 4))
+    frame.loc[1, "geometry"] = None
+    # A point that came along with a parcel is no field.
+    third = frame.geometry[2]
+    frame.loc[2, "geometry"] = shapely.GeometryCollection([third, third.centroid])
+    frame.to_file(tmp_path / "odd.gpkg")
+    said = batch(tmp_path / "odd.gpkg", "--spacing", 20, "--workers", 1, "--out", tmp_path / "farm")
+    assert "4 of 4: 3 done, 1 failed" in said
+    failed = pd.read_csv(tmp_path / "farm" / "failed.csv")
+    assert failed["error"].to_list() == ["The row has no position."]
+    overview = tmp_path / "farm" / "farm.gpkg"
+    assert [len(gpd.read_file(overview, layer=one)) for one in ("field", "places")] == [3, 3]
+
+
 def test_parcels_that_overlap_are_told(tmp_path: Path) -> None:
     frame = gpd.read_file(parcels(tmp_path / "p.gpkg", 4))
     frame.loc[1, "geometry"] = shapely.affinity.translate(frame.geometry[0], 0.0003)

@@ -77,6 +77,8 @@ def dataset_of(farm: Farm, name: str) -> Joined:
         if len(table) or not layer.optional:
             tables[layer.name] = table.to_crs(crs)
     places = farm.status.to_crs(crs)
+    # Rows that say nothing of where they are can be shown nowhere: they are in failed.csv.
+    places = places[~places.geometry.is_empty]
     reviewed = places["reviewed"].map({True: "yes", False: "no"})
     told = places.assign(reviewed=reviewed).replace("", None)
     tables[PLACES.name] = schema.conform(PLACES, told)

@@ -161,7 +161,9 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
         # A row without shape is a place that fails and says so.
         absent = np.setdiff1d(np.arange(len(shapes)), row)
         kind = shapely.get_type_id(single)
-        usable = np.isin(kind, (0, 3)) & ~shapely.is_empty(single)
+        # A point beside a polygon in one row is no field of its own.
+        point = (kind == 0) & ~np.isin(row, row[kind == 3])
+        usable = (point | (kind == 3)) & ~shapely.is_empty(single)
         other += int((~usable).sum())
         single = np.append(single[usable], np.full(len(absent), None))
         row = np.append(row[usable], absent)
@@ -179,7 +181,7 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
         wkb[~area] = None
         outlines.append(pa.array(wkb, pa.binary(), from_pandas=True))
     if other:
-        notes.append(f"{other} shapes that are no points and no polygons are left out.")
+        notes.append(f"{other} shapes that are no polygons and no places are left out.")
     rows, parts = np.concatenate(kept), np.concatenate(part)
     if not len(rows):
         raise FormatError(

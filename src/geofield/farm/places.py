@@ -72,8 +72,11 @@ class Places:
 
     @property
     def parcels(self) -> bool:
-        """Whether every place is a parcel."""
-        return self.outlines is not None and self.outlines.null_count == 0
+        """Whether every place is a parcel, but for rows that say nothing of where they are."""
+        if self.outlines is None:
+            return False
+        known = np.isfinite(self.lat) & np.isfinite(self.lon)
+        return not (known & self.outlines.is_null().to_numpy(zero_copy_only=False)).any()
 
     def take(self, positions: Sequence[int] | NDArray[np.int64]) -> Iterator[Place]:
         """Some of the places."""
