@@ -71,6 +71,9 @@ def dataset_of(farm: Farm, name: str) -> Joined:
     """All fields as one dataset, with the places as a layer beside those of the schema."""
     fields = farm.layer(schema.FIELD.name)
     crs = LONLAT if fields.crs is None else fields.crs
+    # Whatever makes a field doubtful colours it, and stands in its row.
+    doubts = farm.status.set_index(FIELD_ID)["doubts"].replace("", None)
+    fields["doubts"] = fields[FIELD_ID].map(doubts).to_numpy(dtype=object)
     tables: dict[str, gpd.GeoDataFrame] = {schema.FIELD.name: fields}
     for layer in _DETAILS if len(farm) <= MOST_FIELDS else ():
         table = farm.layer(layer.name)

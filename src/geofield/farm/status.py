@@ -26,8 +26,8 @@ class Outcome:
     #: lat, lon: degrees, WGS 84.
     lat: float = float("nan")
     lon: float = float("nan")
-    #: ``done``; ``doubtful`` (planned, but a person should look at the outline); ``failed``;
-    #: ``lost`` (it ended its worker, twice).
+    #: ``done``; ``doubtful`` (planned, but a person should look at the outline, or at ground that
+    #: the picture did not show); ``failed``; ``lost`` (it ended its worker, twice).
     status: str = "done"
     #: error, hint: why it failed, and what helps.
     error: str = ""
@@ -36,7 +36,7 @@ class Outcome:
     notes: str = ""
     #: Of the outline.
     certainty: float | None = None
-    #: What speaks against the outline.
+    #: What speaks against the outline, and for obstacles that nobody saw.
     doubts: str = ""
     #: Whether it is as a person left it.
     reviewed: bool = False
@@ -51,7 +51,8 @@ class Outcome:
 
 def outcome_words(plan: Plan) -> dict[str, Any]:
     """Status, certainty and doubts of a plan that was made."""
-    doubts = plan.doubts
+    # A coarse or flat picture is that of all fields; ground that nobody saw is of this one.
+    doubts = (*plan.doubts, *(f"Obstacles: {each}" for each in plan.evidence.unseen))
     quality = plan.field.quality
     trusted = quality is None or quality.trusted or plan.outline_edited
     return {

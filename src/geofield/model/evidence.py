@@ -15,6 +15,9 @@ import shapely
 from geofield.model.field import Field, FieldQuality
 from geofield.model.written import Written
 
+#: How the doubt begins that nobody saw a part of the field.
+UNSEEN = "The picture does not show"
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
@@ -33,6 +36,11 @@ class Evidence:
     def obstacle_doubts(self) -> tuple[str, ...]:
         """What the picture did not allow when obstacles were looked for, in words."""
         return tuple(self.detection.get("doubts", ()))
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Those of ground in the field that the picture did not show."""
+        return tuple(each for each in self.obstacle_doubts if each.startswith(UNSEEN))
 
     def moved(self, outline: shapely.Polygon) -> bool:
         """Whether a person moved an outline since a stage wrote it; not, where nobody knows."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.learned import network
 from geofield.model.circles import Circles, disc_means, inside
+from geofield.model.evidence import UNSEEN
 from geofield.model.field import Field
 from geofield.obstacles.crowns import (
     ALIGN_PX,
@@ -205,10 +206,7 @@ def _unseen(field_px: float, seen_px: int) -> list[str]:
     # Along its border pixels are counted whole or not at all.
     if missing <= max(0.01 * field_px, field_px**0.5):
         return []
-    return [
-        f"The picture does not show {missing / field_px:.0%} of the field: "
-        "what stands there is not found."
-    ]
+    return [f"{UNSEEN} {missing / field_px:.0%} of the field: what stands there is not found."]
 
 
 def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
