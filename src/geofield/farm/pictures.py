@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import shapely
 
+from geofield.crs import LONLAT, reproject
 from geofield.errors import ImageryError
 from geofield.farm.places import Places
 from geofield.grid import Grid
+from geofield.model.field import Field
 from geofield.settings import Settings
 
 
@@ -22,17 +25,12 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
     ImageryError
         Saying whether latitude and longitude look swapped.
     """
-    from geofield.imagery import open_reader
-
     if path.is_dir() or path.suffix.lower() not in (".tif", ".tiff", ".vrt", ".jp2", ".img"):
         return  # many pictures: each place looks for its own
     known = np.isfinite(places.lat) & np.isfinite(places.lon)
     lat, lon = places.lat[known], places.lon[known]
-    imagery = settings.imagery
-    grid = open_reader(
-        str(path), bands=imagery.bands, crs=imagery.crs, allow=settings.fetch.allow
-    ).grid
-    if _inside(grid, lat, lon).any():
+    grid = _grid_of(path, settings)
+    if _inside(grid, lat, lon).any() or _shows_outlines(grid, places):
         return
     swapped = np.abs(lon) <= 90
     hint = "Check the CRS of both."
@@ -42,6 +40,34 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
         f"None of the {len(places)} places of {Path(places.path).name} lies in {path.name}.",
         hint=hint,
     )
+
+
+def point_shown(path: str | Path, outline: Field, settings: Settings) -> shapely.Point | None:
+    """A point (longitude, latitude) of an outline that a picture shows beside its middle.
+
+    None where it shows nothing of it.
+    """
+    frame = shapely.Polygon(_grid_of(path, settings).corners_lonlat())
+    seen = frame.intersection(outline.polygon_lonlat)
+    return seen.representative_point() if seen.area > 0.0 else None
+
+
+def _grid_of(path: str | Path, settings: Settings) -> Grid:
+    from geofield.imagery import open_reader
+
+    imagery = settings.imagery
+    return open_reader(
+        str(path), bands=imagery.bands, crs=imagery.crs, allow=settings.fetch.allow
+    ).grid
+
+
+def _shows_outlines(grid: Grid, places: Places) -> bool:
+    """Whether a picture shows ground of a parcel, be its middle elsewhere."""
+    if places.outlines is None:
+        return False
+    shapes = shapely.from_wkb(places.outlines.to_numpy(zero_copy_only=False))
+    frame = shapely.Polygon(grid.corners_lonlat())
+    return bool(shapely.intersects(reproject(shapes, places.crs, LONLAT), frame).any())
 
 
 def _inside(grid: Grid, lat: np.ndarray, lon: np.ndarray) -> np.ndarray:

@@ -14,7 +14,8 @@ import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.earlier import drew_outline
-from geofield.errors import FieldError, FieldWarning, GeofieldWarning
+from geofield.errors import FieldError, FieldWarning, GeofieldWarning, PointOutsideError
+from geofield.farm.pictures import point_shown
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_obstacles
@@ -179,7 +180,15 @@ def _on_picture(
     asked = wider(settings, settings.imagery.size_m or WINDOW_M)
     seen = showing(asked, place.lat, place.lon, outline)
     with job.imagery.at(place.lat, place.lon, seen) if job.imagery else nullcontext("") as path:
-        window = open_scene(path, place.lat, place.lon, seen)
+        try:
+            window = open_scene(path, place.lat, place.lon, seen)
+        except PointOutsideError:
+            shown = None if outline is None else point_shown(path, outline, settings)
+            if shown is None:
+                raise
+            place = replace(place, lat=shown.y, lon=shown.x)
+            seen = showing(asked, place.lat, place.lon, outline)
+            window = open_scene(path, place.lat, place.lon, seen)
         plan = run_field(
             path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
             boundary=boundary, window=window,
