@@ -374,7 +374,6 @@ def test_a_reviewed_plan_that_was_edited_where_it_lies_is_taken_in(folder: Path)
         folder, "a", "field", lambda one: one.set_geometry(one.geometry.translate(7, 0))
     )
     # What is made of the farm before that is told to be without it.
-    geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg")
     said = geofield("export", folder / "farm", "--format", "geojson", "--out", folder / "out")
     assert "reviewed/a.gpkg has edits that the farm does not hold yet" in " ".join(said.split())
     said = _batch(folder)
@@ -389,17 +388,14 @@ def test_a_reviewed_plan_that_was_edited_where_it_lies_is_taken_in(folder: Path)
     # Once, and not again where the file is merely newer.
     file.touch()
     assert "as edited" not in _batch(folder)
-    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg", "--overwrite")
-    assert "has edits" not in said
 
 
 def test_edits_of_the_overview_are_told_where_they_are_not_in(folder: Path) -> None:
+    export = ("export", folder / "farm", "--format", "geojson", "--out", folder / "out")
     _edit(folder, "obstacles", _tree_grown)
-    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg")
-    assert "farm.gpkg has edits that the farm does not hold yet" in " ".join(said.split())
-    _batch(folder)
-    said = geofield("farm", "get", folder / "farm", "b", "-o", folder / "b.gpkg", "--overwrite")
-    assert "has edits" not in said
+    assert "farm.gpkg has edits that the farm does not hold yet" in geofield(*export)
+    geofield("farm", "put", folder / "farm" / "farm.gpkg", folder / "farm")
+    assert "has edits" not in geofield(*export, "--overwrite")
 
 
 def test_an_overview_that_was_left_out_is_renewed_by_the_next_run(folder: Path) -> None:

@@ -45,7 +45,6 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
             f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
             hint="Its status table tells what became of each place.",
         )
-    say_waiting(folder)
     save_plan(whole[field_id], output, overwrite=overwrite)
     say(f"Plan       {output}")
 

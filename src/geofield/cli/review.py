@@ -52,9 +52,7 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     from geofield.review.plans import is_farm, plans_in
     from geofield.review.server import ReviewServer
 
-    if is_farm(plan_file):
-        say_waiting(plan_file)
-    elif plan_file.is_dir():
+    if plan_file.is_dir() and not is_farm(plan_file):
         plans_in(plan_file)  # no browser is opened on nothing
     try:
         server = ReviewServer(port)
@@ -73,6 +71,8 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
     shelf = server.load(lambda: _shelf(plan_file, picture))
     if shelf.desk.brought_back:
         say(shelf.desk.brought_back)
+    if is_farm(plan_file):
+        say_waiting(plan_file)
     try:
         while serving.is_alive():  # waiting without end would hear no Ctrl-C on Windows
             serving.join(0.5)
