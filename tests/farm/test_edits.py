@@ -378,6 +378,7 @@ def test_a_reviewed_plan_that_was_edited_where_it_lies_is_taken_in(folder: Path)
     assert "reviewed/a.gpkg has edits that the farm does not hold yet" in " ".join(said.split())
     said = _batch(folder)
     assert "a as edited in reviewed/a.gpkg" in said
+    assert not file.with_suffix(".qgz").exists()
     farm = gf.read_farm(folder / "farm")
     bounds = (500_007.0, 5_300_000.0, 500_127.0, 5_300_120.0)
     assert farm["a"].field.polygon.bounds == pytest.approx(bounds)
@@ -412,3 +413,29 @@ def test_a_plan_without_obstacles_goes_back_as_it_is(tmp_path: Path) -> None:
     gf.Farm([gf.Plan(field, tracks=tracks, settings=Settings())]).write(tmp_path / "farm")
     geofield("farm", "get", tmp_path / "farm", "a", "-o", tmp_path / "a.gpkg")
     assert "planned again" not in geofield("farm", "put", tmp_path / "a.gpkg", tmp_path / "farm")
+
+
+def test_a_plan_edited_where_it_lies_gets_the_tracks_of_its_farm(folder: Path) -> None:
+    geofield("farm", "get", folder / "farm", "a", "-o", folder / "a.gpkg")
+    geofield("farm", "put", folder / "a.gpkg", folder / "farm")
+    _batch(folder, "--fresh", "--spacing", 12)
+    file = folder / "farm" / "reviewed" / "a.gpkg"
+    # As QGIS leaves it when it is killed: the edit is in the log alone.
+    edit = """
+import os, sqlite3, sys
+file = sqlite3.connect(sys.argv[1])
+for name in ("ST_IsEmpty", "ST_MinX", "ST_MaxX", "ST_MinY", "ST_MaxY"):
+    file.create_function(name, 1, lambda shape: 0)
+file.execute("PRAGMA journal_mode = WAL")
+file.execute("UPDATE obstacles SET status = 'rejected'")
+file.commit()
+os._exit(0)
+"""
+    subprocess.run([sys.executable, "-c", edit, str(file)], check=True)
+    assert file.with_name("a.gpkg-wal").stat().st_size
+    assert "a as edited in reviewed/a.gpkg" in _batch(folder, "--spacing", 12)
+    farm = gf.read_farm(folder / "farm")
+    assert set(farm["a"].obstacles["status"]) == {"rejected"}
+    assert farm["a"].settings.tracks.spacing_m == 12
+    assert len(farm["a"].tracks.lines) == len(farm["d"].tracks.lines)
+    assert gf.read_plan(file) == farm["a"]

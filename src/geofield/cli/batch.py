@@ -170,13 +170,13 @@ def take_in(store: Store, only: list[str] | None = None) -> list[str]:
     """
     from geofield.farm.edits import put_edits
     from geofield.farm.overview import OVERVIEW
-    from geofield.farm.reviewed import edited_in_place, file_of, put_back
+    from geofield.farm.reviewed import edited_in_place, file_of, take_in_place
 
     if store.folder is None:
         return []
     for one in list(edited_in_place(store)) if only is None else ():
-        put_back(store.folder / file_of(one), store.folder)
-        say(f"Field      {one} as edited in {file_of(one)}: kept")
+        take_in_place(store, one)
+        say(f"Field      {one} as edited in {file_of(one)}: kept, its tracks planned again")
     overview = store.folder / OVERVIEW
     edited, waiting = put_edits(store.folder, overview, only=only, anyway=only is not None)
     for one in edited:

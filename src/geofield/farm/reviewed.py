@@ -22,6 +22,8 @@ from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.renewal import written_ns
+from geofield.settings import Settings
+from geofield.staging import refuse_locked
 from geofield.staging.generations import copy_whole
 
 if TYPE_CHECKING:
@@ -119,9 +121,39 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         if not whole:
             save_plan(plan, file, overwrite=True)
         # First what must not be lost; the tables follow from it.
-        store.put(file_of(field_id), file.read_bytes())
+        _put(store, field_id, file)
     _replace(store, [plan])
     return field_id
+
+
+def take_in_place(store: Store, field_id: str) -> None:
+    """Take in a plan that was edited in `reviewed/`, its tracks planned again as the farm's are.
+
+    Raises
+    ------
+    FormatError
+        When another program has it open.
+    TrackError
+        When its tracks cannot be planned again.
+    """
+    edited = Path(store.place) / file_of(field_id)
+    settings = read_farm(store.place)[field_id].settings
+    plan = read_plan(edited)
+    plan = run_tracks(plan, settings=settings or plan.settings or Settings())
+    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
+        file = Path(name) / "field.gpkg"
+        copy_whole(edited, file)
+        save_plan(plan, file, overwrite=True)
+        _put(store, field_id, file)
+    _replace(store, [plan])
+
+
+def _put(store: Store, field_id: str, file: Path) -> None:
+    """Keep a reviewed plan, in the place of the one that is there."""
+    there = None if store.folder is None else store.folder / file_of(field_id)
+    if there is not None and there.is_file():
+        refuse_locked(there)
+    store.put(file_of(field_id), file.read_bytes())
 
 
 def _has_its_tracks(plan: Plan, before: Plan | None) -> bool:
@@ -196,7 +228,7 @@ def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | No
         file = Path(name) / "field.gpkg"
         for plan in plans:
             save_plan(plan, file, overwrite=True)
-            store.put(file_of(plan.field.field_id), file.read_bytes())
+            _put(store, plan.field.field_id, file)
     _replace(store, plans, note)
 
 
