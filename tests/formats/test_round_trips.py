@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import re
 import shutil
 import tempfile
 import zipfile
@@ -201,6 +203,36 @@ def test_archives_are_read(dataset, tmp_path, name):
 def test_own_zipped_shapefiles(dataset, tmp_path):
     (path,) = write_dataset(dataset, tmp_path, ["shapefile"], options={"zip": True})
     assert len(read_dataset(path).table("segments")) == len(dataset.table("segments"))
+
+
+@pytest.mark.parametrize("lon", [-62.0, 120.0, 33.0])
+def test_geojson_keeps_digits_behind_zeros_and_nines(dataset, tmp_path, lon):
+    """-62.0000008 is a tenth of a metre from -62: no noise that a writer may drop."""
+    lons = lon + np.array([*range(1, 10), 999_999, 999_991, 1_000_004, 4_999_998]) / 1e7
+    line = shapely.LineString([(each, -33.0 - n * 1e-4) for n, each in enumerate(lons)])
+    segments = dataset.tables["segments"].iloc[:1].to_crs(LONLAT).set_geometry([line], crs=LONLAT)
+    moved = dataclasses.replace(dataset, tables={"segments": segments}, crs=LONLAT, points=None)
+    write_dataset(moved, tmp_path, ["geojson"])
+    text = (tmp_path / "geojson" / "segments.geojson").read_text(encoding="utf-8")
+    (feature,) = json.loads(text)["features"]
+    xy = np.array(feature["geometry"]["coordinates"])
+    np.testing.assert_allclose(xy, shapely.get_coordinates(line), rtol=0, atol=5.1e-8)
+    assert not re.search(r"\d\.\d{8,}", text.partition('"coordinates"')[2])
+    assert '"xy_coordinate_resolution": 1e-07' in text
+
+
+def test_geojson_loses_no_row_that_is_too_thin_for_it(dataset, tmp_path):
+    obstacles = dataset.tables["obstacles"].copy()
+    x, y = obstacles.geometry.iloc[0].centroid.coords[0]
+    obstacles.geometry = [shapely.box(x, y, x + 9, y + 1e-4), *obstacles.geometry.iloc[1:]]
+    thin = dataclasses.replace(dataset, tables={**dataset.tables, "obstacles": obstacles})
+    write_dataset(thin, tmp_path, ["geojson"])
+    assert list(read_dataset(tmp_path / "geojson").table("obstacles")["obstacle_no"]) == [
+        1,
+        2,
+        3,
+        4,
+    ]
 
 
 def test_archives_that_lead_out_of_their_folder(tmp_path):

@@ -148,6 +148,7 @@ def arrow_table(
     table: gpd.GeoDataFrame,
     *,
     lonlat: bool = False,
+    decimals: int | None = None,
     geometry_name: str = "geom",
     reserved: Iterable[str] = (),
 ) -> pa.Table:
@@ -155,13 +156,15 @@ def arrow_table(
 
     The user's own columns stand behind those of the schema; one with a name of the schema in
     large or small letters, or with a `reserved` one, has a number behind it. `lonlat` reprojects
-    to WGS 84.
+    to WGS 84; `decimals` rounds the coordinates.
     """
     import pyarrow as pa
 
     geometry = exact_geometry(of, table)
     if lonlat and len(geometry):
         geometry = split(to_lonlat(geometry, CRS(table.crs)))
+    if decimals is not None:
+        geometry = _rounded(geometry, decimals)
     columns = {column.name: arrow_values(column, table[column.name]) for column in of.columns}
     taken = {*columns, geometry_name, *reserved}
     for name in schema.own_columns(of, table):
@@ -169,6 +172,16 @@ def arrow_table(
         columns[unlike(str(name), taken, "_")] = _own_values(table[name])
     columns[geometry_name] = pa.array(shapely.to_wkb(geometry, flavor="iso"), pa.binary())
     return pa.table(columns)
+
+
+def _rounded(geometry: NDArray[np.object_], decimals: int) -> NDArray[np.object_]:
+    """Shapes on a grid of so many decimals, vertex by vertex; built anew where that breaks one."""
+    rounded = shapely.transform(geometry, lambda xy: np.round(xy, decimals))
+    broken = shapely.is_valid(geometry) & ~shapely.is_valid(rounded)
+    sound = shapely.set_precision(geometry[broken], 10.0**-decimals)
+    # What is too thin for the grid stays as it is: `validate` says so, and no row is lost.
+    rounded[broken] = np.where(shapely.is_empty(sound), rounded[broken], sound)
+    return np.asarray(rounded, dtype=object)
 
 
 def _own_values(series: Any) -> pa.Array:
@@ -206,6 +219,7 @@ def write_layer(
     driver: str,
     *,
     lonlat: bool = False,
+    decimals: int | None = None,
     points: bool = True,
     **options: Any,
 ) -> None:
@@ -218,7 +232,7 @@ def write_layer(
     name = authority_name(crs)
     try:
         pyogrio.write_arrow(
-            layer_batches(dataset, of, points=points, lonlat=lonlat),
+            layer_batches(dataset, of, points=points, lonlat=lonlat, decimals=decimals),
             path,
             layer=of.name,
             driver=driver,
