@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from pyproj import CRS
 from shapely.affinity import rotate
 
 from geofield import schema
+from geofield.crs import LONLAT, transformer
 from geofield.grid import Grid
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.field import Field
@@ -144,6 +146,23 @@ def _driving(field: Field, tracks: Tracks, crs: CRS):
             crs,
         ),
     }
+
+
+def plan_across_180() -> Dataset:
+    """The small plan's field, obstacles and tracks where 180 degrees cut them, without points."""
+    plan, crs = small_plan(), CRS("EPSG:32660")
+    middle = plan.tables["field"].geometry.iloc[0].centroid
+    x, _ = transformer(LONLAT, crs).transform(180.0, 35.07)
+    tables = {
+        name: table.set_geometry(table.geometry.translate(x - middle.x)).set_crs(
+            crs, allow_override=True
+        )
+        for name, table in plan.tables.items()
+    }
+    centres = shapely.get_coordinates(tables["obstacles"].geometry.centroid)
+    lon, lat = transformer(crs, LONLAT).transform(*centres.T)
+    tables["obstacles"] = tables["obstacles"].assign(lon=lon, lat=lat)
+    return replace(plan, tables=tables, crs=crs, grid=None, points=None)
 
 
 def _obstacles(x0: float, y0: float, grid: Grid, crs: CRS):

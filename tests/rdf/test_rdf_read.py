@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rdf_plans import small_plan
+from rdf_plans import plan_across_180, small_plan
 
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf import write
@@ -52,6 +54,25 @@ def assert_same_points(got, wanted):
     for column in ("x_px", "y_px"):
         assert np.abs(got[column] - wanted[column]).max() < 0.05, column
     assert shapely.distance(got.geometry.to_numpy(), wanted.geometry.to_numpy()).max() < 0.01
+
+
+def test_a_plan_across_180_is_cut_there_and_reads_back_whole(tmp_path):
+    plan = plan_across_180()
+    (path,) = write.write_ntriples(plan, tmp_path, options={})
+    text = path.read_text(encoding="utf-8")
+    assert "sf#MultiPolygon" in text
+    shapes = re.findall(r'CRS84> ((?:MULTI)?(?:POLYGON|LINESTRING)[^"]*)"', text)
+    for part in shapely.get_parts(shapely.from_wkt(shapes)):
+        west, _, east, _ = part.bounds
+        assert east - west < 0.01
+    assert_same_tables(read(path), plan)
+    # Without the geometries of the metric CRS, to the nine decimals of a degree.
+    lines = [line for line in text.splitlines(keepends=True) if "/EPSG-32660>" not in line]
+    path.write_text("".join(lines), encoding="utf-8")
+    got = read(path)
+    for name in ("field", "obstacles", "segments"):
+        ours, theirs = plan.tables[name].geometry, got.tables[name].geometry
+        assert shapely.hausdorff_distance(ours.to_numpy(), theirs.to_numpy()).max() < 1e-3
 
 
 @pytest.mark.parametrize("profile", write.PROFILES)

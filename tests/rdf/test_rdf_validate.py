@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import time
 
 import pyshacl
 import pytest
 import rdflib
-from rdf_plans import small_plan
+from rdf_plans import plan_across_180, small_plan
 
 from geofield.formats.rdf import write
 from geofield.formats.rdf.names import Names
@@ -31,6 +32,24 @@ WRITERS = {
 def test_every_product_is_sound(plan, tmp_path, profile, syntax):
     for path in WRITERS[syntax](plan, tmp_path, options={"rdf_profile": profile}):
         assert [str(problem) for problem in validate(path)] == []
+
+
+@pytest.mark.parametrize("syntax", WRITERS)
+def test_every_product_across_180_is_sound(tmp_path, syntax):
+    for path in WRITERS[syntax](plan_across_180(), tmp_path, options={}):
+        assert [str(problem) for problem in validate(path)] == []
+
+
+def test_files_of_a_plan_without_obstacles_or_tracks_are_sound(plan, tmp_path):
+    for absent in ({"obstacles"}, {"tracks", "segments", "gaps"}):
+        tables = {name: table for name, table in plan.tables.items() if name not in absent}
+        bare = dataclasses.replace(plan, tables=tables, points=None)
+        paths = write.write_rdfxml(bare, tmp_path, options={})
+        assert [str(problem) for path in paths for problem in validate(path)] == []
+    (tmp_path / "other.rdf").write_text(
+        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"/>', encoding="utf-8"
+    )
+    assert "no field" in str(validate(tmp_path / "other.rdf"))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from pyproj import CRS
 
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import unwrapped
 from geofield.formats.rdf.geosparql import geometry_of
 from geofield.formats.rdf.graph import Graph, ontology
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
@@ -33,8 +34,8 @@ _LINKS = {
 }
 _AXES = "In CRS84 the longitude comes first."
 
+#: West, south, east and north; east may lie beyond 180.
 Bounds = tuple[float, float, float, float]
-_EARTH: Bounds = (-180.0, -90.0, 180.0, 90.0)
 
 
 def check_graph(graph: Graph) -> Iterator[Problem]:
@@ -107,8 +108,7 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
     box = _lonlat_bounds(shape, crs)
     if box is not None:
         bounds[iri] = box
-    on_earth = box and _near(_EARTH, box[0], box[1], 0) and _near(_EARTH, box[2], box[3], 0)
-    if crs.is_geographic and not on_earth:
+    if crs.is_geographic and not _on_earth(shape):
         pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
         message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
         hint = "Are they metres, or latitude before longitude?"
@@ -118,11 +118,18 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
         yield Problem(message, f"<{iri}>", rule="valid-shape")
 
 
+def _on_earth(shape: Any) -> bool:
+    return bool((np.abs(shapely.bounds(shape)) <= (180.0, 90.0, 180.0, 90.0)).all())
+
+
 def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
+    if crs.is_geographic:
+        (shape,) = unwrapped(np.array([shape]))
     west, south, east, north = shapely.bounds(shape).tolist()
     if not crs.is_geographic:
         project = transformer(crs, LONLAT)
         (west, east), (south, north) = project.transform([west, east], [south, north])
+        east += 360.0 if east < west else 0.0
     box = (west, south, east, north)
     return box if all(map(math.isfinite, box)) else None
 
@@ -175,13 +182,17 @@ def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
 
 def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:
     west, south, east, north = box
-    return west - margin <= lon <= east + margin and south - margin <= lat <= north + margin
+    # Beyond 180 a longitude counts on from -180.
+    eastward = (lon - west + margin) % 360.0
+    return eastward <= east - west + 2 * margin and south - margin <= lat <= north + margin
 
 
 def _same(mine: Bounds, theirs: Bounds) -> bool:
     # Bounds of a reprojected box differ by the grid's rotation: a tenth of its size.
     size = max(mine[2] - mine[0], mine[3] - mine[1])
-    return bool(np.allclose(mine, theirs, rtol=0.0, atol=_SAME_PLACE_M / 111_000.0 + 0.1 * size))
+    apart = np.abs(np.subtract(mine, theirs))
+    apart[[0, 2]] = np.minimum(apart[[0, 2]], 360.0 - apart[[0, 2]])
+    return bool((apart <= _SAME_PLACE_M / 111_000.0 + 0.1 * size).all())
 
 
 def _float(text: str | None) -> float | None:

@@ -15,6 +15,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, reproject
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import split
 from geofield.formats.rdf.geosparql import in_order
 from geofield.formats.rdf.layers import CODE_LISTS, YES_NO, LayerMap, layer_map, value_iri
 from geofield.formats.rdf.names import Names
@@ -180,16 +181,16 @@ def _geometries(
 ) -> tuple[list[Nodes], list[Column]]:
     """The geometries' nodes, and the links from their features to them."""
     identifier = crs_iri(crs)
-    lonlat = shapely.to_wkt(
-        reproject(geometry, crs, LONLAT), rounding_precision=LONLAT_DECIMALS if identifier else -1
-    )
-    told = [("", CRS84, lonlat)]
+    # Cut at 180: rings that jump there would go round the earth.
+    told = [("", CRS84, split(reproject(geometry, crs, LONLAT)))]
     if identifier:
-        exact = shapely.to_wkt(in_order(geometry, crs), rounding_precision=-1)
+        exact = in_order(geometry, crs)
         told.append((f"/EPSG-{identifier.rpartition('/')[2]}", identifier, exact))
-    kinds = [(node(f"sf:{shape.geom_type}"), node("geo:Geometry")) for shape in geometry]
     nodes = []
-    for name, iri, wkt in told:
+    for name, iri, shapes in told:
+        rounded = identifier is not None and iri == CRS84
+        wkt = shapely.to_wkt(shapes, rounding_precision=LONLAT_DECIMALS if rounded else -1)
+        kinds = [(node(f"sf:{shape.geom_type}"), node("geo:Geometry")) for shape in shapes]
         columns: list[Column] = [
             (node("rdf:type"), kinds),
             (node("geo:asWKT"), Typed([f"<{iri}> {text}" for text in wkt], "geo:wktLiteral")),

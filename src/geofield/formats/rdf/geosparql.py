@@ -20,6 +20,7 @@ from shapely.errors import ShapelyError
 
 from geofield.crs import LONLAT, northing_first, reproject, utm_crs
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import joined
 from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, EPSG, GEOF, expand, node
 
 _GEOD = Geod(ellps="WGS84")
@@ -93,7 +94,9 @@ def geometries_of(
             for text, row in zip(known, rows, strict=True):
                 geometry_of(text, subjects[row])
             raise
-        result[rows] = reproject(shapes, crs, target)
+        # What is cut at 180 is one shape where no meridian is in the way.
+        whole = shapes if target.is_geographic else joined(shapes, crs)
+        result[rows] = reproject(whole, crs, target)
     lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
     for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
         raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")

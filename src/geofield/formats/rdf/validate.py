@@ -11,12 +11,14 @@ from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import classes, layer_maps
-from geofield.formats.rdf.namespaces import GML, STUDY_TREE
+from geofield.formats.rdf.namespaces import GF, GML, STUDY_TREE
 from geofield.formats.rdf.parse import Problem, parse
 from geofield.formats.rdf.shapes import shape_problems
 from geofield.formats.validation import Finding
 
 _BASE = re.compile(r'(?:@base\s+<|BASE\s+<|xml:base\s*=\s*"|"@base"\s*:\s*")([^">]*)[">]')
+#: In the head of every RDF/XML file that geofield writes.
+_GEOFIELD = f'xmlns:gf="{GF}"'.encode()
 _PREFIX = re.compile(r"@?prefix\s+([\w-]*):\s*<([^>]*)>", re.IGNORECASE)
 
 
@@ -37,6 +39,8 @@ def validate(path: Path) -> list[Problem]:
     graph = Graph()
     graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
     known = [iri for layer in layer_maps() for iri in classes(layer)]
+    if not quads and _GEOFIELD in path.read_bytes()[:20_000]:
+        return []  # one of a plan's three files: it has no obstacles, or no tracks
     if not graph.of_type(*known, STUDY_TREE + "tree", GML + "point"):
         return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
     return _located({*shape_problems(quads), *check_graph(graph)}, path)
