@@ -98,6 +98,18 @@ def test_obstacles_are_joined_and_inside_the_field(tmp_path, name, version):
     assert all("runs through obstacle" in message for message in wrong)
 
 
+@pytest.mark.parametrize("name", ["isoxml", "isoxml-v3", "agopengps"])
+def test_a_post_is_an_obstacle_however_thin(tmp_path, name):
+    dataset = make_dataset(points=False)
+    obstacles = dataset.tables["obstacles"].iloc[:1].assign(radius_m=0.05, buffer_m=0.0)
+    x, y = (np.array([v]) for v in obstacles.geometry.iloc[0].centroid.coords[0])
+    obstacles = obstacles.set_geometry(circle_polygons(x, y, np.array([0.05]), dataset.crs))
+    tables = {**dataset.tables, "obstacles": obstacles.set_crs(dataset.crs)}
+    write_dataset(dataclasses.replace(dataset, tables=tables), tmp_path, [name])
+    (found,) = read_dataset(tmp_path / name).table("obstacles").geometry
+    assert found.hausdorff_distance(obstacles.geometry.iloc[0]) < 0.005
+
+
 def test_agopengps_reads_holes_and_headland_of_isoxml(tmp_path):
     """It takes the first exterior ring of a boundary and of a headland, and no interior ones."""
     dataset = crowded()

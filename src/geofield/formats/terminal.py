@@ -55,13 +55,15 @@ def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[Termina
     for each in np.unique(group):
         rows = np.flatnonzero(group == each)
         whole = shapes[rows[0]] if len(rows) == 1 else shapely.union_all(shapes[rows])
+        # A post may be small, too: only what clipping leaves over is a sliver.
+        least_m2 = 0.0
         if not shapely.covers(field, whole):
-            whole = shapely.intersection(whole, field)
+            whole, least_m2 = shapely.intersection(whole, field), _SLIVER_M2
         name = "Obstacle " + "+".join(str(number) for number in sorted(numbers[rows]))
         pieces = [
             piece
             for piece in shapely.orient_polygons(shapely.get_parts(whole))
-            if piece.geom_type == "Polygon" and piece.area > _SLIVER_M2
+            if piece.geom_type == "Polygon" and piece.area > least_m2
         ]
         for position, piece in enumerate(pieces, start=1):
             trees = tuple(
