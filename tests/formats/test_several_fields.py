@@ -20,7 +20,7 @@ from formats_plan import make_dataset
 from isoxml.util.isoxml_io import isoxml_from_path
 from pyproj import CRS
 
-from geofield.formats import read_dataset, validate_file, write_dataset
+from geofield.formats import read_dataset, validate_file, write_dataset, write_datasets
 from geofield.formats.arrow import to_lonlat
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
@@ -212,3 +212,37 @@ def test_the_same_field_twice_is_refused(tmp_path):
     assert done.returncode == 1
     assert "Two fields have the id 'f0'" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_file_of_several_fields_is_exported_field_by_field(tmp_path):
+    """What is one GeoPackage with all of them, as of `geofield tracks parcels.shp`."""
+    write_datasets(FARM, tmp_path / "farm", ["gpkg"])
+    file = tmp_path / "farm" / "field.gpkg"
+    done = geofield("export", file, "-f", "isoxml", "-f", "gpx", "-f", "turtle", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    write_datasets(FARM, tmp_path / "apart", ["isoxml"])
+    root, wanted = (
+        ET.parse(folder / "isoxml" / "TASKDATA" / "TASKDATA.XML").getroot()
+        for folder in (tmp_path, tmp_path / "apart")
+    )
+    assert [f.get("C") for f in root.iter("PFD")] == [f.get("C") for f in wanted.iter("PFD")]
+    for ours, theirs in zip(root.iter("PFD"), wanted.iter("PFD"), strict=True):
+        assert ours.get("D") == theirs.get("D")
+        lonlat, other = (
+            np.array([(float(p.get("D")), float(p.get("C"))) for p in each.iter("PNT")])
+            for each in (ours, theirs)
+        )
+        np.testing.assert_allclose(lonlat, other, rtol=0, atol=2e-9)
+    assert len(list(tmp_path.glob("*.gpx"))) == 3
+    assert [f for f in validate_file(tmp_path / "field.ttl") if f.level == "error"] == []
+
+
+def test_a_row_of_none_of_the_fields_is_not_left_out_silently(tmp_path):
+    write_datasets(FARM[:2], tmp_path, ["gpkg"])
+    file = tmp_path / "field.gpkg"
+    obstacles = pyogrio.read_dataframe(file, layer="obstacles")
+    obstacles.loc[3, "field_id"] = None
+    pyogrio.write_dataframe(obstacles, file, layer="obstacles")
+    done = geofield("export", file, "-f", "isoxml", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "'obstacles' has 1 row(s) of none of the 2 fields" in done.stderr

@@ -73,6 +73,7 @@ def export(
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.gpkg_read import scene_beside
+    from geofield.formats.many import apart
 
     given["zip"] = given.pop("zipped") or None
     options = {key: value for key, value in given.items() if value is not None}
@@ -97,7 +98,7 @@ def export(
         if plan_file.suffix.lower() == ".gpkg" and ("gpkg" not in names or "scene" in names):
             # A project written without the picture must not look for it.
             dataset = replace(dataset, scene_path=scene_beside(plan_file))
-        datasets.append(dataset)
+        datasets += apart(dataset)
     written = write_datasets(
         datasets,
         folder,

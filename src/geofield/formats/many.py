@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
+from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT
+from geofield.crs import LONLAT, metric_crs
 from geofield.errors import FormatError
 from geofield.formats.names import safe_name, unlike
 from geofield.formats.origin import imagery_day
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
 FIELD_ID = "field_id"
+#: In every row of several fields: the EPSG code of its field's metric CRS.
+UTM_EPSG = "utm_epsg"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +98,50 @@ def joined(datasets: Sequence[Dataset]) -> Joined:
             tables[layer.name] = pd.concat(parts, ignore_index=True)
     software = datasets[0].provenance.software
     return Joined(tables, crs, "farm", Provenance(software))
+
+
+def apart(dataset: Dataset) -> list[Dataset]:
+    """The fields of a dataset that holds several, as :func:`joined` has them; else itself alone.
+
+    Each is in the metric CRS that its row names, or in its UTM zone where they share none.
+
+    Raises
+    ------
+    FormatError
+        When a row is of none of the fields.
+    """
+    fields = dataset.table(schema.FIELD.name)
+    tables = {name: table for name, table in dataset.tables.items() if len(table)}
+    ids = fields[FIELD_ID]
+    alone = len(fields) < 2 or not ids.is_unique or ids.isna().any()
+    if alone or any(FIELD_ID not in table.columns for table in tables.values()):
+        return [dataset]
+    for name, table in tables.items():
+        strange = int((~table[FIELD_ID].isin(ids)).sum())
+        if strange:
+            raise FormatError(
+                f"Layer {name!r} has {strange} row(s) of none of the {len(ids)} fields.",
+                hint="Give each row the field_id of its field.",
+            )
+    return [_one_of(dataset, tables, row) for row in fields.to_dict("records")]
+
+
+def _one_of(dataset: Dataset, tables: Mapping[str, Any], row: Mapping[str, Any]) -> Dataset:
+    """The rows of one field, without the columns that say which."""
+    epsg, field_id, crs = row.get(UTM_EPSG), row[FIELD_ID], dataset.crs
+    if epsg is not None and not pd.isna(epsg):
+        crs = CRS.from_epsg(int(epsg))
+    elif crs.is_geographic:
+        crs = metric_crs(*row["geometry"].representative_point().coords[0])
+    found = {}
+    for name, table in tables.items():
+        layer = schema.layer(name)
+        said = [each for each in (FIELD_ID, UTM_EPSG) if each not in layer.column_names]
+        mine = table[table[FIELD_ID] == field_id].drop(columns=said, errors="ignore")
+        found[name] = mine.to_crs(crs).reset_index(drop=True)
+    label = row["name"] if isinstance(row["name"], str) else str(field_id)
+    source = dataset.provenance.source
+    return Dataset(found, crs, label, Provenance(dataset.provenance.software, source))
 
 
 def _named(table: gpd.GeoDataFrame, field_id: str) -> gpd.GeoDataFrame:
