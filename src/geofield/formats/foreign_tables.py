@@ -175,19 +175,25 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     rows, shapes = [], []
     for number, part in segments.groupby("track_no", sort=True):
         lines = part.geometry.to_numpy()
-        (x0, y0), (x1, y1) = lines[0].coords[0], lines[-1].coords[-1]
-        grid_heading = np.degrees(np.arctan2(x1 - x0, y1 - y0))
+        whole = shapely.multilinestrings(list(lines))
         row = {
             "track_no": int(number),
-            "heading_deg": float((grid_heading + grid_north_deg(crs, x0, y0)) % 360.0),
+            "heading_deg": heading_deg(whole, crs),
             "segment_count": len(part),
             "gap_count": len(part) - 1,
             "length_m": float(part["length_m"].sum()),
         }
         rows.append(row)
-        shapes.append(shapely.multilinestrings(list(lines)))
+        shapes.append(whole)
     data = {name: [row.get(name) for row in rows] for name in schema.TRACKS.column_names}
     return schema.table(schema.TRACKS, data, shapes, crs), segments
+
+
+def heading_deg(track: shapely.Geometry, crs: CRS) -> float:
+    """From a track's first to its last vertex: degrees clockwise from true north."""
+    (x0, y0), *_, (x1, y1) = shapely.get_coordinates(track).tolist()
+    grid = np.degrees(np.arctan2(x1 - x0, y1 - y0))
+    return float((grid + grid_north_deg(crs, x0, y0)) % 360.0)
 
 
 def _line_numbers(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:

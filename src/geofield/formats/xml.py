@@ -10,8 +10,8 @@ from xml.etree import ElementTree as ET
 from geofield.errors import FormatError
 from geofield.strangers import parse_xml
 
-# Control characters that XML 1.0 has no way to write.
-_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
+#: Characters that XML 1.0 has no way to write, not even escaped.
+NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
 def node(tag: str, *inside: ET.Element | str | Mapping[str, str], **attributes: str) -> ET.Element:
@@ -32,7 +32,7 @@ def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
     """Write a document as UTF-8; characters that XML cannot carry are refused."""
     for element in root.iter():
         for text in (element.text, *element.attrib.values()):
-            if text and (found := _FORBIDDEN.search(text)):
+            if text and (found := NOT_IN_XML.search(text)):
                 raise FormatError(
                     f"{path.name}: {text!r} holds the character U+{ord(found.group()):04X}, which "
                     "XML cannot carry.",

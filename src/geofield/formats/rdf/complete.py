@@ -9,7 +9,8 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, grid_north_deg, ground_areas_m2, ground_lengths_m, transformer
+from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
+from geofield.formats.foreign_tables import heading_deg
 from geofield.grid import Grid
 
 if TYPE_CHECKING:
@@ -94,10 +95,4 @@ def _tracks(tables: dict[str, gpd.GeoDataFrame]) -> None:
             _fill(tracks, column, counts.reindex(number, fill_value=0).to_numpy())
     if tracks["heading_deg"].isna().any():
         crs = CRS(tracks.crs)
-        _fill(tracks, "heading_deg", [_heading(line, crs) for line in tracks.geometry])
-
-
-def _heading(line: shapely.Geometry, crs: CRS) -> float:
-    (x0, y0), *_, (x1, y1) = shapely.get_coordinates(line)
-    grid = np.degrees(np.arctan2(x1 - x0, y1 - y0))
-    return float((grid + grid_north_deg(crs, float(x0), float(y0))) % 360.0)
+        _fill(tracks, "heading_deg", [heading_deg(line, crs) for line in tracks.geometry])

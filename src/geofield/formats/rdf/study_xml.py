@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from geofield import schema
-from geofield.formats.rdf.triples import xml_text
+from geofield.formats.xml import NOT_IN_XML
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import active
 
@@ -44,10 +45,11 @@ def write_study_xml(
 def _obstacles(dataset: Dataset) -> Iterator[str]:
     yield _HEAD + "<Obstacles>\n"
     frame = active(dataset.table(schema.OBSTACLES.name))
+    region = escape(NOT_IN_XML.sub("\ufffd", dataset.name), {"\r": "&#13;"})
     for kind, element in _ELEMENTS.items():
         rows = frame[frame["kind"] == kind].to_dict("records")
         if rows:
-            items = "".join(_item(row, xml_text(dataset.name)) for row in rows)
+            items = "".join(_item(row, region) for row in rows)
             yield f"  <{element}>\n{items}  </{element}>\n"
     yield "</Obstacles>\n"
 

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, repeat
 from typing import Any
-from xml.sax.saxutils import escape
 
 import pyoxigraph as ox
 
 from geofield.formats.rdf.namespaces import BOOLEAN, DOUBLE, INTEGER, node
+from geofield.formats.xml import NOT_IN_XML
 
 #: Nodes of equal length that belong together row by row: a feature and its geometries.
 Group = tuple["Nodes", ...]
@@ -23,8 +23,6 @@ Group = tuple["Nodes", ...]
 Value = Any
 #: A predicate with a value for each row.
 Column = tuple[ox.NamedNode, Sequence[Value]]
-#: Control characters cannot stand in XML 1.0, not even escaped: they are none in any syntax.
-_NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 _DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
 _MANY_OR_NONE = {tuple, type(None)}
 _DATATYPES = {bool: BOOLEAN, int: INTEGER, float: DOUBLE}
@@ -104,18 +102,13 @@ def term(value: Any) -> Any:
 
 
 def text_term(text: str) -> ox.Literal:
-    """A plain text as a literal."""
-    return ox.Literal(_NOT_IN_XML.sub("\ufffd", text))
+    """A plain text as a literal; what XML cannot carry stands in no syntax."""
+    return ox.Literal(NOT_IN_XML.sub("\ufffd", text))
 
 
 def date_term(text: str) -> ox.Literal:
     """A day as a date; a text where only the year or month is known."""
     return ox.Literal(text, datatype=node("xsd:date")) if _DAY.fullmatch(text) else text_term(text)
-
-
-def xml_text(text: str) -> str:
-    """A text for an XML element, without the characters that XML cannot hold."""
-    return escape(_NOT_IN_XML.sub("\ufffd", text), {"\r": "&#13;"})
 
 
 def named(iris: Iterable[str | None]) -> list[Any]:
