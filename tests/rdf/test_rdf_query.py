@@ -255,3 +255,28 @@ def test_the_validate_command_tells_and_exits_with_one(files, tmp_path):
     result = run(cli, ["validate", "--json", str(broken)])
     (finding, *_) = json.loads(result.stdout)[str(broken)]
     assert re.match(r"line \d+, <https://example.org/geofield/field/", finding["where"])
+
+
+def test_functions_across_180():
+    """What lies beyond 180 is beside what lies before it, however a literal tells it."""
+    east, west = "POLYGON ((179.999 1, 180 1, 180 2, 179.999 2, 179.999 1))", "POINT (-179.999 1)"
+    geod = Geod(ellps="WGS84")
+    assert geosparql.distance(east, west) == pytest.approx(geod.inv(180, 1, -179.999, 1)[2])
+    assert geosparql.distance(west, east) == pytest.approx(geod.inv(180, 1, -179.999, 1)[2])
+    cut = (
+        "MULTIPOLYGON (((179.999 1, 180 1, 180 1.001, 179.999 1)), "
+        "((-180 1, -179.999 1, -180 1.001, -180 1)))"
+    )
+    intersects, _ = geosparql.FUNCTIONS["sfIntersects"]
+    assert intersects(west, cut)
+    assert intersects(cut, west)
+    grown = geosparql.buffer(cut, 10.0)
+    assert "MULTIPOLYGON" in grown
+    assert "180" in grown
+    assert geosparql.distance(grown, "POINT (-179.998 1)") == pytest.approx(
+        geod.inv(-179.999, 1, -179.998, 1)[2] - 10.0, abs=0.1
+    )
+    union, _ = geosparql.FUNCTIONS["union"]
+    both = str(union(east, "POLYGON ((-180 1, -179.999 1, -180 2, -180 1))"))
+    longitudes = shapely.get_coordinates(shapely.from_wkt(geosparql.split_literal(both)[1]))[:, 0]
+    assert np.abs(longitudes).max() <= 180.0

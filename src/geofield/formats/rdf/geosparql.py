@@ -20,7 +20,7 @@ from shapely.errors import ShapelyError
 
 from geofield.crs import LONLAT, northing_first, reproject, utm_crs
 from geofield.errors import FormatError
-from geofield.formats.antimeridian import joined
+from geofield.formats.antimeridian import joined, split
 from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, EPSG, GEOF, expand, node
 
 _GEOD = Geod(ellps="WGS84")
@@ -108,11 +108,28 @@ def geometries_of(
 
 @lru_cache(maxsize=4096)
 def _shape(literal: str) -> Any:
-    """A WKT literal as a geometry in longitude and latitude."""
-    return geometries_of([literal], ["the literal"], LONLAT)[0]
+    """A WKT literal as a geometry in longitude and latitude; across 180 those go on beyond."""
+    return joined(geometries_of([literal], ["the literal"], LONLAT), LONLAT)[0]
+
+
+def _side_by_side(literals: Sequence[str]) -> list[Any]:
+    """Geometries, all on the side of 180 where the first one is."""
+    first, *others = map(_shape, literals)
+    return [first, *(_moved(each, beside=first) for each in others)]
+
+
+def _moved(shape: Any, *, beside: Any) -> Any:
+    apart = shapely.bounds(beside)[0] - shapely.bounds(shape)[0]
+    turn = 0.0 if np.isnan(apart) else 360.0 * np.rint(apart / 360.0)
+    return shapely.transform(shape, lambda xy: np.add(xy, (turn, 0.0))) if turn else shape
 
 
 def _literal(shape: Any) -> str:
+    if (np.abs(shapely.bounds(shape)[[0, 2]]) > 180.0).any():
+        shape = shapely.transform(
+            shape, lambda xy: np.column_stack([(xy[:, 0] + 180.0) % 360.0 - 180.0, xy[:, 1]])
+        )
+    (shape,) = split(np.array([shape]))
     return f"<{CRS84}> {shapely.to_wkt(shape, rounding_precision=9)}"
 
 
@@ -124,7 +141,7 @@ def _need_metres(unit: str) -> None:
 def distance(first: str, second: str, unit: str = METRE_IRIS[0]) -> float:
     """`geof:distance`: shortest way between two geometries, metres on the ellipsoid."""
     _need_metres(unit)
-    near = shapely.shortest_line(_shape(first), _shape(second))
+    near = shapely.shortest_line(*_side_by_side([first, second]))
     (lon0, lat0), (lon1, lat1) = shapely.get_coordinates(near).tolist()
     return float(_GEOD.inv(lon0, lat0, lon1, lat1)[2])
 
@@ -150,12 +167,12 @@ def buffer(literal: str, radius: float, unit: str = METRE_IRIS[0]) -> str:
 
 def _relation(name: str) -> tuple[Callable[..., Value], str]:
     test = getattr(shapely, name)
-    return lambda first, second: bool(test(_shape(first), _shape(second))), BOOLEAN
+    return lambda *literals: bool(test(*_side_by_side(literals))), BOOLEAN
 
 
 def _operation(name: str) -> tuple[Callable[..., Value], str]:
     work = getattr(shapely, name)
-    return lambda *literals: _literal(work(*map(_shape, literals))), expand("geo:wktLiteral")
+    return lambda *literals: _literal(work(*_side_by_side(literals))), expand("geo:wktLiteral")
 
 
 _RELATIONS = (
