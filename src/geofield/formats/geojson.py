@@ -14,9 +14,9 @@ from geofield.formats.origin import lineage
 from geofield.model import Dataset
 
 DECIMALS = 7
-# GDAL takes `00000x` and `99999x` at the end of what it writes for noise and drops them: of seven
-# decimals that is up to a tenth of a metre. With three more, the numbers rounded before, there is
-# nothing but zeros for it to drop.
+# GDAL takes `00000x` and `99999x` at the end of a long number for noise and drops them: with seven
+# decimals that moves what lies at a tenth of a degree (-62.0000008) by up to a tenth of a metre.
+# With three decimals more, the numbers rounded before, there are nothing but zeros for it to drop.
 _GDAL_DECIMALS = DECIMALS + 3
 _RESOLUTION = '"xy_coordinate_resolution": 1e-{:02d},'
 
