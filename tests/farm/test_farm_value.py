@@ -43,7 +43,7 @@ def plan_at(x: float, y: float, epsg: int, name: str, **own: object) -> gf.Plan:
     from geofield.formats.foreign_tables import obstacle_table
 
     plan = gf.Plan(field, obstacles=obstacle_table(trees, field.crs, Path("trees")))
-    settings = with_values(None, spacing_m=6, headland_m=8.0, route="shortest", buffer_m=2.25)
+    settings = with_values(None, spacing_m=6, headland_m=12.0, route="shortest", buffer_m=2.25)
     return run_tracks(plan, settings=settings)
 
 
