@@ -423,7 +423,7 @@ def test_obstacles_in_another_crs_and_of_other_kinds() -> None:
 
 
 @pytest.mark.parametrize("settings", [{}, {"min_segment_m": 5.0}])
-def test_an_obstacle_over_the_whole_field(settings: dict[str, float]) -> None:
+def test_an_obstacle_over_the_whole_field(settings: dict[str, Any]) -> None:
     with pytest.warns(TrackWarning, match="covers the field" + ".*5 m" * len(settings)):
         tracks = plan_tracks(
             box(0, 0, 100, 40), [box(-5, -5, 105, 45)], crs=CRS, spacing_m=4.0, **settings
