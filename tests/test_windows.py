@@ -6,11 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import rasterio
+import rasterio.shutil
+import rasterio.windows
 from click.testing import CliRunner
+from shapely.affinity import translate
 
 import geofield as gf
 from geofield.cli.main import cli
-from geofield.errors import FieldWarning
+from geofield.errors import FieldWarning, ObstacleWarning, PointOutsideError
 from geofield.imagery import reader, scene
 from geofield.pipeline import plan_field, run_obstacles
 from geofield.plan import Plan, read_plan
@@ -84,8 +88,6 @@ def test_a_drawn_outline_is_shown_as_a_whole() -> None:
 
 
 def test_more_of_a_picture_that_was_fetched_is_offered(tmp_path: Path) -> None:
-    import rasterio.shutil
-
     with rasterio.open(PICTURE) as opened:
         profile = {**opened.profile, "count": 3, "driver": "GTiff"}
         pixels = opened.read([1, 2, 3])
@@ -103,3 +105,25 @@ def test_more_of_a_picture_that_was_fetched_is_offered(tmp_path: Path) -> None:
     with pytest.warns(FieldWarning, match="goes on outside"):
         assert "may be had with --size-m 2" in told("--size-m", 100)
     assert "--size-m" not in told("--size-m", 400, "--overwrite")
+
+
+def test_a_parcel_of_which_the_picture_shows_a_part_beside_its_middle(tmp_path: Path) -> None:
+    """Through every door: the part that is shown is searched, and the rest is told."""
+    with rasterio.open(PICTURE) as opened:
+        window = rasterio.windows.Window(0, 0, 480, 170)
+        profile = {**opened.profile, "height": 170, "driver": "GTiff"}
+        profile["transform"] = opened.window_transform(window)
+        pixels = opened.read(window=window)
+    with rasterio.open(tmp_path / "part.tif", "w", **profile) as part:
+        part.write(pixels)
+    lon, lat = TRUTH.field.inside_lonlat
+    with pytest.warns(ObstacleWarning, match="does not show"):
+        plan = plan_field(
+            tmp_path / "part.tif", lat=lat, lon=lon, settings=settings(), boundary=TRUTH.field
+        )
+    assert plan.obstacles is not None
+    assert 3 <= len(plan.obstacles) < 12
+    elsewhere = replace(TRUTH.field, polygon=translate(TRUTH.field.polygon, 5000.0))
+    lon, lat = elsewhere.inside_lonlat
+    with pytest.raises(PointOutsideError):
+        plan_field(tmp_path / "part.tif", lat=lat, lon=lon, settings=settings(), boundary=elsewhere)

@@ -14,8 +14,10 @@ import shapely
 from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
+from geofield.errors import PointOutsideError
 
 if TYPE_CHECKING:
+    from geofield.grid import Grid
     from geofield.model import Field, Scene
     from geofield.plan import Plan
     from geofield.settings import Settings
@@ -29,7 +31,22 @@ _AROUND_M = 25.0
 def open_scene(
     path: str | Path, lat: float, lon: float, settings: Settings, *, outline: Field | None = None
 ) -> Scene:
-    """Read the picture around a point, degrees (stage 1), with all of an outline where it can."""
+    """Read the picture around a point, degrees (stage 1), with all of an outline where it can.
+
+    A picture that shows only a part of the outline, and not the point, is read around that part.
+    """
+    try:
+        return _read(path, lat, lon, settings, outline)
+    except PointOutsideError:
+        shown = None if outline is None else _point_shown(path, outline, settings)
+        if shown is None:
+            raise
+    return _read(path, *shown, settings, outline)
+
+
+def _read(
+    path: str | Path, lat: float, lon: float, settings: Settings, outline: Field | None
+) -> Scene:
     from geofield.imagery import read_scene
 
     asked = settings.imagery.model_dump()
@@ -38,6 +55,19 @@ def open_scene(
         asked["size_m"] = max(asked["size_m"], shown_m)
     least_m = max(WINDOW_M, shown_m)
     return read_scene(path, lat=lat, lon=lon, allow=settings.fetch.allow, least_m=least_m, **asked)
+
+
+def _point_shown(
+    path: str | Path, outline: Field, settings: Settings
+) -> tuple[float, float] | None:
+    """Latitude and longitude of a place in an outline that a picture shows; None without one."""
+    grid = grid_of(path, settings)
+    seen = outline.polygon_px(grid).intersection(shapely.box(0, 0, grid.width_px, grid.height_px))
+    if not seen.area:
+        return None
+    inside = seen.representative_point()
+    lon, lat = grid.to_lonlat(inside.x, inside.y)
+    return lat, lon
 
 
 def scene_of_plan(path: str | Path, plan: Plan, settings: Settings) -> Scene:
@@ -70,15 +100,19 @@ def first_side_m(scene: Scene, lat: float, lon: float, settings: Settings) -> fl
 
 def shows_all(path: str | Path, lat: float, lon: float, scene: Scene, settings: Settings) -> bool:
     """Whether a scene is all of its picture."""
+    whole = grid_of(path, settings, lat=lat, lon=lon).corners_lonlat()
+    return bool(np.allclose(whole, scene.grid.corners_lonlat(), rtol=0.0, atol=1e-9))
+
+
+def grid_of(path: str | Path, settings: Settings, **point: float) -> Grid:
+    """The pixels of a whole picture, or set of pictures; `lat` and `lon` choose among grids."""
     from geofield.imagery import open_reader
 
     imagery = settings.imagery
     reader = open_reader(
-        str(path), lat=lat, lon=lon, bands=imagery.bands, crs=imagery.crs,
-        allow=settings.fetch.allow,
-    )  # fmt: skip
-    whole, here = reader.grid.corners_lonlat(), scene.grid.corners_lonlat()
-    return bool(np.allclose(whole, here, rtol=0.0, atol=1e-9))
+        str(path), bands=imagery.bands, crs=imagery.crs, allow=settings.fetch.allow, **point
+    )
+    return reader.grid
 
 
 def reach_m(lat: float, lon: float, settings: Settings, outline: Field | None) -> float:

@@ -11,8 +11,8 @@ from geofield.crs import LONLAT, reproject
 from geofield.errors import ImageryError
 from geofield.farm.places import Places
 from geofield.grid import Grid
-from geofield.model.field import Field
 from geofield.settings import Settings
+from geofield.windows import grid_of
 
 
 def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
@@ -29,7 +29,7 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
         return  # many pictures: each place looks for its own
     known = np.isfinite(places.lat) & np.isfinite(places.lon)
     lat, lon = places.lat[known], places.lon[known]
-    grid = _grid_of(path, settings)
+    grid = grid_of(path, settings)
     if _inside(grid, lat, lon).any() or _shows_outlines(grid, places):
         return
     swapped = np.abs(lon) <= 90
@@ -40,25 +40,6 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
         f"None of the {len(places)} places of {Path(places.path).name} lies in {path.name}.",
         hint=hint,
     )
-
-
-def point_shown(path: str | Path, outline: Field, settings: Settings) -> shapely.Point | None:
-    """A point (longitude, latitude) of an outline that a picture shows beside its middle.
-
-    None where it shows nothing of it.
-    """
-    frame = shapely.Polygon(_grid_of(path, settings).corners_lonlat())
-    seen = frame.intersection(outline.polygon_lonlat)
-    return seen.representative_point() if seen.area > 0.0 else None
-
-
-def _grid_of(path: str | Path, settings: Settings) -> Grid:
-    from geofield.imagery import open_reader
-
-    imagery = settings.imagery
-    return open_reader(
-        str(path), bands=imagery.bands, crs=imagery.crs, allow=settings.fetch.allow
-    ).grid
 
 
 def _shows_outlines(grid: Grid, places: Places) -> bool:

@@ -14,8 +14,7 @@ import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.earlier import drew_outline
-from geofield.errors import FieldError, FieldWarning, GeofieldWarning, PointOutsideError
-from geofield.farm.pictures import point_shown
+from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_obstacles
@@ -180,15 +179,7 @@ def _on_picture(
     asked = wider(settings, settings.imagery.size_m or WINDOW_M)
     seen = showing(asked, place.lat, place.lon, outline)
     with job.imagery.at(place.lat, place.lon, seen) if job.imagery else nullcontext("") as path:
-        try:
-            window = open_scene(path, place.lat, place.lon, seen)
-        except PointOutsideError:
-            shown = None if outline is None else point_shown(path, outline, settings)
-            if shown is None:
-                raise
-            place = replace(place, lat=shown.y, lon=shown.x)
-            seen = showing(asked, place.lat, place.lon, outline)
-            window = open_scene(path, place.lat, place.lon, seen)
+        window = open_scene(path, place.lat, place.lon, seen, outline=outline)
         plan = run_field(
             path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
             boundary=boundary, window=window,
