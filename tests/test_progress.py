@@ -96,5 +96,6 @@ def test_every_setting_is_described(tmp_path):
     assert rows["tracks", "curve"]["choices"] == ["dubins", "reeds_shepp"]
     run = described["commands"]["run"]["parameters"]
     assert {"setting": "tracks.spacing_m"} in run
-    lat = next(each for each in run if each.get("name") == "lat")
-    assert (lat["option"], lat["required"]) == ("--lat", True)
+    named = {each["name"]: each for each in run if "name" in each}
+    assert (named["lat"]["option"], named["lat"]["required"]) == ("--lat", False)
+    assert (named["out"]["option"], named["out"]["required"]) == ("--out", True)
