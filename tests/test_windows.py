@@ -87,26 +87,6 @@ def test_a_drawn_outline_is_shown_as_a_whole() -> None:
     assert not again.evidence.obstacle_doubts
 
 
-def test_more_of_a_picture_that_was_fetched_is_offered(tmp_path: Path) -> None:
-    with rasterio.open(PICTURE) as opened:
-        profile = {**opened.profile, "count": 3, "driver": "GTiff"}
-        pixels = opened.read([1, 2, 3])
-    with rasterio.open(tmp_path / "rgb.tif", "w", **profile) as colour:
-        colour.write(pixels)
-    tiles = tmp_path / "farm.mbtiles"
-    rasterio.shutil.copy(tmp_path / "rgb.tif", tiles, driver="MBTiles")
-
-    def told(*more: object) -> str:
-        command = ["field", tiles, "--lat", LAT, "--lon", LON, "-o", tmp_path / "f.gpkg", *more]
-        done = CliRunner().invoke(cli, [str(each) for each in command])
-        assert done.exit_code == 0, done.output
-        return done.stderr
-
-    with pytest.warns(FieldWarning, match="goes on outside"):
-        assert "may be had with --size-m 2" in told("--size-m", 100)
-    assert "--size-m" not in told("--size-m", 400, "--overwrite")
-
-
 def test_a_parcel_of_which_the_picture_shows_a_part_beside_its_middle(tmp_path: Path) -> None:
     """Through every door: the part that is shown is searched, and the rest is told."""
     with rasterio.open(PICTURE) as opened:

@@ -45,6 +45,8 @@ from geofield.windows import first_side_m, open_scene, shows_all, wider
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
+#: Gives the path of what shows a square of a side in ground metres; None where nothing does.
+FetchWider = Callable[[float], str | None]
 
 STAGES = ("picture", "field", "obstacles", "tracks")
 
@@ -60,6 +62,7 @@ def plan_field(
     progress: Progress | None = None,
     timings_s: MutableMapping[str, float] | None = None,
     name: str | None = None,
+    fetch_wider: FetchWider | None = None,
     **by_name: Any,
 ) -> Plan:
     """Run all four stages.
@@ -88,6 +91,9 @@ def plan_field(
         Filled with the seconds of each stage.
     name : str, optional
         Of the field; its earlier plan's, or its place, when not given.
+    fetch_wider : callable, optional
+        Of a picture that was fetched for this place: called with a side, ground metres, where the
+        field goes on outside; returns the path of a picture so wide, or None.
     **by_name
         Any setting by its own name, over those of `settings`: ``spacing_m=6``; ``machine`` may
         be one of the settings, a `Machine` or a mapping such as ``{"width_m": 12}``.
@@ -112,6 +118,7 @@ def plan_field(
             boundary=boundary,
             window=picture,
             name=name,
+            fetch_wider=fetch_wider,
         )
         picture = plan.scene or picture
     with _timed("obstacles", timings, tell):
@@ -132,6 +139,7 @@ def run_field(
     window: Scene | None = None,
     choose: int | None = None,
     name: str | None = None,
+    fetch_wider: FetchWider | None = None,
 ) -> Plan:
     """Stage 2: find the outline, unless a person drew it.
 
@@ -168,7 +176,7 @@ def run_field(
         field = kept_outline(previous)
     else:
         if boundary is None:
-            field, scene = _find(picture, scene, lat, lon, settings, regions)
+            field, scene = _find(picture, scene, lat, lon, settings, regions, fetch_wider)
             field = field.choose(choose) if choose else field
         else:
             field = boundary
@@ -222,6 +230,7 @@ def _find(
     lon: float,
     settings: Settings,
     regions: Sequence[int],
+    fetch_wider: FetchWider | None,
 ) -> tuple[Field, Scene]:
     """The field, in a window as wide as it needs."""
     from geofield.field import extract_field, grow_field
@@ -233,15 +242,22 @@ def _find(
         # Numbers of regions, and a picture that is given as a value, do not change.
         return extract_field(scene, lat=lat, lon=lon, regions=regions, **options), scene
     first_m = first_side_m(scene, lat, lon, settings)
+    latest = scene
 
     def read(size_m: float) -> Scene:
+        nonlocal latest
         if size_m == first_m:
             return scene
+        path = fetch_wider(size_m) if fetch_wider is not None else picture
+        if path is None:
+            return latest
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ImageryWarning)  # told with the first window
-            if settings.imagery.size_m is None and shows_all(picture, lat, lon, scene, settings):
+            unasked = path == picture and settings.imagery.size_m is None
+            if unasked and shows_all(picture, lat, lon, scene, settings):
                 return scene
-            return open_scene(picture, lat, lon, wider(settings, size_m))
+            latest = open_scene(path, lat, lon, wider(settings, size_m))
+        return latest
 
     return grow_field(
         read, lat=lat, lon=lon, size_m=first_m, largest_m=max(6400.0, first_m), **options

@@ -158,11 +158,11 @@ def test_a_named_picture_carries_its_terms(
         pass
     Path("geofield.toml").write_text(text + "may_derive = true\n")
     with as_picture("drone", load_settings(), lat=lat, lon=lon) as picture:
-        scene = read_scene(picture)
+        scene = read_scene(picture.path)
     assert scene.source.attribution == "Me"
     assert np.array_equal(scene.bands, ground())
     with as_picture(path, load_settings(), lat=lat, lon=lon) as picture:
-        assert picture == path
+        assert picture.path == path
 
 
 def test_sources_of_ones_own(

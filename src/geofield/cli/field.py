@@ -12,6 +12,7 @@ from geofield.cli.console import echo_json, progress_bar, say
 from geofield.cli.files import FILE, FOLDER, claim_plan
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
+    acknowledge_option,
     name_option,
     point_or_parcel_options,
     stage_options,
@@ -77,6 +78,7 @@ Examples (on the project's own sample):
     type=click.IntRange(1, 3),
     help="Take this outline of the alternatives: your word, kept on every later run.",
 )
+@acknowledge_option
 @name_option
 @boundary_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON on stdout.")
@@ -93,6 +95,7 @@ def field(
     pictures: Path | None,
     alternatives: bool,
     choose: int | None,
+    acknowledge_terms: bool,
     name: str | None,
     boundary: Path | None,
     boundary_layer: str | None,
@@ -132,23 +135,25 @@ def field(
     seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
     with (
         progress_bar(quiet=as_json) as progress,
-        as_picture(imagery, seen, lat=lat, lon=lon, progress=progress) as picture,
+        as_picture(
+            imagery, seen, lat=lat, lon=lon, acknowledged=acknowledge_terms, progress=progress
+        ) as picture,
     ):
         if list_regions or regions or pictures is not None:
-            scene = open_scene(picture, lat, lon, settings)
+            scene = open_scene(picture.path, lat, lon, settings)
             _study(scene, lat, lon, regions, pictures, tell=list_regions, as_json=as_json)
         if output is None:
             return
         plan = run_field(
-            picture, lat=lat, lon=lon, settings=settings, previous=previous, regions=regions,
-            boundary=parcel, choose=choose, name=name,
+            picture.path, lat=lat, lon=lon, settings=settings, previous=previous,
+            regions=regions, boundary=parcel, choose=choose, name=name, fetch_wider=picture.wider,
         )  # fmt: skip
     save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
     if as_json:
         echo_json(_figures(plan, output))
     else:
         _say(plan, output, alternatives=alternatives)
-        say_wider(plan, imagery)
+        say_wider(plan, picture)
 
 
 def _refuse_at_odds(given: Mapping[str, Any]) -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from geofield.cli.console import Progress, say
 
 if TYPE_CHECKING:
-    from geofield.imagery import Acquired, FetchOptions, Where
+    from geofield.imagery import Acquired, FetchOptions, PlacePicture, Where
     from geofield.imagery.sources import Source, SourceEntry
     from geofield.plan import Plan
     from geofield.settings import Settings
@@ -133,13 +133,13 @@ def as_picture(
     lon: float,
     acknowledged: bool = False,
     progress: Progress | None = None,
-) -> Iterator[str]:
-    """A path that `read_scene` reads: the user's own picture, or one fetched for the moment."""
-    from geofield.imagery import is_own_picture, picture_at
+) -> Iterator[PlacePicture]:
+    """The user's own picture, or one fetched for the moment."""
+    from geofield.imagery import PlacePicture, is_own_picture, picture_at
     from geofield.imagery.terms import check_terms
 
     if is_own_picture(what):
-        yield what
+        yield PlacePicture(what)
         return
     options = fetch_options(settings, cache_dir_of(settings))
     source = resolve(what, settings, point=(lon, lat), options=options)
@@ -152,15 +152,13 @@ def as_picture(
         bands=settings.imagery.bands,
         options=replace(options, acknowledged=acknowledged),
         progress=progress,
-    ) as path:
-        yield path
+    ) as picture:
+        yield picture
 
 
-def say_wider(plan: Plan, imagery: str) -> None:
+def say_wider(plan: Plan, picture: PlacePicture) -> None:
     """How to get more of a source's picture, where the outline goes on outside what was fetched."""
-    from geofield.imagery import is_own_picture
-
-    if plan.grid is None or not plan.frame_lines or is_own_picture(imagery):
+    if plan.grid is None or not plan.frame_lines or not picture.offers_more:
         return
     side_m = max(plan.grid.shape) * plan.grid.ground_resolution_m
     say(f"           what lies outside may be had with --size-m {2 * side_m:.0f}", fg="yellow")

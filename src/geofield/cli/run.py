@@ -120,8 +120,8 @@ def run(
         ) as picture,
     ):
         plan = plan_field(
-            picture, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,
-            progress=progress, timings_s=timings, name=name,
+            picture.path, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,
+            progress=progress, timings_s=timings, name=name, fetch_wider=picture.wider,
         )  # fmt: skip
         inputs = [each for each in (imagery, boundary) if each is not None]
         files = plan.write(out, overwrite=overwrite, timings_s=timings, inputs=inputs)
@@ -129,7 +129,7 @@ def run(
         echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
     else:
         summarise(plan, files, timings)
-        say_wider(plan, imagery)
+        say_wider(plan, picture)
         say_outdated(out / "field.gpkg")
 
 

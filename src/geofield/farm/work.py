@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from geofield.tracks.outline import clean_outline
 from geofield.windows import WINDOW_M, open_scene, showing, wider
 
 if TYPE_CHECKING:
-    from geofield.imagery import FetchOptions
+    from geofield.imagery import FetchOptions, PlacePicture
     from geofield.imagery.sources import Source
 
 #: Share of the smaller outline that a place and its reviewed plan have in common at least.
@@ -46,19 +46,19 @@ class Imagery:
     options: FetchOptions | None = None
 
     @contextmanager
-    def at(self, lat: float, lon: float, settings: Settings) -> Iterator[str]:
-        """A path that `read_scene` reads at a place."""
-        if self.source is None or self.options is None:
-            yield self.path
-            return
-        from geofield.imagery import picture_at
+    def at(self, lat: float, lon: float, settings: Settings) -> Iterator[PlacePicture]:
+        """The picture of a place."""
+        from geofield.imagery import PlacePicture, picture_at
 
+        if self.source is None or self.options is None:
+            yield PlacePicture(self.path)
+            return
         imagery = settings.imagery
         with picture_at(
             self.source, lat=lat, lon=lon, size_m=imagery.size_m, bands=imagery.bands,
             options=self.options,
-        ) as path:  # fmt: skip
-            yield path
+        ) as picture:  # fmt: skip
+            yield picture
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
             return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)
     if job.imagery is not None:
-        plan = _on_picture(place, boundary, settings, job, previous)
+        plan = _on_picture(job.imagery, place, boundary, settings, job, previous)
     elif previous is not None:
         plan = previous
     elif boundary is not None:
@@ -172,17 +172,22 @@ def _same_stages(one: Settings | None, other: Settings) -> bool:
 
 
 def _on_picture(
-    place: Place, boundary: Field | None, settings: Settings, job: Job, previous: Plan | None
+    imagery: Imagery,
+    place: Place,
+    boundary: Field | None,
+    settings: Settings,
+    job: Job,
+    previous: Plan | None,
 ) -> Plan:
     """Outline, unless it is given, and obstacles."""
     outline = boundary if previous is None else previous.field
     asked = wider(settings, settings.imagery.size_m or WINDOW_M)
     seen = showing(asked, place.lat, place.lon, outline)
-    with job.imagery.at(place.lat, place.lon, seen) if job.imagery else nullcontext("") as path:
-        window = open_scene(path, place.lat, place.lon, seen, outline=outline)
+    with imagery.at(place.lat, place.lon, seen) as picture:
+        window = open_scene(picture.path, place.lat, place.lon, seen, outline=outline)
         plan = run_field(
-            path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
-            boundary=boundary, window=window,
+            picture.path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
+            boundary=boundary, window=window, fetch_wider=picture.wider,
         )  # fmt: skip
         if previous is None:
             plan = _around(plan, job)

@@ -12,7 +12,7 @@ from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
-    from geofield.imagery.at_place import is_own_picture, picture_at
+    from geofield.imagery.at_place import PlacePicture, is_own_picture, picture_at
     from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
     from geofield.imagery.reader import SceneReader
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Acquired",
     "FetchOptions",
+    "PlacePicture",
     "SceneReader",
     "Where",
     "acquire",
@@ -38,7 +39,7 @@ __getattr__ = late_names(
     __name__,
     {
         "acquisition": "Acquired Where acquire",
-        "at_place": "is_own_picture picture_at",
+        "at_place": "PlacePicture is_own_picture picture_at",
         "opening": "FetchOptions",
         "pictures": "open_reader",
         "reader": "SceneReader",
