@@ -9,12 +9,10 @@ import pytest
 import rasterio
 import rasterio.shutil
 import rasterio.windows
-from click.testing import CliRunner
 from shapely.affinity import translate
 
 import geofield as gf
-from geofield.cli.main import cli
-from geofield.errors import FieldWarning, ObstacleWarning, PointOutsideError
+from geofield.errors import ObstacleWarning, PointOutsideError
 from geofield.imagery import reader, scene
 from geofield.pipeline import plan_field, run_obstacles
 from geofield.plan import Plan, read_plan

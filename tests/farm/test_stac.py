@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,3 +65,40 @@ def test_it_is_written_the_same_again(folder):
     write_stac(Store.of(folder), name="home")
     assert (folder / "collection.json").read_bytes() == before
     assert json.loads(before)["extent"]["temporal"]["interval"][0][0] == "2020-05-01T00:00:00Z"
+
+
+def test_boxes_across_180_degrees_do_not_go_round_the_world(tmp_path):
+    """Fiji: fields west of the meridian, across it and east of it."""
+    metric = "EPSG:32760"
+    shapes = [shapely.box(x, 8_150_000, x + 300, 8_150_200) for x in (816_000, 819_500, 823_000)]
+    table = gpd.GeoDataFrame({"field_id": list("abc")}, geometry=shapes, crs=metric)
+    sides = table.centroid.to_crs(4326).x
+    assert sides.min() < -179.9
+    assert sides.max() > 179.9
+    table.to_file(tmp_path / "parcels.gpkg")
+    gf.Farm(list(gf.plan_fields(tmp_path / "parcels.gpkg", spacing_m=20))).write(tmp_path / "farm")
+    write_stac(Store.of(tmp_path / "farm"))
+    collection = pystac.Collection.from_file(str(tmp_path / "farm" / "collection.json"))
+    (item,) = collection.get_items()
+    for west, south, east, north in (item.bbox, *collection.extent.spatial.bboxes):
+        assert 179.9 < west < 180
+        assert -180 < east < -179.9
+        assert 0 < north - south < 0.01
+    shape = shapely.geometry.shape(item.geometry)
+    assert len(shapely.get_parts(shape)) == 2
+    assert shape.area < 0.001
+    assert shape.intersects(shapely.Point(180.0, south))
+
+
+def test_items_of_chunks_that_are_gone_go_too(folder, tmp_path):
+    farm = tmp_path / "farm"
+    shutil.copytree(folder, farm)
+    (farm / "stac" / "chunk-0007.json").write_text("{}")
+    (farm / "stac" / "mine.json").write_text("{}")
+    write_stac(Store.of(farm), name="home")
+    assert {each.name for each in (farm / "stac").iterdir()} == {"chunk-0000.json", "mine.json"}
+    for each in (farm / "status").rglob("*.parquet"):
+        each.unlink()
+    assert write_stac(Store.of(farm), name="home") == []
+    assert not (farm / "collection.json").exists()
+    assert [each.name for each in (farm / "stac").iterdir()] == ["mine.json"]

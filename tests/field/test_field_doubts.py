@@ -1,6 +1,7 @@
 """Bad input: a clear message or a flagged result, never a silent wrong polygon."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from affine import Affine
 from geofield.crs import parse_crs
 from geofield.errors import FieldWarning, GeofieldError
 from geofield.field import extract_field
+from geofield.field.evidence import block_mean
 from geofield.grid import Grid
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field
@@ -115,3 +117,17 @@ def test_grey_pictures_work():
     field = judged(scene, 100, 100)
     assert field is not None
     assert field.polygon_px(grid).area == pytest.approx(120 * 120, rel=0.02)
+
+
+def test_a_border_from_coarse_pixels_is_told_as_such():
+    truth = simulate_field(12, SimulationSettings(width_px=1600, height_px=1600))
+    said = []
+    for factor in (4, 8):
+        bands = np.stack([block_mean(band, factor) for band in truth.scene.bands]).astype(np.uint8)
+        grid = truth.scene.grid.resized(bands.shape[2], bands.shape[1])
+        scene = replace(truth.scene, grid=grid, bands=bands, valid=np.ones(grid.shape, bool))
+        quality = extract_field(scene, lat=truth.lat, lon=truth.lon).quality
+        assert quality is not None
+        said.append("; ".join(quality.reasons))
+    assert "coarse" not in said[0]
+    assert "coarse (4.8 m per pixel)" in said[1]

@@ -653,6 +653,9 @@ def test_a_geopackage_that_is_the_picture_itself(tmp_path: Path) -> None:
     with pytest.raises(ImageryError, match="2 others") as caught:
         read_scene(tmp_path / "tiled.gpkg")
     assert "gdal_translate 'GPKG:" in caught.value.hint
+    told = CliRunner().invoke(cli, ["info", str(tmp_path / "tiled.gpkg")])
+    assert "pictures in it:" in told.stdout
+    assert f"GPKG:{tmp_path / 'tiled.gpkg'}:B" in told.stdout
 
 
 def test_an_index_and_a_vrt(tmp_path: Path) -> None:

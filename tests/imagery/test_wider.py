@@ -121,9 +121,11 @@ def test_a_server_is_asked_for_more(
         if all_there:
             told(*command)
         else:
-            with pytest.warns(ImageryWarning, match="could not be had"):
-                with pytest.warns(FieldWarning, match="goes on outside"):
-                    told(*command)
+            with (
+                pytest.warns(ImageryWarning, match="could not be had"),
+                pytest.warns(FieldWarning, match="goes on outside"),
+            ):
+                told(*command)
     plan = read_plan(tmp_path / "f.gpkg")
     if all_there:
         assert overlap(plan) > 0.97

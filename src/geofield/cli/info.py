@@ -118,6 +118,9 @@ def _picture(file: Path) -> dict[str, Any]:
     from geofield.imagery.gdal import gdal_env, open_picture, reading
 
     with gdal_env(str(file)), reading(str(file)), open_picture(str(file)) as picture:
+        if not picture.count and picture.subdatasets:
+            inner = list(picture.subdatasets)
+            return {"file": str(file), "format": picture.driver, "pictures in it": inner}
         facts: dict[str, Any] = {
             "file": str(file),
             "format": picture.driver,

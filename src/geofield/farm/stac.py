@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pyarrow.compute as pc
 import shapely
 
@@ -18,11 +19,13 @@ from geofield import __version__, schema
 from geofield.farm.folder import RECORD, STATUS, committed, file_of, read_part
 from geofield.farm.layers import GEOMETRY, LAYERS, PLAN
 from geofield.farm.store import Store
+from geofield.formats.antimeridian import extent, extent_box
 
 COLLECTION = "collection.json"
 ITEMS = "stac"
 _VERSION = "1.0.0"
 _PARQUET = "application/vnd.apache.parquet"
+_OF_A_CHUNK = re.compile(r"chunk-\d+\.json")
 _SPDX = re.compile(r"[A-Za-z0-9.+-]+")
 #: Of an item whose imagery nobody has dated; STAC wants some interval.
 _UNKNOWN = {"start_datetime": "1900-01-01T00:00:00Z", "end_datetime": "9999-12-31T23:59:59Z"}
@@ -31,7 +34,7 @@ _UNKNOWN = {"start_datetime": "1900-01-01T00:00:00Z", "end_datetime": "9999-12-3
 def write_stac(store: Store, *, name: str = "farm") -> list[str]:
     """Write ``collection.json`` and ``stac/chunk-0007.json``; the names of the files.
 
-    `name` is the id of the collection.
+    `name` is the id of the collection. Items of chunks that are gone are removed.
     """
     written: dict[str, dict[str, Any]] = {}
     present = {layer: set(store.names(layer)) for layer, _ in _layers()}
@@ -41,7 +44,11 @@ def write_stac(store: Store, *, name: str = "farm") -> list[str]:
             file = f"{ITEMS}/chunk-{chunk:04d}.json"
             store.put(file, _json(item))
             written[file] = item
+    for each in store.names(ITEMS):
+        if _OF_A_CHUNK.fullmatch(each) and f"{ITEMS}/{each}" not in written:
+            store.remove(f"{ITEMS}/{each}")
     if not written:
+        store.remove(COLLECTION)
         return []
     store.put(COLLECTION, _json(_collection(written, name)))
     return [COLLECTION, *written]
@@ -54,7 +61,7 @@ def _item(
     if fields is None or not fields.num_rows:
         return None
     shapes = shapely.from_wkb(fields[GEOMETRY].to_numpy(zero_copy_only=False))
-    west, south, east, north = (round(float(each), 7) for each in shapely.total_bounds(shapes))
+    west, south, east, north = (round(each, 7) for each in extent(shapes))
     days = sorted({str(day)[:10] for day in fields["imagery_date"].to_pylist() if day})
     properties: dict[str, Any] = {"datetime": None, **_UNKNOWN}
     if days:
@@ -69,7 +76,7 @@ def _item(
         "stac_version": _VERSION,
         "id": f"{collection}-chunk-{chunk:04d}",
         "collection": collection,
-        "geometry": json.loads(shapely.to_geojson(shapely.box(west, south, east, north))),
+        "geometry": json.loads(shapely.to_geojson(extent_box(west, south, east, north))),
         "bbox": [west, south, east, north],
         "properties": {
             **properties,
@@ -111,9 +118,7 @@ def _terms(store: Store, chunk: int) -> list[dict[str, Any]]:
 
 def _collection(by_file: Mapping[str, dict[str, Any]], name: str) -> dict[str, Any]:
     items = by_file.values()
-    boxes = [item["bbox"] for item in items]
-    west, south = (min(box[side] for box in boxes) for side in (0, 1))
-    east, north = (max(box[side] for box in boxes) for side in (2, 3))
+    west, south, east, north = extent(np.array([extent_box(*item["bbox"]) for item in items]))
     known = (item["properties"] for item in items)
     dated = [one for one in known if one["start_datetime"] != _UNKNOWN["start_datetime"]]
     begin = min((each["start_datetime"] for each in dated), default=None)

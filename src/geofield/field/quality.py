@@ -16,6 +16,8 @@ BoolArray = NDArray[np.bool_]
 
 #: A field below this is hardly one, square metres.
 _SMALL_M2 = 400.0
+#: A border is found to a fraction of a pixel: of larger ones that is metres.
+_COARSE_M = 3.0
 #: From this score on an outline is used without a warning. The score is the probability of a
 #: good outline, lowered for what that probability knows nothing of.
 _TRUSTED = 0.45
@@ -48,7 +50,8 @@ def judge(
     frame_px : shapely.Polygon
         The frame of the whole picture, of which the scene may be a part.
     """
-    area_m2 = outline_px.area * scene.grid.ground_resolution_m**2
+    pixel_m = scene.grid.ground_resolution_m
+    area_m2 = outline_px.area * pixel_m**2
     strange, seen = doubts(look, mask)
     touching = edge_share(outline_px, frame_px)
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
@@ -64,6 +67,8 @@ def judge(
     if area_m2 < _SMALL_M2:
         reasons.append(f"it has only {area_m2:.0f} m2")
         score -= 0.6
+    if pixel_m > _COARSE_M:
+        reasons.append(f"the picture is coarse ({pixel_m:.3g} m per pixel): it may be metres off")
     if not outline_px.covers(shapely.Point(seed_px)):
         reasons.append("the point lies on something else (a tree, a road, a roof?)")
         score -= 0.4

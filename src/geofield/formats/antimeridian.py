@@ -62,6 +62,29 @@ def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
     return shapes
 
 
+def extent(shapes: NDArray[np.object_]) -> tuple[float, float, float, float]:
+    """West, south, east and north of shapes in degrees; west lies beyond east across 180.
+
+    That is RFC 7946, section 5.2. Of the two ways round, the narrower one.
+    """
+    bounds = shapely.bounds(unwrapped(shapes)).reshape(-1, 4)
+    ways = []
+    for shift in (0.0, 360.0):
+        left = np.where(bounds[:, 0] < 0, bounds[:, 0] + shift, bounds[:, 0])
+        ways.append((np.nanmin(left), np.nanmax(left + bounds[:, 2] - bounds[:, 0])))
+    west, east = (float(side) for side in min(ways, key=lambda way: way[1] - way[0]))
+    south, north = float(np.nanmin(bounds[:, 1])), float(np.nanmax(bounds[:, 3]))
+    return west - 360.0 * (west > 180.0), south, east - 360.0 * (east > 180.0), north
+
+
+def extent_box(west: float, south: float, east: float, north: float) -> Any:
+    """An extent as a shape in degrees, cut at 180 where it lies across."""
+    if west <= east:
+        return shapely.box(west, south, east, north)
+    sides = (west, 180.0), (-180.0, east)
+    return shapely.multipolygons([shapely.box(left, south, right, north) for left, right in sides])
+
+
 def _joined(shape: Any) -> Any:
     parts = shapely.get_parts(shape)
     if len(parts) == 1:
