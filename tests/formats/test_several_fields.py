@@ -246,3 +246,33 @@ def test_a_row_of_none_of_the_fields_is_not_left_out_silently(tmp_path):
     done = geofield("export", file, "-f", "isoxml", "--out", tmp_path / "out")
     assert done.returncode == 1
     assert "'obstacles' has 1 row(s) of none of the 2 fields" in done.stderr
+
+
+def test_each_field_of_a_set_of_shapefiles_has_its_own_tracks(tmp_path):
+    """Two fields with a track 1 each have two of them, and are exported as two again."""
+    write_datasets(FARM[:2], tmp_path, ["shapefile", "isoxml"])
+    done = geofield("import", tmp_path / "shapefile", "-o", tmp_path / "all.gpkg")
+    assert done.returncode == 0, done.stderr
+    tracks = pyogrio.read_dataframe(tmp_path / "all.gpkg", layer="tracks")
+    wanted = [len(each.table("tracks")) for each in FARM[:2]]
+    assert tracks["field_id"].value_counts(sort=False).tolist() == wanted
+    args = (tmp_path / "all.gpkg", "-f", "isoxml", "-f", "csv", "--out", tmp_path / "again")
+    done = geofield("export", *args)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("there are none of their points") == 1
+    lines = [
+        sorted(len(list(field.iter("LSG"))) for field in ET.parse(file).getroot().iter("PFD"))
+        for folder in (tmp_path, tmp_path / "again")
+        for file in [folder / "isoxml" / "TASKDATA" / "TASKDATA.XML"]
+    ]
+    assert lines[0] == lines[1]
+
+
+def test_the_places_of_a_farm_are_known(tmp_path):
+    write_datasets(FARM[:2], tmp_path, ["gpkg"])
+    points = gpd.GeoDataFrame(geometry=[shapely.Point(0, 0)], crs=4326)
+    for layer, told in (("places", 0), ("mine", 1)):
+        pyogrio.write_dataframe(points, tmp_path / "field.gpkg", layer=layer)
+        done = geofield("export", tmp_path / "field.gpkg", "-f", "kml", "--out", tmp_path / layer)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr.count("is not geofield's") == told

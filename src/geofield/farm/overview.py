@@ -30,26 +30,6 @@ OVERVIEW = f"{STEM}.gpkg"
 #: Fields up to which the overview holds obstacles and tracks; beyond, outlines and places.
 MOST_FIELDS = 20_000
 
-PLACES = schema.Layer(
-    "places",
-    "Point",
-    "Places",
-    "What was asked for and what became of it.",
-    ("place", "field_id"),
-    (
-        schema.Column("place", "int", "Row in the places file", "place"),
-        schema.Column("field_id", "str", "Field id", "field_id"),
-        schema.Column("name", "str", "Name", "name"),
-        schema.Column(
-            "status", "str", "Status", "status", values=("done", "doubtful", "failed", "lost")
-        ),
-        schema.Column("error", "str", "Error", "error"),
-        schema.Column("hint", "str", "What helps", "hint"),
-        schema.Column("notes", "str", "Notes", "notes"),
-        schema.Column("reviewed", "str", "Reviewed", "reviewed", values=("yes", "no")),
-    ),
-    optional=True,
-)
 #: Those that a person works on; the others follow from them.
 _DETAILS = tuple(
     each
@@ -84,7 +64,7 @@ def dataset_of(farm: Farm, name: str) -> Joined:
     places = places[~places.geometry.is_empty]
     reviewed = places["reviewed"].map({True: "yes", False: "no"})
     told = places.assign(reviewed=reviewed).replace("", None)
-    tables[PLACES.name] = schema.conform(PLACES, told)
+    tables[schema.PLACES.name] = schema.conform(schema.PLACES, told)
     details = schema.OBSTACLES.name in tables
     obstacles = tables[schema.OBSTACLES.name] if details else schema.empty(schema.OBSTACLES, crs)
     evidence = {
@@ -93,7 +73,7 @@ def dataset_of(farm: Farm, name: str) -> Joined:
         OWN: {"columns": {}, "digests": {}},
     }
     origin = Provenance(f"geofield {__version__}", _source(fields), {}, evidence)
-    return Joined(tables, crs, name, origin, further=(PLACES,))
+    return Joined(tables, crs, name, origin, further=(schema.PLACES,))
 
 
 def _source(fields: gpd.GeoDataFrame) -> ImagerySource:

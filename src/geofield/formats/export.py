@@ -111,7 +111,24 @@ def write_datasets(
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
+        if _points_alone(each) and any(_lacks_points(one) for one in datasets):
+            warnings.warn(
+                f"{each.title} has nothing of the tracks: there are none of their points, which "
+                "`geofield tracks` makes.",
+                FormatWarning,
+                stacklevel=2,
+            )
     return written
+
+
+def _points_alone(into: Format) -> bool:
+    """Whether a format has the tracks by their points alone."""
+    names = schema.TRACKS.name, schema.SEGMENTS.name
+    return schema.TRACK_POINTS.name in into.layers and not set(names) & set(into.layers)
+
+
+def _lacks_points(dataset: Dataset) -> bool:
+    return dataset.has(schema.TRACKS.name) and not dataset.has(schema.TRACK_POINTS.name)
 
 
 def _written(

@@ -160,8 +160,16 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     """Lines as layers `tracks` and `segments`.
 
     Lines with the same track number are segments of one track; without numbers each line is
-    a track.
+    a track. Where rows say of which of several fields they are, each field has its own tracks.
     """
+    owners = column_like(frame, ("field_id",))
+    if owners is not None and owners.notna().all() and owners.nunique() > 1:
+        parts = [(one, line_tables(frame[owners == one], crs)) for one in owners.unique()]
+        tracks, segments = (
+            pd.concat([part[at].assign(field_id=one) for one, part in parts], ignore_index=True)
+            for at in (0, 1)
+        )
+        return tracks, segments
     geometry = shapely.force_2d(frame.geometry.to_numpy())
     geometry = np.array([shapely.LineString(line.coords) for line in geometry], dtype=object)
     track, segment = _line_numbers(frame)

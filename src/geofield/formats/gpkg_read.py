@@ -47,6 +47,8 @@ def read(path: Path) -> Dataset:
     crs = record.crs
     known = {layer.name: layer for layer in schema.LAYERS}
     for name in layers:
+        if name == schema.PLACES.name:
+            continue  # a farm's overview: no part of a plan
         if name not in known:
             warnings.warn(
                 f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",

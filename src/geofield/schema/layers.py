@@ -227,6 +227,26 @@ LAYERS: tuple[Layer, ...] = (
     ALTERNATIVES,
 )
 
+#: Beside the layers of its fields, in the overview of a farm.
+PLACES = Layer(
+    "places",
+    "Point",
+    "Places",
+    "What was asked for and what became of it.",
+    ("place", "field_id"),
+    (
+        Column("place", "int", "Row in the places file", "place"),
+        Column("field_id", "str", "Field id", "field_id"),
+        Column("name", "str", "Name", "name"),
+        Column("status", "str", "Status", "status", values=("done", "doubtful", "failed", "lost")),
+        Column("error", "str", "Error", "error"),
+        Column("hint", "str", "What helps", "hint"),
+        Column("notes", "str", "Notes", "notes"),
+        Column("reviewed", "str", "Reviewed", "reviewed", values=("yes", "no")),
+    ),
+    optional=True,
+)
+
 
 def layer(name: str) -> Layer:
     """The layer of a name.
