@@ -94,6 +94,9 @@ def test_every_setting_is_described(tmp_path):
     assert rows["tracks", "spacing_m"]["default"] == 2.0
     assert rows["tracks", "spacing_m"]["above"] == 0
     assert rows["tracks", "curve"]["choices"] == ["dubins", "reeds_shepp"]
+    for command, about in described["commands"].items():
+        for each in about["parameters"]:
+            assert "setting" in each or each["description"], (command, each)
     run = described["commands"]["run"]["parameters"]
     assert {"setting": "tracks.spacing_m"} in run
     named = {each["name"]: each for each in run if "name" in each}

@@ -1089,6 +1089,11 @@
       <translation>Bild</translation>
     </message>
     <message>
+      <location filename="description.json" />
+      <source>IMAGERY is a GeoTIFF, a folder of them, or any other source that `geofield tiles` takes.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Lat</source>
       <translation>Breite</translation>
@@ -1209,6 +1214,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.json" />
+      <source>IMAGERY is a picture or any other source that `geofield tiles` takes.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Output</source>
       <translation>Ziel</translation>
@@ -1279,9 +1289,19 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.json" />
+      <source>IMAGERY is the picture that the field was found in.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Plan file</source>
       <translation>Plan</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Rows that a person confirmed, rejected or drew in FIELD.gpkg stay as they are; the settings that it was made with hold where you say nothing else.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
@@ -1307,6 +1327,11 @@
       <location filename="description.py" />
       <source>File</source>
       <translation>Datei</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with all that a person changed, and whose settings hold where you say nothing else; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
@@ -1352,6 +1377,11 @@
       <location filename="description.py" />
       <source>Source</source>
       <translation>Quelle</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>SOURCE is the name of a source (see `geofield sources`), a tile address with {z}/{x}/{y}, the address of a WMS, WMTS or GeoTIFF, a picture, a folder of pictures, an MBTiles or a STAC file.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
@@ -1485,6 +1515,11 @@
     </message>
     <message>
       <location filename="description.json" />
+      <source>PLAN is a GeoPackage of geofield, the folder of a farm, or any file it can import.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
       <source>Format; may be repeated.</source>
       <translation>Formate.</translation>
     </message>
@@ -1580,6 +1615,11 @@
     </message>
     <message>
       <location filename="description.json" />
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or AgOpenGPS field, in any CRS.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
       <source>GeoPackage to write.</source>
       <translation type="unfinished" />
     </message>
@@ -1595,6 +1635,11 @@
     </message>
     <message>
       <location filename="description.json" />
+      <source>Check each FILE, of any format: the format's rules, and whether the plan fits together.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
       <source>Print the findings as JSON on stdout.</source>
       <translation type="unfinished" />
     </message>
@@ -1602,6 +1647,16 @@
       <location filename="description.py" />
       <source>Detected</source>
       <translation>Gefunden</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>TRUTH may be a plan that a person reviewed: what they rejected is no true obstacle.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.py" />
@@ -1667,6 +1722,16 @@
       <location filename="description.py" />
       <source>Places</source>
       <translation>Orte</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>PLACES is a file with a row per field: points (CSV or Parquet with columns lat and lon, or any vector file) or parcels (polygons), whose outlines are taken as they are.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>IMAGERY is whatever `geofield run` takes; parcels need none.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />

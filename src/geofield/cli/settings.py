@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import click
@@ -77,7 +78,7 @@ def all_commands(context: click.Context) -> dict[str, Any]:
             found[name] = {
                 "help": (command.help or "").strip(),
                 "parameters": [
-                    _parameter(each)
+                    _parameter(each, command.help or "")
                     for each in command.params
                     if each.name not in ("help", "progress", "log_file", "verbose")
                 ],
@@ -85,7 +86,7 @@ def all_commands(context: click.Context) -> dict[str, Any]:
     return found
 
 
-def _parameter(parameter: click.Parameter) -> dict[str, Any]:
+def _parameter(parameter: click.Parameter, command_help: str) -> dict[str, Any]:
     section, separator, name = (parameter.name or "").partition(SEPARATOR)
     if separator:
         return {"setting": f"{section}.{name}"}
@@ -94,11 +95,23 @@ def _parameter(parameter: click.Parameter) -> dict[str, Any]:
     return {
         "name": parameter.name,
         "option": parameter.opts[0] if isinstance(parameter, click.Option) else "",
-        "description": (parameter.help or "") if isinstance(parameter, click.Option) else "",
+        "description": _described(parameter, command_help),
         "required": parameter.required,
         "default": plain,
         **_kind(parameter),
     }
+
+
+def _described(parameter: click.Parameter, command_help: str) -> str:
+    """What a parameter is; an argument has no help of its own, but a sentence of its command's."""
+    if isinstance(parameter, click.Option):
+        return parameter.help or ""
+    called = (parameter.metavar or str(parameter.name).upper()).strip("[]").split()[0].rstrip(".")
+    sentences = re.split(r"(?<=\.)\s+|\n\n", command_help)
+    about = [
+        " ".join(one.split()) for one in sentences if re.search(rf"\b{re.escape(called)}\b", one)
+    ]
+    return min(about, key=lambda one: not one.startswith(called), default="")
 
 
 def _kind(parameter: click.Parameter) -> dict[str, Any]:

@@ -3,6 +3,9 @@
 Superpixels merge across their weakest borders first; the pieces around the seed make a chain
 from a patch of ground to the whole picture. Further points take parts of that tree away or add
 them. What the network takes for the field makes a few regions more (`cuts`).
+
+Cuts alone, with the ranking learned anew, lose .007 on fields left out with near infrared and .003
+on simulated ones, gain .004 in grey, and take two thirds of the time.
 """
 
 from __future__ import annotations
