@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import rasterio
 
 from geofield.cli.main import COMMANDS
 from geofield.simulate import SimulatedField
@@ -199,3 +200,31 @@ def test_no_room_for_what_is_printed() -> None:
         )
     assert done.returncode == 1
     assert done.stderr.startswith("Error: The disk is full")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell that closes streams")
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed(sample: Path, tmp_path: Path, closed: str) -> None:
+    """As cron jobs and services have them: no file gets what would have been printed."""
+    picture, out = sample / "field_1.tif", tmp_path / "cut.tif"
+    point = "--lat 35.075373 --lon 33.531142 --size-m 60"
+    for line in ("formats", f"tiles {picture} {point} -o {out}"):
+        done = subprocess.run(
+            f"{GEOFIELD} {line} {closed}",
+            shell=True,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+    with rasterio.open(out) as cut:
+        assert cut.read().std() > 1
+        assert cut.checksum(1)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_reader_that_goes_away(sample: Path) -> None:
+    line = f"{GEOFIELD} info {sample / 'field_1.gpkg'} | true"
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, check=False)
+    assert done.stderr == ""

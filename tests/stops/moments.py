@@ -26,7 +26,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
-STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGKILL)
+STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL)
 STOPPED = "Stopped; nothing half-written is left."
 GOES_ON = "The same command does what is missing."
 #: After so long, a command that was stopped goes on for ever, seconds.

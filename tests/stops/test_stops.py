@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import os
 import random
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +17,7 @@ import pytest
 from geofield.imagery import write_scene
 from geofield.simulate import SimulationSettings, simulate_field
 
-from .moments import STOPS, Work, make_works, stop
+from .moments import GEOFIELD, STOPS, Work, make_works, stop
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs signals")
 
@@ -41,3 +44,22 @@ def test_a_stop_leaves_old_products_or_new_ones(
         for work, aimed in moments
     ]
     assert not [each for each in stops if each.faults]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminals that are closed")
+def test_work_that_outlives_its_terminal_goes_on(works: list[Work], tmp_path: Path) -> None:
+    """As `nohup geofield run ... &`."""
+    picture = next(works[0].before.parent.glob("picture.tif"))
+    made = simulate_field(5, SimulationSettings(width_px=160, height_px=160, obstacles=3))
+    point = ["--lat", str(made.lat), "--lon", str(made.lon)]
+    command = [str(GEOFIELD), "run", str(picture), *point, "--out", str(tmp_path / "out")]
+    with subprocess.Popen(
+        ["sh", "-c", "trap '' HUP; exec \"$@\"", "sh", *command],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        while process.poll() is None:
+            time.sleep(0.3)
+            process.send_signal(signal.SIGHUP)
+    assert process.returncode == 0
+    assert (tmp_path / "out" / "field.gpkg").is_file()

@@ -125,6 +125,16 @@ def _end_if_known(error: Exception) -> None:
         sys.exit(1)
 
 
+def _open_streams() -> None:
+    """Streams that the caller closed lead nowhere.
+
+    Otherwise a file that is opened next takes their number, and what is printed goes into it.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line; exit code 0 done, 1 failed with a message, 2 wrong usage.
 
@@ -136,6 +146,7 @@ def main(args: list[str] | None = None) -> None:
     """
     # What libraries make while they load stays to the end: going through it is 7 % of a start.
     gc.set_threshold(10_000)
+    _open_streams()
     # OpenBLAS's threads spin for 25 ms behind every product of matrices that small; it is told
     # before NumPy loads it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -162,10 +173,6 @@ def main(args: list[str] | None = None) -> None:
                 _end_stopped()
             say_error(error.message, error.hint)
             sys.exit(error.exit_code)
-        except BrokenPipeError:
-            # The reader of our output (head, less) has gone: not our failure.
-            sys.stderr.close()
-            sys.exit(0)
         except Exception as error:
             _end_if_known(error)
             raise

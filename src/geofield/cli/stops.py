@@ -1,4 +1,6 @@
-"""Stops: Ctrl+C and SIGTERM end the work, and what is half written is taken away first.
+"""Stops: signals end the work, and what is half written is taken away first.
+
+They are Ctrl+C, SIGTERM and, unless `nohup` has it ignored, SIGHUP of a terminal that is closed.
 
 A stop is a `KeyboardInterrupt` in the main thread. It can come where a library passes over it: in
 a destructor, while C code is loaded, behind a bare ``except``. It is raised again until it is on
@@ -16,12 +18,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from geofield.stop_signals import STOP_SIGNALS
+
 #: Programs say a stop in two ways at once, as they may not know which one is heard.
 _SAME_STOP_S = 1.0
 _AGAIN_S = 0.1
 #: So many errors are looked through for a stop that lies behind them.
 _DEEPEST = 100
-_KINDS = (signal.SIGINT, signal.SIGTERM)
 #: Asks what became of a stop: Ctrl+C may have another handler meanwhile.
 _ASKS = signal.SIGTERM
 #: When this command was asked to stop, seconds; without those that were heard.
@@ -42,7 +45,7 @@ class _Stop(KeyboardInterrupt):
 
 @contextmanager
 def stoppable(*, whole_process: bool) -> Iterator[None]:
-    """Let SIGTERM end the work of the block as Ctrl+C does.
+    """Let other signals end the work of the block as Ctrl+C does.
 
     Parameters
     ----------
@@ -56,7 +59,7 @@ def stoppable(*, whole_process: bool) -> Iterator[None]:
         return
     _STOPS.clear()
     hooks = sys.unraisablehook, sys.excepthook
-    usual = {kind: signal.signal(kind, _stop) for kind in _KINDS}
+    usual = {kind: signal.signal(kind, _stop) for kind in STOP_SIGNALS if not _ignored(kind)}
     try:
         yield
     finally:
@@ -70,6 +73,11 @@ def stoppable(*, whole_process: bool) -> Iterator[None]:
                 signal.signal(kind, handler or signal.SIG_DFL)
 
 
+def _ignored(kind: signal.Signals) -> bool:
+    """Whether the work is to outlive its terminal; a shell's background jobs ignore Ctrl+C, too."""
+    return kind.name == "SIGHUP" and signal.getsignal(kind) == signal.SIG_IGN
+
+
 def stop_heard() -> None:
     """Whoever caught a stop goes on to the end of the work: the next one is a new one."""
     _STOPS.clear()
@@ -77,7 +85,7 @@ def stop_heard() -> None:
 
 def stop_no_more() -> None:
     """All is written and said, only Python itself is taken down: there is nothing to stop."""
-    for kind in _KINDS:
+    for kind in STOP_SIGNALS:
         signal.signal(kind, signal.SIG_IGN)
 
 

@@ -20,6 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from geofield.errors import FormatError
+from geofield.stop_signals import STOP_SIGNALS
 
 PREFIX = ".geofield-"
 #: The file of a staging folder whose products are being moved into place.
@@ -60,7 +61,7 @@ def unstopped() -> Iterator[None]:
         yield  # Python handles signals in the main thread alone
         return
     came: list[int] = []
-    usual = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    usual = {kind: signal.getsignal(kind) for kind in STOP_SIGNALS}
     for kind in usual:
         signal.signal(kind, lambda number, _: came.append(number))
     try:
