@@ -269,10 +269,12 @@ def test_each_field_of_a_set_of_shapefiles_has_its_own_tracks(tmp_path):
 
 
 def test_the_places_of_a_farm_are_known(tmp_path):
-    write_datasets(FARM[:2], tmp_path, ["gpkg"])
     points = gpd.GeoDataFrame(geometry=[shapely.Point(0, 0)], crs=4326)
-    for layer, told in (("places", 0), ("mine", 1)):
-        pyogrio.write_dataframe(points, tmp_path / "field.gpkg", layer=layer)
-        done = geofield("export", tmp_path / "field.gpkg", "-f", "kml", "--out", tmp_path / layer)
+    # In a plan of one field, places are a person's own.
+    for number, layer, told in ((2, "places", 0), (2, "mine", 1), (1, "places", 1)):
+        folder = tmp_path / f"{layer}{number}"
+        write_datasets(FARM[:number], folder, ["gpkg"])
+        pyogrio.write_dataframe(points, folder / "field.gpkg", layer=layer)
+        done = geofield("export", folder / "field.gpkg", "-f", "kml", "--out", folder / "out")
         assert done.returncode == 0, done.stderr
         assert done.stderr.count("is not geofield's") == told

@@ -35,7 +35,15 @@ from geofield.errors import (
     TermsError,
 )
 from geofield.grid import Grid
-from geofield.imagery import FetchOptions, Where, acquire, find_source, open_reader, read_scene
+from geofield.imagery import (
+    FetchOptions,
+    Where,
+    acquire,
+    find_source,
+    open_reader,
+    picture_at,
+    read_scene,
+)
 from geofield.imagery.cache import cache_infos
 from geofield.imagery.client import Client
 from geofield.imagery.sources import BUILTIN, PictureSource
@@ -184,6 +192,11 @@ def test_google_needs_acknowledgement_and_is_never_cached(tmp_path: Path) -> Non
         assert server.paths == []
         options = replace(options, acknowledged=True)
         done = acquire(source, where, tmp_path / "a.tif", options=options)
+        # Where no size is asked for, what the service gives at most; and no more of it.
+        with picture_at(source, lat=LAT, lon=LON, options=options) as picture:
+            assert read_scene(picture.path).grid.shape == (640, 640)
+            assert picture.wider(5000.0) is None
+            assert not picture.offers_more
         with pytest.raises(ImageryError, match="1 to 640 px"):
             acquire(source, replace(where, size_px=641), tmp_path / "b.tif", options=options)
         with pytest.raises(ImageryError, match="needs a cache"):

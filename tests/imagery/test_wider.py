@@ -12,7 +12,7 @@ import rasterio.shutil
 from click.testing import CliRunner, Result
 
 from geofield.cli.main import cli
-from geofield.errors import FieldWarning, ImageryWarning
+from geofield.errors import FieldWarning, ImageryWarning, TermsError
 from geofield.farm import read_farm
 from geofield.plan import Plan, read_plan
 
@@ -21,7 +21,7 @@ from .tile_server import Handler, serving
 SAMPLE = Path(__file__).parents[2] / "sample_data"
 TRUTH = read_plan(SAMPLE / "field_1.gpkg")
 POINT = ["--lat", "35.0754216", "--lon", "33.5310261"]
-#: The field is 330 m long.
+#: A square of this side shows a part of the field.
 FIRST_M = 120
 
 
@@ -60,8 +60,9 @@ def test_a_file_of_tiles_is_read_as_far_as_the_field_goes(tiles: Path, tmp_path:
     plan = read_plan(tmp_path / "out" / "field.gpkg")
     assert overlap(plan) > 0.97
     assert side_m(plan) > 2 * FIRST_M
+    assert plan.grid is not None
     with rasterio.open(tmp_path / "out" / "scene.tif") as scene:
-        assert scene.shape == plan.grid.shape if plan.grid else False
+        assert scene.shape == plan.grid.shape
     assert plan.settings is not None
     assert plan.settings.imagery.size_m == FIRST_M
     assert plan.obstacles is not None
@@ -72,18 +73,21 @@ def test_points_of_a_farm_are_looked_at_as_far_as_their_fields_go(
     tiles: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "places.csv").write_text(f"id,lat,lon\none,{POINT[1]},{POINT[3]}\n")
-    told(
-        "batch",
-        tmp_path / "places.csv",
-        tiles,
-        "--size-m",
-        FIRST_M,
-        "--workers",
-        1,
-        "--out",
-        tmp_path / "farm",
-    )
+    asked = ("--size-m", FIRST_M, "--workers", 1)
+    told("batch", tmp_path / "places.csv", tiles, *asked, "--out", tmp_path / "farm")
     assert overlap(read_farm(tmp_path / "farm")["one"]) > 0.97
+
+
+def test_no_more_is_fetched_unasked_than_is_read_at_once(
+    tiles: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("geofield.imagery.at_place.MAX_SIDE_PX", 300)
+    command = ("field", tiles, *POINT, "--size-m", 100, "-o", tmp_path / "f.gpkg")
+    with pytest.warns(FieldWarning, match="goes on outside"):
+        done = told(*command)
+    assert side_m(read_plan(tmp_path / "f.gpkg")) < 120
+    assert "may be had with --size-m 2" in done.stderr
+    assert "--size-m" not in told(*command[:-4], "--size-m", 400, "-o", tmp_path / "g.gpkg").stderr
 
 
 def of_file(path: Path) -> dict[tuple[int, int, int], bytes]:
@@ -125,9 +129,25 @@ def test_a_server_is_asked_for_more(
                 pytest.warns(ImageryWarning, match="could not be had"),
                 pytest.warns(FieldWarning, match="goes on outside"),
             ):
-                told(*command)
+                assert "--size-m" not in told(*command).stderr
     plan = read_plan(tmp_path / "f.gpkg")
     if all_there:
         assert overlap(plan) > 0.97
     else:
         assert plan.frame_lines
+
+
+def test_terms_are_acknowledged_by_the_field_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "geofield.toml").write_text(
+        f'[fetch.sources.drone]\nkind = "picture"\nurl = "{SAMPLE / "field_1.tif"}"\n'
+        'attribution = "Me"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    command = ["field", "drone", *POINT, "-o", str(tmp_path / "f.gpkg")]
+    refused = CliRunner().invoke(cli, command)
+    assert isinstance(refused.exception, TermsError)
+    assert "--acknowledge-terms" in str(refused.exception.hint)
+    told(*command, "--acknowledge-terms")
+    assert overlap(read_plan(tmp_path / "f.gpkg")) > 0.97

@@ -46,7 +46,6 @@ def test_a_stop_leaves_old_products_or_new_ones(
     assert not [each for each in stops if each.faults]
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminals that are closed")
 def test_work_that_outlives_its_terminal_goes_on(works: list[Work], tmp_path: Path) -> None:
     """As `nohup geofield run ... &`."""
     picture = next(works[0].before.parent.glob("picture.tif"))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def two_interrupts() -> Iterator[Control]:
-    """A control that the first Ctrl+C sets; the second, and SIGTERM, end the block."""
+    """A control that the first Ctrl+C sets; the second, and any other stop, end the block."""
     from geofield.farm.engine import Control
 
     control = Control()

@@ -164,7 +164,8 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     """
     owners = column_like(frame, ("field_id",))
     if owners is not None and owners.notna().all() and owners.nunique() > 1:
-        parts = [(one, line_tables(frame[owners == one], crs)) for one in owners.unique()]
+        rows = frame.groupby(owners.to_numpy(), sort=False)
+        parts = [(one, line_tables(own, crs)) for one, own in rows]
         tracks, segments = (
             pd.concat([part[at].assign(field_id=one) for one, part in parts], ignore_index=True)
             for at in (0, 1)

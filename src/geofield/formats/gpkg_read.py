@@ -47,18 +47,17 @@ def read(path: Path) -> Dataset:
     crs = record.crs
     known = {layer.name: layer for layer in schema.LAYERS}
     for name in layers:
-        if name == schema.PLACES.name:
-            continue  # a farm's overview: no part of a plan
-        if name not in known:
+        if name in known and name != schema.TRACK_POINTS.name:
+            tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
+    field = tables.get(schema.FIELD.name)
+    several = field is not None and len(field) > 1
+    for name in layers:
+        if name not in known and not (several and name == schema.PLACES.name):
             warnings.warn(
                 f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",
                 FormatWarning,
                 stacklevel=2,
             )
-            continue
-        if name != schema.TRACK_POINTS.name:
-            tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
-    field = tables.get(schema.FIELD.name)
     named = field is not None and len(field) == 1 and isinstance(field["name"].iloc[0], str)
     has_points = schema.TRACK_POINTS.name in layers
     return Dataset(

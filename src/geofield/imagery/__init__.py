@@ -12,9 +12,10 @@ from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
-    from geofield.imagery.at_place import PlacePicture, is_own_picture, picture_at
+    from geofield.imagery.at_place import picture_at
     from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
+    from geofield.imagery.place_picture import PlacePicture, is_own_picture
     from geofield.imagery.reader import SceneReader
     from geofield.imagery.scene import read_scene
     from geofield.imagery.sources import find_source
@@ -39,9 +40,10 @@ __getattr__ = late_names(
     __name__,
     {
         "acquisition": "Acquired Where acquire",
-        "at_place": "PlacePicture is_own_picture picture_at",
+        "at_place": "picture_at",
         "opening": "FetchOptions",
         "pictures": "open_reader",
+        "place_picture": "PlacePicture is_own_picture",
         "reader": "SceneReader",
         "scene": "read_scene",
         "sources": "find_source",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import math
 import sqlite3
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 from PIL import Image, UnidentifiedImageError
 
@@ -20,6 +22,8 @@ from geofield.imagery.tiling import Tile, TilePyramid
 class MBTilesSource:
     """Tiles of a file here; a picklable value, the file is opened for each tile."""
 
+    #: Side of the largest picture that it gives, pixels.
+    most_px: ClassVar[float] = math.inf
     name: str
     path: str
     terms: Terms
