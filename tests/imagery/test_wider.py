@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -151,3 +153,14 @@ def test_terms_are_acknowledged_by_the_field_command(
     assert "--acknowledge-terms" in str(refused.exception.hint)
     told(*command, "--acknowledge-terms")
     assert overlap(read_plan(tmp_path / "f.gpkg")) > 0.97
+
+
+def test_a_picture_of_ones_own_loads_nothing_of_what_fetches(tmp_path: Path) -> None:
+    words = ["run", str(SAMPLE / "field_1.tif"), *POINT, "--out", str(tmp_path / "out")]
+    code = (
+        "import sys; from click.testing import CliRunner; from geofield.cli.main import cli; "
+        f"done = CliRunner().invoke(cli, {words!r}); print(done.exit_code, "
+        "[f'geofield.imagery.{name}' in sys.modules for name in ('scene', 'acquisition')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "0 [True, False]\n"

@@ -135,12 +135,14 @@ def as_picture(
     progress: Progress | None = None,
 ) -> Iterator[PlacePicture]:
     """The user's own picture, or one fetched for the moment."""
-    from geofield.imagery import PlacePicture, is_own_picture, picture_at
-    from geofield.imagery.terms import check_terms
+    from geofield.imagery import PlacePicture, is_own_picture
 
     if is_own_picture(what):
         yield PlacePicture(what)
         return
+    from geofield.imagery import picture_at
+    from geofield.imagery.terms import check_terms
+
     options = fetch_options(settings, cache_dir_of(settings))
     source = resolve(what, settings, point=(lon, lat), options=options)
     check_terms(source.name, source.terms, acknowledged=acknowledged)

@@ -48,11 +48,13 @@ class Imagery:
     @contextmanager
     def at(self, lat: float, lon: float, settings: Settings) -> Iterator[PlacePicture]:
         """The picture of a place."""
-        from geofield.imagery import PlacePicture, picture_at
+        from geofield.imagery import PlacePicture
 
         if self.source is None or self.options is None:
             yield PlacePicture(self.path)
             return
+        from geofield.imagery import picture_at
+
         imagery = settings.imagery
         with picture_at(
             self.source, lat=lat, lon=lon, size_m=imagery.size_m, bands=imagery.bands,
