@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import shapely
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError, ObstacleError, TrackWarning
+from geofield.errors import FieldError, ObstacleError
 from geofield.model.evidence import outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
@@ -104,7 +103,6 @@ def of_the_same_field(previous: Plan | None, lat: float, lon: float) -> Plan | N
             _refuse_to_forget(previous, lat, lon)
         return None
     refuse_lost_obstacles(previous)
-    tell_lost_tracks(previous)
     return previous
 
 
@@ -138,17 +136,6 @@ def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
             f"The earlier plan there is of another field ({previous.field.name}; lat {lat}, lon "
             f"{lon} lies outside it) and holds {' and '.join(work)}.",
             hint="Choose another folder, or --fresh to forget that work.",
-        )
-
-
-def tell_lost_tracks(plan: Plan) -> None:
-    """That tracks which a person edited are not kept: they are always planned anew."""
-    if plan.tracks is not None and plan.tracks.edited:
-        warnings.warn(
-            "The tracks there were edited: tracks are always planned anew. `geofield undo` brings "
-            "the edited ones back.",
-            TrackWarning,
-            stacklevel=3,
         )
 
 

@@ -28,7 +28,6 @@ from geofield.earlier import (
     points_said,
     refuse_lost_obstacles,
     renamed,
-    tell_lost_tracks,
     with_points,
 )
 from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarning, TrackError
@@ -37,6 +36,7 @@ from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
+from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.written import Written
 from geofield.plan import Plan
@@ -191,6 +191,9 @@ def run_field(
     if name:
         field = replace(field, name=name)
     obstacles = written = None
+    edits = TrackEdits()
+    if previous is not None:
+        edits = previous.track_edits.reprojected(previous.field.crs, field.crs)
     if previous is not None and previous.obstacles is not None:
         obstacles, written = reconcile(previous.obstacles, previous.evidence.written, scene.grid)
         obstacles = obstacles.to_crs(field.crs)
@@ -201,7 +204,9 @@ def run_field(
         settings=settings,
         source=scene.source,
         grid=scene.grid,
-        evidence=Evidence((lat, lon), outline_digest(field.polygon), written=written),
+        evidence=Evidence(
+            (lat, lon), outline_digest(field.polygon), written=written, track_edits=edits
+        ),
         scene=scene,
         changes=() if previous is None else (outline_changed(previous, field, kept=kept),),
     )
@@ -269,7 +274,6 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     from geofield.obstacles import detect_obstacles
 
     refuse_lost_obstacles(plan)
-    tell_lost_tracks(plan)
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
     detected.attrs.clear()
@@ -287,7 +291,9 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
         settings=_with_section(plan.settings, settings, "obstacles"),
         source=scene.source,
         grid=scene.grid,
-        evidence=replace(plan.evidence, detection=found, written=written),
+        evidence=replace(
+            plan.evidence, detection=found, written=written, track_edits=plan.track_edits
+        ),
         scene=scene,
         changes=changes,
     )
@@ -297,12 +303,14 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan)
-    tell_lost_tracks(plan)
-    obstacles, evidence = None, plan.evidence
+    obstacles, evidence = None, replace(plan.evidence, track_edits=plan.track_edits)
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
         evidence = replace(evidence, written=written)
-    tracks = tracks_of_plan(replace(plan, field=field, obstacles=obstacles), settings)
+    read = replace(plan, field=field, obstacles=obstacles, tracks=None, evidence=evidence)
+    tracks = tracks_of_plan(read, settings)
+    evidence = replace(evidence, track_edits=tracks.edits)
+    told = tracks.edits.in_words()
     if field is not plan.field:
         evidence = replace(evidence, outline=outline_digest(field.polygon))
     return replace(
@@ -312,6 +320,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         tracks=tracks,
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence=evidence,
+        changes=(*plan.changes, told) if told else plan.changes,
     )
 
 
@@ -321,10 +330,11 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
 
     field = plan.field
     _refuse_too_wide(field, settings.tracks.spacing_m)
+    edits = plan.track_edits
     tracks = plan_with_settings(
-        field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid
+        field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid, edits=edits
     )
-    if not len(tracks.rows()[schema.TRACKS.name]) and not tracks.blocked_count:
+    if not (len(tracks.rows()[schema.TRACKS.name]) or tracks.blocked_count or tracks.edits):
         raise TrackError(
             f"The field of {field.area_ha:.4f} ha is smaller than one track.",
             hint="Choose a smaller spacing or headland, or check the outline.",

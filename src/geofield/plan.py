@@ -20,6 +20,7 @@ from geofield.model.field import Field
 from geofield.model.frame import along_frame, with_outside
 from geofield.model.rows import Rows
 from geofield.model.scene import ImagerySource, Scene
+from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 
 if TYPE_CHECKING:
@@ -138,6 +139,12 @@ class Plan:
     def outline_edited(self) -> bool:
         """Whether a person moved the outline since a stage wrote it."""
         return self.evidence.moved(self.field.polygon)
+
+    @property
+    def track_edits(self) -> TrackEdits:
+        """What a person changed of the tracks: taken away, shortened, drawn."""
+        known = self.evidence.track_edits
+        return known if self.tracks is None else self.tracks.edits_since(known)
 
     @property
     def doubts(self) -> tuple[str, ...]:

@@ -14,7 +14,6 @@ import pandas as pd
 import pyogrio
 import pytest
 from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
-from shapely.affinity import translate
 
 from geofield.simulate import SimulatedField
 
@@ -194,27 +193,6 @@ def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
     told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
     assert "As the plan was made: --buffer 2.5\n" in told
     assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}
-
-
-def test_edited_tracks_are_told_before_they_are_planned_anew(
-    folder: Path, made: SimulatedField
-) -> None:
-    file = folder / "out/field.gpkg"
-    again = folder / "again.gpkg"
-    steps: list[list[object]] = [
-        ["tracks", file, "--spacing", 6, "-o", file],
-        ["obstacles", folder / "picture.tif", file, "-o", again, "--overwrite"],
-    ]
-    for step in steps:
-        assert "The tracks there were edited" not in geofield(*step)
-    rewritten(file, "segments", lambda table: table.iloc[1:])
-    for step in steps[::-1]:
-        assert "The tracks there were edited" in geofield(*step)
-    rewritten(file, "segments", lambda table: table.iloc[::-1].assign(note="mine"))
-    assert "The tracks there were edited" not in run(folder, made, "--overwrite")
-    moved = [translate(line, 0.5, 0) for line in gpd.read_file(file, layer="segments").geometry]
-    rewritten(file, "segments", lambda table: table.set_geometry(moved, crs=table.crs))
-    assert "The tracks there were edited" in run(folder, made, "--overwrite")
 
 
 def test_a_layer_of_tracks_that_is_gone_is_planned_again(folder: Path) -> None:

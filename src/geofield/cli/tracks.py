@@ -54,6 +54,7 @@ Examples (the first two on the project's own sample):
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @name_option
 @defaults_option
+@click.option("--fresh", is_flag=True, help="Forget which tracks you took away, changed or drew.")
 @click.option("--overwrite", is_flag=True, help="Replace files that are there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 @stage_options("tracks", imagery=False)
@@ -65,6 +66,7 @@ def tracks(
     crs: str | None,
     name: str | None,
     defaults: bool,
+    fresh: bool,
     overwrite: bool,
     as_json: bool,
     settings: Settings,
@@ -108,7 +110,7 @@ def tracks(
             field_id = place.field_id if places.ids_given else ""
             begun = replace(place, name=name or place.name, field_id=field_id)
         target = output if output.suffix else output / f"{stem}.gpkg"
-        rows = [_one(begun, job, target, file, overwrite=overwrite)]
+        rows = [_one(begun, job, target, file, overwrite=overwrite, fresh=fresh)]
     if as_json:
         echo_json({"fields": rows, "failed": list(failed)})
     for row in () if as_json else rows:
@@ -143,12 +145,13 @@ def _own_plan(file: Path) -> Plan | None:
 
 
 def _one(
-    plan: Plan | Place, job: Job, target: Path, file: Path, *, overwrite: bool
+    plan: Plan | Place, job: Job, target: Path, file: Path, *, overwrite: bool, fresh: bool
 ) -> dict[str, Any]:
     """Plan one field and write it; its figures."""
     from geofield.cli.many_tracks import figures_of
     from geofield.farm.standing import obstacles_of, with_obstacles
     from geofield.farm.work import plan_place
+    from geofield.model.track_edits import TrackEdits
     from geofield.pipeline import run_tracks
     from geofield.plan import Plan
     from geofield.plan_files import save_plan
@@ -158,6 +161,11 @@ def _one(
     else:
         if job.obstacles is not None:
             plan = with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
+        if fresh:
+            evidence = replace(plan.evidence, track_edits=TrackEdits())
+            plan = replace(plan, tracks=None, evidence=evidence)
         done, read_from = run_tracks(plan, settings=job.settings), file
+    for change in done.changes:
+        say(f"Changes: {change}")
     save_plan(done, target, read_from=read_from, overwrite=overwrite)
     return figures_of(done, target)

@@ -21,6 +21,7 @@ from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
 from geofield.model.frame import along_frame, with_outside
 from geofield.model.review import reconcile
+from geofield.model.tracks import Tracks
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -51,7 +52,28 @@ def made_whole(dataset: Dataset) -> Dataset:
     if dataset.has(schema.FIELD.name):
         field = _measured(_named(tables[schema.FIELD.name], dataset), dataset)
         tables[schema.FIELD.name] = _judged(field, dataset)
-    return replace(dataset, tables=tables)
+    return _driven(replace(dataset, tables=tables))
+
+
+def _driven(dataset: Dataset) -> Dataset:
+    """A dataset of which all layers of the tracks, and their points, tell the same."""
+    evidence = dataset.provenance.evidence
+    known = Evidence.from_json(evidence).track_edits
+    if not Tracks.lie_in(dataset.tables, evidence):
+        return dataset
+    tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
+    if tracks.edits_since(known) == known:
+        return dataset
+    from geofield.tracks.blocks import obstacle_shapes
+    from geofield.tracks.by_hand import as_edited
+
+    shapes = obstacle_shapes(dataset.tables.get(schema.OBSTACLES.name), dataset.crs)
+    parts = shapely.get_parts(dataset.table(schema.FIELD.name).geometry.to_numpy())
+    outline = parts[0] if len(parts) == 1 else None
+    whole = as_edited(replace(tracks, shapes=shapes, outline=outline), known)
+    tables = {**dataset.tables, **whole.tables()}
+    has_points = dataset.has(schema.TRACK_POINTS.name)
+    return replace(dataset, tables=tables, points=whole.point_chunks if has_points else None)
 
 
 def _understood(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:

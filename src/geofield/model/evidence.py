@@ -13,6 +13,7 @@ from typing import Any
 import shapely
 
 from geofield.model.field import Field, FieldQuality
+from geofield.model.track_edits import TrackEdits
 from geofield.model.written import Written
 
 #: How the doubt begins that nobody saw a part of the field.
@@ -31,6 +32,8 @@ class Evidence:
     detection: Mapping[str, Any] = field(default_factory=dict)
     #: The obstacles as the last stage left them; None where nobody recorded them.
     written: Written | None = None
+    #: What a person changed of the tracks, as far as a stage has read it.
+    track_edits: TrackEdits = field(default_factory=TrackEdits)
 
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
@@ -59,6 +62,8 @@ class Evidence:
             result["obstacles"] = dict(self.detection)
         if self.written is not None:
             result["written"] = self.written.to_json()
+        if self.track_edits:
+            result["track_edits"] = self.track_edits.to_json()
         if tracks is not None:
             result["tracks"] = dict(tracks)
         return result
@@ -72,6 +77,7 @@ class Evidence:
             value.get("field", {}).get("outline_sha256"),
             dict(value.get("obstacles", {})),
             None if written is None else Written.from_json(written),
+            TrackEdits.from_json(value.get("track_edits", {})),
         )
 
 

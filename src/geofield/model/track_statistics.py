@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 #: Of headland tracks and their strips: corners stay corners (an implement is turned there), but a
 #: spike's corner is cut off.
 MITRE_LIMIT = 2.0
+#: Rows are parallel where their ends are no farther off, share of the spacing.
+_STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +101,10 @@ def worked(
         Units of that CRS per metre on the ground.
     """
     strips = _strips(segments, headland_tracks, width, scale)
-    if headland_tracks is None and _apart(segments, width):
+    row = None if headland_tracks is not None else _rows_apart(segments, width)
+    if row is not None:
         # Strips of every other track do not even touch: their union is the list of them.
-        even = segments["track_no"].to_numpy(dtype=np.int64) % 2 == 0
+        even = row % 2 == 0
         rows = [shapely.multipolygons(strips[even]), shapely.multipolygons(strips[~even])]
         alone = float(shapely.area(shapely.intersection(rows, outline)).sum())
         return alone, alone
@@ -113,21 +116,31 @@ def worked(
     return once, float(shapely.area(shapely.intersection(strips, outline)).sum())
 
 
-def _apart(segments: gpd.GeoDataFrame, width: float) -> bool:
-    """Whether neighbouring tracks lie a width apart, and the segments of each behind each other."""
+def _rows_apart(segments: gpd.GeoDataFrame, width: float) -> NDArray[np.int64] | None:
+    """In which of parallel rows, a width apart, each segment lies behind the others of its row.
+
+    None where they do not lie so: a person may have drawn some.
+    """
     if not len(segments) or not _is_straight(segments.geometry.to_numpy()).all():
-        return False
+        return None
     ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
-    number = segments["track_no"].to_numpy(dtype=np.int64)
     along = ends[0, 1] - ends[0, 0]
     along /= np.hypot(*along)
     start, end = ((ends - ends[0, 0]) @ along).T
-    across = (ends[:, 0] - ends[0, 0]) @ np.array([-along[1], along[0]])
-    order = np.lexsort((start, number))
+    across = (ends - ends[0, 0]) @ np.array([-along[1], along[0]])
+    if np.abs(across[:, 1] - across[:, 0]).max() > _STRAIGHT * width:
+        return None
+    number = segments["track_no"].to_numpy(dtype=np.int64)
+    # Ends of one row differ in their last digits.
+    order = np.lexsort((start, number, np.rint(across[:, 0] / (_STRAIGHT * width))))
     same = number[order][1:] == number[order][:-1]
-    step = np.abs(np.diff(across[order]))
+    step = np.diff(across[order, 0])
     behind = start[order][1:] - end[order][:-1] > 0.0
-    return bool(np.where(same, behind, step >= width * (1.0 - 1e-9)).all())
+    if not np.where(same, behind, step >= width * (1.0 - 1e-9)).all():
+        return None
+    row = np.empty(len(order), np.int64)
+    row[order] = np.append(0, np.cumsum(~same))
+    return row
 
 
 def _strips(
@@ -153,9 +166,11 @@ def _strips(
 
 def _beside(lines: Any, width: float) -> Any:
     """The strips along lines that bend."""
-    return shapely.buffer(
+    around = shapely.buffer(
         lines, width / 2.0, cap_style="flat", join_style="mitre", mitre_limit=MITRE_LIMIT
     )
+    # That of a line which doubles back on itself may cross itself.
+    return np.where(shapely.is_valid(around), around, shapely.make_valid(around))
 
 
 def _ring_width_m(headland_tracks: gpd.GeoDataFrame) -> float:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
+from geofield.model.track_edits import TrackEdits, TracksWritten, edits_in
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
 
 if TYPE_CHECKING:
@@ -78,8 +78,10 @@ class Tracks:
         What was avoided.
     headland, headland_tracks, route, turns : GeoDataFrame or None
         The optional layers of the same names, where they were planned.
-    written : str
-        Fingerprint of the segments as they were planned; empty where they are those.
+    edits : TrackEdits
+        What a person changed of the layout, as it was planned with.
+    written : TracksWritten or None
+        The segments as they were planned; None where they are those.
     """
 
     lines: gpd.GeoDataFrame
@@ -99,7 +101,8 @@ class Tracks:
     headland_tracks: gpd.GeoDataFrame | None = None
     route: gpd.GeoDataFrame | None = None
     turns: gpd.GeoDataFrame | None = None
-    written: str = ""
+    edits: TrackEdits = field(default_factory=TrackEdits)
+    written: TracksWritten | None = None
 
     def __repr__(self) -> str:
         return words(f"Tracks: {len(self.lines)}", self._facts())
@@ -135,14 +138,29 @@ class Tracks:
         """The same without making tables of rows that nobody asked for yet."""
         return rows_of(self)
 
-    @property
-    def edited(self) -> bool:
-        """Whether a person moved, drew or deleted segments since they were planned."""
-        return bool(self.written) and self.written != self._digest()
+    def edits_since(self, known: TrackEdits) -> TrackEdits:
+        """What a person changed of the tracks until now, `known` before these were written."""
+        if self.written is None:
+            return known
+        return edits_in(self.lines, self.segments, self.written, known)
 
-    def _digest(self) -> str:
-        shapes = np.sort(shapely.to_wkb(self.rows()[schema.SEGMENTS.name].geometry, byte_order=1))
-        return hashlib.sha256(b"".join(shapes)).hexdigest()
+    def _written(self) -> TracksWritten:
+        if self.written is not None:
+            return self.written
+        segments = self.rows()[schema.SEGMENTS.name]
+        middle = (0.0, 0.0)
+        if self.outline is not None:
+            middle = (self.outline.centroid.x, self.outline.centroid.y)
+        elif len(segments):
+            middle = tuple(shapely.get_coordinates(segments.geometry[0])[0].tolist())
+        numbers = segments.column("track_no")
+        return TracksWritten.of(
+            numbers,
+            segments.geometry,
+            heading_deg=self.heading_deg,
+            spacing_m=self.spacing_m,
+            middle=middle,
+        )
 
     def evidence(self) -> dict[str, Any]:
         """What the tables do not say, as plain JSON values."""
@@ -154,7 +172,7 @@ class Tracks:
             "direction_why": self.direction_why,
             "blocked_count": self.blocked_count,
             "losses": [[each.obstacle_no, each.length_m, each.percent] for each in self.losses],
-            "segments_sha256": self.written or self._digest(),
+            "written": self._written().to_json(),
         }
 
     @staticmethod
@@ -179,6 +197,7 @@ class Tracks:
 
         `grid` gives the points their pixels, `outline` (metric CRS) the field for the figures.
         """
+        written = evidence.get("written")
         return cls(
             lines=tables[schema.TRACKS.name],
             segments=tables[schema.SEGMENTS.name],
@@ -192,10 +211,11 @@ class Tracks:
             outline=outline,
             blocked_count=int(evidence.get("blocked_count", 0)),
             losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),
-            written=str(evidence.get("segments_sha256", "")),
-            **{
-                name: tables.get(name) for name in ("headland", "headland_tracks", "route", "turns")
-            },
+            written=None if written is None else TracksWritten.from_json(written),
+            headland=tables.get(schema.HEADLAND.name),
+            headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
+            route=tables.get(schema.ROUTE.name),
+            turns=tables.get(schema.TURNS.name),
         )
 
     @cached_property

@@ -58,8 +58,8 @@ class Desk:
         self.brought_back = journal.replay(session)
         if self.brought_back is None and session.outdated:
             self.brought_back = (
-                "Field or obstacles were edited after the tracks had been planned; the tracks here "
-                "are planned anew. Save them."
+                "Field, obstacles or tracks were edited after the tracks had been planned; the "
+                "tracks here are planned anew, with what you changed of them. Save them."
             )
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.

@@ -138,9 +138,9 @@ class Session:
 
 
 def _is_planned(plan: Plan) -> bool:
-    """Whether field and obstacles are those that the last stage recorded, as far as it did."""
+    """Whether field, obstacles and tracks are those that the last stage recorded."""
     obstacles, written = plan.obstacles, plan.evidence.written
-    if plan.outline_edited:
+    if plan.outline_edited or plan.track_edits != plan.evidence.track_edits:
         return False
     if obstacles is None:
         return True
@@ -156,7 +156,7 @@ def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", GeofieldWarning)
         settings = plan.settings or Settings()
-        after = run_tracks(replace(plan, tracks=None), settings=settings)
+        after = run_tracks(plan, settings=settings)
     notes = dict.fromkeys(
         str(each.message) for each in caught if issubclass(each.category, GeofieldWarning)
     )

@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from geofield.crs import LONLAT, transformer
 from geofield.errors import TrackError
 from geofield.grid import Grid
+from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
 from geofield.tracks.outline import metric
@@ -35,12 +36,13 @@ def plan_with_settings(
     *,
     crs: Any,
     grid: Grid | None = None,
+    edits: TrackEdits | None = None,
 ) -> Tracks:
     """Plan tracks and, when `settings.route` names a pattern, the route through them.
 
     Parameters
     ----------
-    polygon, obstacles, crs, grid
+    polygon, obstacles, crs, grid, edits
         As for `plan_tracks`.
     settings : TrackSettings
         Places in it are longitude and latitude.
@@ -64,6 +66,7 @@ def plan_with_settings(
         if through is None
         else _place(through, metric_crs, polygon, "place to pass through"),
         grid=grid,
+        edits=edits,
         **{name: getattr(settings, name) for name in _OF_TRACKS},
     )
     if settings.route == "none":

@@ -47,7 +47,8 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     """Length of track lost to each obstacle, metres.
 
     A stretch inside several obstacles is shared evenly among them, so that the losses add up to
-    what all obstacles together cost.
+    what all obstacles together cost. Owners beyond their count are no obstacles: what is barred
+    by one of these is lost to none.
     """
     lost: NDArray[np.float64] = np.zeros(obstacle_count)
     if not obstacle_count or not len(crossings.u):
@@ -56,12 +57,13 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     u, owner = crossings.u[once], crossings.owner[once]
     enters = crossings.enters[once].astype(np.int64)
     is_field = owner == FIELD
+    mine = ~is_field & (owner < obstacle_count)
     field_depth = np.cumsum(np.where(is_field, enters, 0))
-    depth = np.cumsum(np.where(is_field, 0, enters))
+    depth = np.cumsum(np.where(mine, enters, 0))
+    barred = np.cumsum(np.where(is_field | mine, 0, enters)) > 0
     width = np.diff(u, append=u[-1:])
-    counted = (field_depth > 0) & (depth > 0)
+    counted = (field_depth > 0) & (depth > 0) & ~barred
     share = np.where(counted, width / np.maximum(depth, 1), 0.0)
     before = np.concatenate(([0.0], np.cumsum(share)[:-1]))
-    mine = ~is_field
     lost += np.bincount(owner[mine], -enters[mine] * before[mine], obstacle_count)
     return np.maximum(lost, 0.0)

@@ -16,9 +16,11 @@ from geofield.errors import CRSMismatchError, TrackError, TrackWarning
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.obstacles import ObstacleShapes
+from geofield.model.track_edits import TrackEdits
 from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
 from geofield.tracks.blocks import obstacle_shapes
+from geofield.tracks.by_hand import on_layout, with_drawn
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
 from geofield.tracks.fewest import fewest_tracks
@@ -34,6 +36,7 @@ from geofield.tracks.losses import obstacle_losses
 from geofield.tracks.outline import clean_outline, metric
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
 from geofield.tracks.tables import (
+    BY_HAND,
     gap_table,
     line_table,
     number_segments,
@@ -62,6 +65,7 @@ def plan_tracks(
     step_m: float = 1.0,
     straight_tolerance_m: float = 1.0,
     grid: Grid | None = None,
+    edits: TrackEdits | None = None,
 ) -> Tracks:
     """Plan parallel tracks through a field, around what stands in it.
 
@@ -111,6 +115,9 @@ def plan_tracks(
     grid : Grid, optional
         Of the picture: gives the track points their pixels; where the outline runs along the
         picture's frame, that is no edge to follow.
+    edits : TrackEdits, optional
+        Tracks that a person took away, shortened or drew (`Plan.track_edits`): they stay so where
+        the layout has the same lines, and what was drawn is cut at obstacles and border.
 
     Returns
     -------
@@ -163,8 +170,21 @@ def plan_tracks(
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left, scale=scale)
     edges = polygon_edges(inner, frame, FIELD)
     positions, spacing_m, more = _positions(edges, frame, baseline, strips, inset_m=headland_m)
-    pieces, crossings = clip_shapes(positions, edges, shapes, frame, min_segment_m)
-    told = () if len(pieces.track) else (_nothing_left(min_segment_m),)
+    said = on_layout(
+        edits or TrackEdits(),
+        positions,
+        frame,
+        heading_deg=baseline.heading_deg,
+        spacing_m=spacing_m,
+        owner=len(shapes.circles) + len(shapes.polygons),
+    )
+    barred = join_edges(edges, said.barred)
+    pieces, crossings = clip_shapes(positions, barred, shapes, frame, min_segment_m)
+    told: tuple[str, ...] = (
+        () if len(pieces.track) or said.drawn else (_nothing_left(min_segment_m),)
+    )
+    if said.edits.apart:
+        told += (_other_layout(len(said.edits.apart)),)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
         told = (*unworked_note(headland_m, wanted_m), *told)
@@ -182,12 +202,13 @@ def plan_tracks(
         )
     for note in told:
         warnings.warn(note, TrackWarning, stacklevel=2)
-    return _tracks(
+    tracks = _tracks(
         pieces,
         crossings,
         positions,
         frame,
         shapes,
+        barred_count=said.barred_whole,
         crs=metric_crs,
         heading_deg=baseline.heading_deg,
         spacing_m=spacing_m,
@@ -196,8 +217,10 @@ def plan_tracks(
         outline=outline,
         notes=(*notes, *more, *told),
         direction_why=_why(baseline, fewest_tracks(inner, strips, scale), len(positions)),
+        edits=said.edits,
         **optional,
     )
+    return with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
 
 
 def clip_shapes(
@@ -236,6 +259,12 @@ def _nothing_left(min_segment_m: float) -> str:
     """That no track has a piece."""
     but = f", or leaves no piece of {min_segment_m:g} m" if min_segment_m else ""
     return f"Nothing is left to drive: what stands there covers the field{but}."
+
+
+def _other_layout(count: int) -> str:
+    """That what a person changed is of another layout."""
+    tracks = "1 track that you edited is" if count == 1 else f"{count} tracks that you edited are"
+    return f"{tracks} of another layout (spacing, direction, outline): kept for it, not used here."
 
 
 def _why(baseline: Baseline, least: int, count: int) -> str:
@@ -328,6 +357,7 @@ def _tracks(
     heading_deg: float,
     step_m: float,
     outline: Polygon,
+    barred_count: int,
     **rest: Any,
 ) -> Tracks:
     obstacle_no = np.concatenate((shapes.circle_no, shapes.polygon_no))
@@ -339,11 +369,18 @@ def _tracks(
     whole = float(length_m.sum() + lost.sum())
     numbers, row = np.unique(obstacle_no, return_inverse=True)
     per_number = np.bincount(row, weights=lost, minlength=len(numbers))
-    blocked = len(positions) - len(np.unique(pieces.track))
+    blocked = len(positions) - barred_count - len(np.unique(pieces.track))
     return Tracks(
         lines=line_table(ends, track_no, length_m, heading_deg=heading_deg, step_m=step_m, crs=crs),
         segments=segments,
-        gaps=gap_table(pieces, crossings, positions, frame, obstacle_no=obstacle_no, crs=crs),
+        gaps=gap_table(
+            pieces,
+            crossings,
+            positions,
+            frame,
+            obstacle_no=np.append(obstacle_no, BY_HAND),
+            crs=crs,
+        ),
         heading_deg=heading_deg,
         step_m=step_m,
         outline=outline,

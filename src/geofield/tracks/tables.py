@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -14,6 +16,9 @@ from geofield.tracks.clip import Crossings, Pieces
 from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.losses import gap_causes, gaps_between
 from geofield.tracks.shapes import FIELD, IntArray
+
+BY_HAND = 0
+"""Among obstacle numbers: what a person took out of a track."""
 
 
 def segment_ends(pieces: Pieces, positions: FloatArray, frame: TrackFrame) -> FloatArray:
@@ -109,19 +114,20 @@ def _in_words(
             border[at] = True
         else:
             numbers[at].append(no)
-    words: list[str] = []
-    lowest: list[int | None] = []
-    for at_border, mine in zip(border, numbers, strict=True):
-        if not mine:
-            words.append("border")
-            lowest.append(None)
-            continue
-        # Parts of one obstacle share its number.
-        each = sorted(set(mine))
-        text = f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}"
-        words.append(f"border, {text}" if at_border else text)
-        lowest.append(each[0])
-    return words, lowest
+    told = [cause_in_words(mine, border=at) for mine, at in zip(numbers, border, strict=True)]
+    return [words for words, _ in told], [lowest for _, lowest in told]
+
+
+def cause_in_words(numbers: Collection[int], *, border: bool) -> tuple[str, int | None]:
+    """The causes of a gap, and the lowest number among them; the border's where there is none."""
+    # Parts of one obstacle share its number.
+    each = sorted(set(numbers) - {BY_HAND})
+    words = ["border"] if border else []
+    if each:
+        words.append(f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}")
+    if BY_HAND in numbers:
+        words.append("by hand")
+    return ", ".join(words) or "border", each[0] if each else None
 
 
 def _count_within(track: IntArray) -> IntArray:

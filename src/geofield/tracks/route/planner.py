@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 from shapely import Polygon
+from shapely.ops import substring
 
 from geofield import schema
 from geofield.errors import TrackError, TrackWarning
@@ -87,7 +88,8 @@ def plan_route(
     outline, shapes = _on_the_ground(outline, shapes, scale)
     if turning_radius_m is not None:
         _check_radius(turning_radius_m, outline.bounds, margin_m)
-    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2) / scale
+    lines = np.asarray(tracks.segments.geometry.to_numpy(), dtype=object)
+    ends, legs = _ends(lines) / scale, _legs(lines)
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
     place = None if start is None else _place(start) / scale
     passage = Passage(outline, shapes, margin_m=margin_m)
@@ -96,7 +98,7 @@ def plan_route(
         rows, backward = shortest_order(
             ends, rows, backward, passage, radius_m=turning_radius_m, start=place
         )
-    exits, entries = _poses(ends[rows], backward)
+    exits, entries = _poses(ends[rows], legs[rows], backward)
     if turning_radius_m is None:
         turns = straight_ways(exits, entries, passage)
     else:
@@ -106,7 +108,7 @@ def plan_route(
             passage,
             radius_m=turning_radius_m,
             curve=curve,
-            spare_m=_spare(ends[rows], track_no[rows], backward),
+            spare_m=_spare(shapely.length(lines[rows]) / scale, track_no[rows], backward),
         )
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
@@ -171,19 +173,34 @@ def _place(start: Any) -> FloatArray:
     return place
 
 
-def _poses(ends: FloatArray, backward: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+def _ends(lines: NDArray[np.object_]) -> FloatArray:
+    """First and last place of each line, (lines, 2, 2)."""
+    return np.stack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (0, -1)], 1)
+
+
+def _legs(lines: NDArray[np.object_]) -> FloatArray:
+    """Directions in which each line begins and ends, radians; a person may have bent one."""
+    beside = np.stack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (1, -2)], 1)
+    ends = _ends(lines)
+    first, last = beside[:, 0] - ends[:, 0], ends[:, 1] - beside[:, 1]
+    return np.column_stack([np.arctan2(each[:, 1], each[:, 0]) for each in (first, last)])
+
+
+def _poses(
+    ends: FloatArray, legs: FloatArray, backward: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray]:
     """Poses at which one segment is left and the next is entered."""
-    first = np.where(backward[:, None], ends[:, 1], ends[:, 0])
-    last = np.where(backward[:, None], ends[:, 0], ends[:, 1])
-    angle = np.arctan2(*(last - first).T[::-1])
-    exits = np.column_stack((last, angle))[:-1]
-    entries = np.column_stack((first, angle))[1:]
+    # Driven backward, a line begins at its end, and the other way round.
+    ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
+    legs = np.where(backward[:, None], legs[:, ::-1] + np.pi, legs)
+    exits = np.column_stack((ends[:, 1], legs[:, 1]))[:-1]
+    entries = np.column_stack((ends[:, 0], legs[:, 0]))[1:]
     return exits, entries
 
 
-def _spare(ends: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]) -> FloatArray:
+def _spare(length_m: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]) -> FloatArray:
     """What may be left out of the segments before and after each turn along one track."""
-    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T) * _SPARE_SHARE
+    length = length_m * _SPARE_SHARE
     same = (track_no[1:] == track_no[:-1]) & (backward[1:] == backward[:-1])
     return np.asarray(np.column_stack((length[:-1], length[1:])) * same[:, None])
 
@@ -200,17 +217,15 @@ def _tables(
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
     """Layers `route` and `turns`; work gets the odd sequence numbers, ways the even ones."""
     scale = tracks.ground_scale
-    ends = shapely.get_coordinates(tracks.segments.geometry.to_numpy()).reshape(-1, 2, 2)[rows]
-    ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
+    driven = np.asarray(tracks.segments.geometry.to_numpy(), dtype=object)[rows]
+    driven[backward] = shapely.reverse(driven[backward])
     early = np.array([turn.early_m for turn in turns] + [0.0] * (len(rows) > len(turns)))
     late = np.array([0.0] * (len(rows) > len(turns)) + [turn.late_m for turn in turns])
-    whole = np.hypot(*(ends[:, 1] - ends[:, 0]).T) / scale
-    along = (ends[:, 1] - ends[:, 0]) / whole[:, None]
-    ends = ends + np.stack((along * late[:, None], -along * early[:, None]), axis=1)
+    whole = shapely.length(driven) / scale
     work_m = whole - early - late
     count = len(rows) + len(turns)
     geometry = np.empty(count, dtype=object)
-    geometry[0::2] = shapely.linestrings(ends) if len(ends) else []
+    geometry[0::2] = _shortened(driven, late * scale, (whole - early) * scale)
     lines = [shapely.LineString(_two(turn.places) * scale) for turn in turns]
     geometry[1::2] = lines
     length = np.empty(count)
@@ -265,6 +280,22 @@ def _tables(
         route = route[there].reset_index(drop=True)
         table = table[there[1::2]].reset_index(drop=True)
     return route, table
+
+
+def _shortened(
+    lines: NDArray[np.object_], begin: FloatArray, end: FloatArray
+) -> NDArray[np.object_]:
+    """The parts of lines from one length along them to another."""
+    straight = shapely.get_num_coordinates(lines) == 2
+    ends = _ends(lines)
+    along = (ends[:, 1] - ends[:, 0]) / shapely.length(lines)[:, None]
+    ends[:, 1] = ends[:, 0] + along * end[:, None]
+    ends[:, 0] += along * begin[:, None]
+    parts = np.empty(len(lines), dtype=object)
+    parts[straight] = shapely.linestrings(ends[straight]) if straight.any() else []
+    for at in np.flatnonzero(~straight):
+        parts[at] = substring(lines[at], begin[at], end[at])
+    return parts
 
 
 def _between(values: IntArray, count: int) -> list[int | None]:

@@ -1,0 +1,314 @@
+"""Tracks that a person took away, shortened or drew, in a layout of parallel ones.
+
+What is not driven of the layout's own lines stands in their way, like an obstacle of no width; what
+was drawn is cut where an obstacle or the border is, and takes its place among the tracks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from shapely import Polygon
+
+from geofield import schema
+from geofield.crs import grid_north_deg
+from geofield.model.obstacles import ObstacleShapes
+from geofield.model.track_edits import TrackEdit, TrackEdits, among, as_text, parts_of
+from geofield.model.tracks import Tracks, points_per_segment
+from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
+from geofield.tracks.shapes import Edges
+from geofield.tracks.tables import BY_HAND, cause_in_words
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: A line is the one that was edited while it is so near and the spacing so much the same, both as
+#: shares of the spacing, and its heading, degrees.
+_NEAR, _ALIKE, _TURNED_DEG = 0.25, 0.02, 2.0
+#: Half the width of what stands in a line's way, and how much longer than the piece it is, metres.
+_THIN_M, _LONGER_M = 0.01, 0.01
+#: Quarter circles of an obstacle have so many sides, laid around it: under a millimetre at 8 m.
+_SIDES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class OnLayout:
+    """The edits as a layout has their lines.
+
+    Attributes
+    ----------
+    edits : TrackEdits
+        Those in use with the numbers of this layout, the others apart.
+    barred : Edges
+        What stands in the way of lines or pieces of them; the owner is that given.
+    drawn : list of TrackEdit
+        Tracks to draw.
+    barred_whole : int
+        So many lines of the layout are not driven at all.
+    """
+
+    edits: TrackEdits
+    barred: Edges
+    drawn: list[TrackEdit]
+    barred_whole: int
+
+
+def on_layout(
+    edits: TrackEdits,
+    positions: FloatArray,
+    frame: TrackFrame,
+    *,
+    heading_deg: float,
+    spacing_m: float,
+    owner: int,
+) -> OnLayout:
+    """Find the layout's lines that were edited; numbers of added tracks come after them.
+
+    Parameters
+    ----------
+    edits : TrackEdits
+    positions : float array (tracks,)
+        Of the layout's lines across the frame, metres.
+    frame : TrackFrame
+    heading_deg, spacing_m : float
+    owner : int
+        Of the edges of what stands in the way.
+    """
+    kept: list[TrackEdit] = []
+    bars: list[tuple[float, float, float]] = []
+    apart, added, whole = [], [], 0
+    for one in (*edits.edits, *edits.apart):
+        if one.place is None:
+            added.append(one)
+            continue
+        at = _line_of(one, positions, frame, heading_deg, spacing_m)
+        if at is None or any(each.track_no == at + 1 for each in kept):
+            apart.append(one)
+            continue
+        kept.append(one._replace(track_no=at + 1))
+        if one.cut is None:
+            bars.append((float(positions[at]), -np.inf, np.inf))
+            whole += 1
+        else:
+            bars += [(float(positions[at]), *span) for span in _spans(one.cut, frame)]
+    taken = {one.track_no for one in kept}
+    free = len(positions) + 1
+    for one in added:
+        number = one.track_no if one.track_no >= free else free
+        while number in taken:
+            number += 1
+        taken.add(number)
+        kept.append(one._replace(track_no=number))
+    drawn = [one for one in kept if one.drawn is not None]
+    kept.sort(key=lambda one: one.track_no)
+    return OnLayout(TrackEdits(tuple(kept), tuple(apart)), _bars(bars, owner), drawn, whole)
+
+
+def _line_of(
+    one: TrackEdit,
+    positions: FloatArray,
+    frame: TrackFrame,
+    heading_deg: float,
+    spacing_m: float,
+) -> int | None:
+    """Which line of a layout was edited."""
+    assert one.place is not None  # noqa: S101 - added tracks have no line
+    turned = abs((one.place.heading_deg - heading_deg + 90.0) % 180.0 - 90.0)
+    across = float(frame.to_frame(one.place.x, one.place.y)[1])
+    away = np.abs(positions - across)
+    if abs(one.place.spacing_m - spacing_m) > _ALIKE * spacing_m or turned > _TURNED_DEG:
+        return None
+    if not len(away) or away.min() > _NEAR * spacing_m:
+        return None
+    return int(np.argmin(away))
+
+
+def _spans(cut: str, frame: TrackFrame) -> list[tuple[float, float]]:
+    """Where pieces begin and end along the frame."""
+    found = []
+    for piece in parts_of(cut):
+        along = frame.to_frame(*shapely.get_coordinates(piece).T)[0]
+        found.append((float(along.min()) - _LONGER_M, float(along.max()) + _LONGER_M))
+    return found
+
+
+def _bars(bars: Sequence[tuple[float, float, float]], owner: int) -> Edges:
+    """Rectangles along lines (place across, begin, end), as edges of the frame."""
+    across, begin, end = np.array(bars, dtype=np.float64).reshape(-1, 3).T
+    begin, end = np.clip(begin, -1e7, None), np.clip(end, None, 1e7)
+    u = np.column_stack((begin, end, end, begin))
+    v = across[:, None] + np.array([-_THIN_M, -_THIN_M, _THIN_M, _THIN_M])
+    number = u.size
+    return Edges(
+        u.ravel(),
+        v.ravel(),
+        np.roll(u, -1, axis=1).ravel(),
+        np.roll(v, -1, axis=1).ravel(),
+        np.ones(number, np.int8),
+        np.full(number, owner, np.int64),
+    )
+
+
+def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
+    """Tracks as a person left them, all tables alike, without planning.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        As read from a file, edited or not.
+    known : TrackEdits
+        Edits that its tracks were planned with.
+    """
+    before, now = known.by_number, tracks.edits_since(known).by_number
+    changed = {no for no in {*before, *now} if before.get(no) != now.get(no)}
+    if not changed or tracks.written is None:
+        return tracks
+    written = tracks.written.segments
+    told = []
+    for no in sorted(changed & set(now)):
+        one = now[no]
+        if one.cut is not None:
+            cut = [shapely.get_coordinates(part) for part in parts_of(one.cut)]
+            left = [line for line in written.get(no, ()) if not among(line, cut)]
+            one = one._replace(drawn=as_text(shapely.MultiLineString(left)), cut=None)
+        told += [one] if one.drawn is not None else []
+
+    def others(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        return table[~table["track_no"].isin(changed) & table["track_no"].notna()]
+
+    rest = replace(
+        tracks,
+        lines=others(tracks.lines),
+        segments=others(tracks.segments),
+        gaps=others(tracks.gaps),
+    )
+    return with_drawn(rest, told, clip=False)
+
+
+def with_drawn(
+    tracks: Tracks,
+    drawn: Iterable[TrackEdit],
+    min_segment_m: float = 0.0,
+    *,
+    clip: bool = True,
+) -> Tracks:
+    """Tracks with those that a person drew, cut at the border and at what they avoid.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Planned without them; they know their outline and what they avoid.
+    drawn : iterable of TrackEdit
+    min_segment_m : float
+        Shorter pieces are not driven.
+    clip : bool
+        Whether to cut them.
+    """
+    free = _free(tracks.outline, tracks.shapes) if clip else None
+    shapes = _shapes(tracks.shapes)
+    numbers = () if tracks.shapes is None else (*tracks.shapes.circle_no, *tracks.shapes.polygon_no)
+    least = max(min_segment_m, 1e-3) * tracks.ground_scale
+    rows, gaps = [], []
+    for one in drawn:
+        lines = parts_of(one.drawn)
+        pieces = [piece for line in lines for piece in _cut(line, free) if piece.length >= least]
+        rows += [(one.track_no, no, piece) for no, piece in enumerate(pieces, 1)]
+        for no, (before, after) in enumerate(pairwise(pieces), 1):
+            way = shapely.LineString([before.coords[-1], after.coords[0]])
+            inside = tracks.outline is None or tracks.outline.covers(way)
+            met = [int(numbers[at]) for at in np.flatnonzero(shapely.intersects(shapes, way))]
+            met += [] if met or not inside else [BY_HAND]
+            gaps.append((one.track_no, no, way, *cause_in_words(met, border=not inside)))
+    return _joined(tracks, rows, gaps)
+
+
+def _free(outline: Polygon | None, shapes: ObstacleShapes | None) -> Any:
+    """Where may be driven; None for everywhere."""
+    if outline is None:
+        return None
+    stands = shapely.union_all(_shapes(shapes))
+    free = outline.difference(stands)
+    shapely.prepare(free)
+    return free
+
+
+def _shapes(shapes: ObstacleShapes | None) -> Any:
+    """What stands there, circles as polygons around them."""
+    if shapes is None:
+        return np.empty(0, dtype=object)
+    x, y, radius = shapes.circles.T
+    around = radius / np.cos(np.pi / (4 * _SIDES))
+    return np.concatenate(
+        [shapely.buffer(shapely.points(x, y), around, quad_segs=_SIDES), shapes.polygons]
+    )
+
+
+def _cut(line: Any, free: Any) -> list[Any]:
+    """The pieces of a line in the free area, along it."""
+    if free is None or free.covers(line):
+        return [line]
+    pieces = [each for each in shapely.get_parts(line.intersection(free)) if each.length > 0.0]
+    joined = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(pieces), directed=True))
+    return sorted(joined, key=lambda each: line.project(shapely.Point(each.coords[0])))
+
+
+def _joined(tracks: Tracks, rows: Sequence[Any], gaps: Sequence[Any]) -> Tracks:
+    """The tables with further segments, gaps, and the tracks that these are of."""
+    import pandas as pd
+
+    crs, scale = tracks.crs, tracks.ground_scale
+
+    def table(layer: schema.Layer, columns: dict[str, Any], shapes: Sequence[Any]) -> Any:
+        return schema.table(layer, columns, np.array([*shapes, None], dtype=object)[:-1], crs)
+
+    def together(old: gpd.GeoDataFrame, new: gpd.GeoDataFrame, by: list[str]) -> Any:
+        parts = [one for one in (old, new) if len(one)]
+        joined = pd.concat(parts) if parts else old
+        return joined.sort_values(by, kind="stable").reset_index(drop=True)
+
+    numbers, parts, lines = zip(*rows, strict=True) if rows else ((), (), ())
+    length_m = shapely.length(np.array(lines, dtype=object)) / scale
+    columns = {"track_no": numbers, "segment_no": parts, "length_m": length_m}
+    segments = table(schema.SEGMENTS, columns, lines)
+    of, number, ways, causes, lowest = zip(*gaps, strict=True) if gaps else ((),) * 5
+    gap_columns = {
+        "track_no": of,
+        "gap_no": number,
+        "length_m": shapely.length(np.array(ways, dtype=object)) / scale,
+        "cause": causes,
+        "obstacle_no": lowest,
+    }
+    every, first = np.unique(np.array(numbers, dtype=np.int64), return_index=True)
+    count = np.diff(np.append(first, len(numbers)))
+    points = points_per_segment(np.asarray(length_m, np.float64), tracks.step_m)
+    line_columns = {
+        "track_no": every,
+        "heading_deg": [
+            _heading(lines[at], lines[at + n - 1], crs) for at, n in zip(first, count, strict=True)
+        ],
+        "segment_count": count,
+        "gap_count": count - 1,
+        "point_count": np.add.reduceat(points, first) if len(first) else points,
+        "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
+    }
+    whole = [
+        shapely.MultiLineString(lines[at : at + n]) for at, n in zip(first, count, strict=True)
+    ]
+    return replace(
+        tracks,
+        lines=together(tracks.lines, table(schema.TRACKS, line_columns, whole), ["track_no"]),
+        segments=together(tracks.segments, segments, ["track_no", "segment_no"]),
+        gaps=together(tracks.gaps, table(schema.GAPS, gap_columns, ways), ["track_no", "gap_no"]),
+    )
+
+
+def _heading(first: Any, last: Any, crs: CRS) -> float:
+    """The true heading from the begin of a track to its end."""
+    (x, y), (to_x, to_y) = first.coords[0][:2], last.coords[-1][:2]
+    return true_heading_deg((to_x - x, to_y - y), grid_north_deg(crs, x, y))

@@ -1,0 +1,338 @@
+"""Tracks that a person took away, shortened, moved or drew: in files, exports, later runs."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from changed_plans import Frame, geofield, plan_in, rewritten, rows, run
+from pyproj import CRS
+from shapely import LineString, MultiLineString
+from shapely.affinity import translate
+
+from geofield.model.track_edits import TrackEdits, TracksWritten
+from geofield.model.tracks import Tracks
+from geofield.plan import Plan, read_plan
+from geofield.review.session import Session
+from geofield.simulate import SimulatedField
+from geofield.tracks import plan_route, plan_tracks
+
+
+def tracks_in(folder: Path) -> Tracks:
+    tracks = plan_in(folder).tracks
+    assert tracks is not None
+    return tracks
+
+
+def without(number: int) -> Callable[[Frame], Frame]:
+    return lambda table: table[table["track_no"] != number]
+
+
+def exported(folder: Path, file: Path) -> dict[str, set[int]]:
+    """Of which tracks each layer of GeoJSON tells."""
+    geofield("export", file, "--format", "geojson", "--out", folder / "x", "--overwrite")
+    found = {}
+    for layer in ("tracks", "segments", "gaps", "track_points"):
+        text = (folder / f"x/geojson/{layer}.geojson").read_text()
+        found[layer] = {each["properties"]["track_no"] for each in json.loads(text)["features"]}
+    return found
+
+
+def guidance(folder: Path, file: Path) -> int:
+    """How many lines a terminal gets."""
+    geofield("export", file, "--format", "isoxml", "--out", folder / "x", "--overwrite")
+    text = next((folder / "x").rglob("TASKDATA.XML")).read_text()
+    return len(re.findall(r"<LSG\b[^>]*\bA=\"5\"", text))
+
+
+def whole(tracks: Tracks) -> None:
+    """All layers tell the same."""
+    lengths = tracks.segments.groupby("track_no")["length_m"].sum()
+    assert tracks.lines["track_no"].tolist() == lengths.index.tolist()
+    assert tracks.lines["length_m"].to_numpy() == pytest.approx(lengths.to_numpy())
+    counts = tracks.segments.groupby("track_no").size()
+    assert tracks.lines["segment_count"].tolist() == counts.tolist()
+    for number, line in zip(tracks.lines["track_no"], tracks.lines.geometry, strict=True):
+        own = tracks.segments[tracks.segments["track_no"] == number]
+        assert own["segment_no"].tolist() == list(range(1, len(own) + 1))
+        assert shapely.equals_exact(line, MultiLineString(list(own.geometry)), tolerance=1e-6)
+        assert (tracks.gaps["track_no"] == number).sum() == len(own) - 1
+    points = tracks.points.groupby("track_no").size()
+    assert tracks.lines["point_count"].tolist() == points.tolist()
+
+
+def is_free(plan: Plan) -> None:
+    """No segment leaves the field or enters what stands there."""
+    assert plan.tracks is not None
+    lines = plan.tracks.segments.geometry.to_numpy()
+    outside = shapely.length(shapely.difference(lines, plan.field.polygon))
+    assert outside.max() < 0.002
+    for buffer in rows(plan).geometry.buffer(-0.01):
+        assert not shapely.intersects(lines, buffer).any()
+
+
+@pytest.mark.parametrize("layer", ["tracks", "segments"])
+def test_a_track_taken_away_is_driven_by_nobody(
+    folder: Path, made: SimulatedField, layer: str
+) -> None:
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+    lines = guidance(folder, file)
+    rewritten(file, layer, without(5))
+    found = exported(folder, file)
+    assert all(5 not in numbers for numbers in found.values())
+    assert found["tracks"] == found["segments"] == found["track_points"]
+    assert guidance(folder, file) == lines - (before.segments["track_no"] == 5).sum()
+
+    again = folder / "again.gpkg"
+    for told in (
+        geofield("tracks", file, "-o", file),
+        run(folder, made, "--overwrite"),
+        geofield("obstacles", folder / "picture.tif", file, "-o", again)
+        + geofield("tracks", again, "-o", file, "--overwrite"),
+    ):
+        assert "tracks of yours kept: 5 taken away" in told
+        after = tracks_in(folder)
+        assert set(after.lines["track_no"]) == set(before.lines["track_no"]) - {5}
+        whole(after)
+        assert after.statistics.blocked_count == before.statistics.blocked_count
+        others = after.segments[after.segments["track_no"] != 5]
+        kept = before.segments[before.segments["track_no"] != 5]
+        assert shapely.equals_exact(
+            others.geometry.to_numpy(), kept.geometry.to_numpy(), tolerance=1e-6
+        ).all()
+    told = geofield("tracks", file, "-o", file, "--fresh")
+    assert "of yours" not in told
+    assert len(tracks_in(folder).lines) == len(before.lines)
+    assert not plan_in(folder).track_edits
+
+
+@pytest.mark.parametrize("layer", ["tracks", "segments"])
+def test_a_piece_taken_away_stays_away_when_an_obstacle_beside_it_goes(
+    folder: Path, layer: str
+) -> None:
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+    gap = before.gaps[before.gaps["obstacle_no"].notna()].iloc[0]
+    number = int(gap["track_no"])
+    own = before.segments[before.segments["track_no"] == number]
+    away = own[own["segment_no"] == gap["gap_no"]].geometry.iloc[0]
+
+    def shortened(table: Frame) -> Frame:
+        if layer == "segments":
+            return table[~((table["track_no"] == number) & (table.geometry.distance(away) < 0.01))]
+        parts = [
+            MultiLineString([one for one in line.geoms if one.distance(away) > 0.01])
+            for line in table.geometry
+        ]
+        return table.set_geometry(parts, crs=table.crs)
+
+    rewritten(file, layer, shortened)
+    rejected = int(gap["obstacle_no"])
+    rewritten(
+        file,
+        "obstacles",
+        lambda table: table.assign(
+            status=table["status"].mask(table["obstacle_no"] == rejected, "rejected")
+        ),
+    )
+    told = geofield("tracks", file, "-o", file)
+    assert f"tracks of yours kept: {number} shortened" in told
+    after = tracks_in(folder)
+    whole(after)
+    lines = after.segments[after.segments["track_no"] == number].geometry.to_numpy()
+    assert shapely.union_all(shapely.buffer(lines, 0.02)).intersection(away).length < 0.1
+    # Where the obstacle was, there is track again.
+    driven = shapely.union_all(shapely.buffer(lines, 0.02))
+    assert shapely.length(shapely.intersection(driven, gap.geometry)) > gap["length_m"] - 0.1
+    if gap["gap_no"] > 1:
+        assert "by hand" in after.gaps[after.gaps["track_no"] == number]["cause"].tolist()
+
+
+def test_what_is_drawn_through_an_obstacle_is_cut_there(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    plan = plan_in(folder)
+    before = tracks_in(folder)
+    tree = rows(plan).iloc[0]
+    through = LineString(
+        [tree.geometry.centroid.coords[0], plan.field.polygon.representative_point().coords[0]]
+    )
+    long = shapely.LineString([through.interpolate(-30), *through.coords])
+    drawn = gpd.GeoDataFrame({"track_no": [None]}, geometry=[MultiLineString([long])])
+    rewritten(file, "tracks", lambda t: pd.concat([t, drawn.set_crs(t.crs)]))
+    # As it is, it is exported as it was drawn; what is planned goes around.
+    number = len(before.lines) + before.blocked_count + 1
+    assert number in exported(folder, file)["segments"]
+    told = geofield("tracks", file, "-o", file)
+    assert f"tracks of yours kept: {number} drawn" in told
+    after = plan_in(folder)
+    is_free(after)
+    assert after.tracks is not None
+    whole(after.tracks)
+    mine = after.tracks.segments[after.tracks.segments["track_no"] == number]
+    assert mine["length_m"].sum() > 5.0
+    line = after.tracks.lines.set_index("track_no").loc[number]
+    assert line["heading_deg"] != pytest.approx(after.tracks.heading_deg, abs=0.01)
+    # The tree is rejected: the line as it was drawn, not as it was cut.
+    length = mine["length_m"].sum()
+    rewritten(file, "obstacles", lambda t: t.assign(status="rejected"))
+    geofield("tracks", file, "-o", file)
+    mine = tracks_in(folder).segments.query(f"track_no == {number}")
+    assert mine["length_m"].sum() > length + tree["radius_m"]
+    # Taken away again, it is gone for good.
+    rewritten(file, "tracks", without(number))
+    assert "of yours" not in geofield("tracks", file, "-o", file)
+    assert not plan_in(folder).track_edits
+
+
+def test_a_moved_track_stands_for_the_one_that_was_there(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+
+    def moved(table: Frame) -> Frame:
+        mine = table["track_no"] == 4
+        shapes = table.geometry.where(~mine, table.geometry.translate(0.8, 0.3))
+        return table.set_geometry(shapes)
+
+    rewritten(file, "segments", moved)
+    geofield("tracks", file, "-o", file)
+    after = plan_in(folder)
+    is_free(after)
+    assert after.tracks is not None
+    whole(after.tracks)
+    assert set(after.tracks.lines["track_no"]) == set(before.lines["track_no"])
+    old, new = (
+        shapely.union_all(one.segments[one.segments["track_no"] == 4].geometry.to_numpy())
+        for one in (before, after.tracks)
+    )
+    assert translate(old, 0.8, 0.3).buffer(0.01).covers(new)
+
+
+def test_edits_wait_for_their_layout(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", without(5))
+    told = geofield("tracks", file, "--spacing", 5, "-o", file)
+    assert "1 track that you edited is of another layout" in told
+    assert "of yours kept" not in told
+    assert 5 in set(tracks_in(folder).lines["track_no"])
+    assert "5 taken away" in geofield("tracks", file, "--spacing", 6, "-o", file)
+    assert 5 not in set(tracks_in(folder).lines["track_no"])
+
+
+def test_copied_rows_and_rows_without_number_are_tracks_of_their_own(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+
+    def copied(table: Frame) -> Frame:
+        copy = table[table["track_no"] == 3]
+        aside = copy.set_geometry(copy.geometry.translate(1.5, 0), crs=table.crs)
+        return pd.concat([aside, table])
+
+    rewritten(file, "tracks", copied)
+    line = translate(before.segments.geometry.iloc[20], 0.0, 1.2)
+    loose = gpd.GeoDataFrame({"track_no": [None]}, geometry=[line])
+    rewritten(file, "segments", lambda t: pd.concat([t, loose.set_crs(t.crs)]))
+    told = geofield("tracks", file, "-o", file)
+    first = len(before.lines) + before.blocked_count + 1
+    assert f"{first}, {first + 1} drawn" in told
+    after = tracks_in(folder)
+    whole(after)
+    assert set(after.lines["track_no"]) == {*before.lines["track_no"], first, first + 1}
+    third = after.segments[after.segments["track_no"] == 3].geometry.to_numpy()
+    old = before.segments[before.segments["track_no"] == 3].geometry.to_numpy()
+    assert shapely.equals_exact(third, old, tolerance=1e-6).all()
+
+
+def test_emptied_layers_are_no_word_on_any_track(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = len(tracks_in(folder).lines)
+    rewritten(file, "tracks", lambda table: table.iloc[:0])
+    assert "of yours" not in geofield("tracks", file, "-o", file)
+    assert len(tracks_in(folder).lines) == before
+
+
+def test_the_review_page_goes_on_with_what_was_changed_elsewhere(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", without(5))
+    session = Session(plan_in(folder))
+    assert session.outdated
+    number = int(rows(session.plan).index[0])
+    for _ in range(2):
+        tracks = session.plan.tracks
+        assert tracks is not None
+        assert 5 not in set(tracks.lines["track_no"])
+        whole(tracks)
+        session.do({"do": "status", "no": number, "status": "rejected"})
+
+
+def test_reading_and_writing_is_no_edit(folder: Path) -> None:
+    plan = plan_in(folder)
+    assert not plan.track_edits
+    plan.write(folder / "copy", formats=["gpkg", "rdf"])
+    assert not read_plan(folder / "copy/field.gpkg").track_edits
+    rewritten(folder / "out/field.gpkg", "segments", lambda t: t.iloc[::-1].assign(note="mine"))
+    assert not plan_in(folder).track_edits
+    rewritten(folder / "out/field.gpkg", "tracks", without(5))
+    edited = plan_in(folder)
+    # Written as it is, it is still known to be edited.
+    edited.write(folder / "kept", formats=["gpkg"])
+    assert read_plan(folder / "kept/field.gpkg").track_edits == edited.track_edits
+
+
+def test_a_route_drives_along_a_bent_track() -> None:
+    crs: Any = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
+    field = shapely.box(500000, 5600000, 500200, 5600100)
+    planned = plan_tracks(field, [], crs=crs, spacing_m=10.0, direction=90)
+    record = TracksWritten.from_json(planned.evidence()["written"])
+    bent = LineString([(500010, 5600020), (500100, 5600030), (500190, 5600020)])
+    segments = planned.segments.copy()
+    segments.loc[segments["track_no"] == 3, "geometry"] = bent
+    edits = replace(planned, segments=segments, written=record).edits_since(TrackEdits())
+    tracks = plan_tracks(field, [], crs=crs, spacing_m=10.0, direction=90, edits=edits)
+    whole(tracks)
+    for radius_m in (None, 4.0):
+        routed = plan_route(tracks, turning_radius_m=radius_m, margin_m=20)
+        assert routed.route is not None
+        lines = routed.route.geometry.to_numpy()
+        ends = shapely.get_coordinates(shapely.get_point(lines, -1))
+        starts = shapely.get_coordinates(shapely.get_point(lines, 0))
+        assert np.abs(ends[:-1] - starts[1:]).max() < 1e-5
+        work = routed.route[routed.route["kind"] == "work"]
+        mine = work[work["track_no"] == 3].geometry.iloc[0]
+        assert shapely.equals_exact(
+            shapely.normalize(mine), shapely.normalize(bent), tolerance=1e-6
+        )
+        if radius_m:
+            # The way out of the bent track goes on in the direction of its last leg.
+            at = int(np.flatnonzero(routed.route["track_no"].fillna(0) == 3)[0])
+            leg, turn = (shapely.get_coordinates(lines[k]) for k in (at, at + 1))
+            one, other = leg[-1] - leg[-2], turn[1] - turn[0]
+            angle = np.degrees(np.arctan2(*one) - np.arctan2(*other))
+            assert abs((angle + 180) % 360 - 180) < 6.0
+
+
+def test_edits_are_the_same_in_another_zone(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", without(5))
+    line = tracks_in(folder).lines.geometry.iloc[2]
+    drawn = gpd.GeoDataFrame({"track_no": [None]}, geometry=[translate(line, 1, 0)])
+    rewritten(file, "tracks", lambda t: pd.concat([t, drawn.set_crs(t.crs)]))
+    plan = plan_in(folder)
+    edits, here = plan.track_edits, plan.field.crs
+    assert TrackEdits.from_json(json.loads(json.dumps(edits.to_json()))) == edits
+    there = edits.reprojected(here, CRS("EPSG:3857"))
+    assert there != edits
+    back = there.reprojected(CRS("EPSG:3857"), here)
+    for one, other in zip(edits.edits, back.edits, strict=True):
+        assert one.track_no == other.track_no
+        if one.place is not None and other.place is not None:
+            assert one.place == pytest.approx(other.place, abs=0.01)
