@@ -2,6 +2,7 @@
 
 import itertools
 import pickle
+import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
@@ -134,9 +135,22 @@ def test_wrong_channels_are_refused(crowns, picture):
         crowns.stacked(red=0.0)
 
 
-def test_an_unknown_network_is_told():
-    with pytest.raises(GeofieldError, match="oaks"):
+def test_an_unknown_network_is_told(tmp_path):
+    with pytest.raises(GeofieldError, match=r"oaks.*this installation"):
         network("oaks")
+    with pytest.raises(GeofieldError, match=r"outline.*" + re.escape(str(tmp_path))):
+        network("outline", tmp_path)
+
+
+def test_a_network_of_another_folder_is_told_from_that_of_the_package(tmp_path):
+    package = files("geofield.learned")
+    for file in ("outline.json", "outline.onnx"):
+        (tmp_path / file).write_bytes((package / file).read_bytes())
+    other, own = network("outline", tmp_path), network("outline")
+    assert other is not own
+    assert (other.folder, own.folder) == (tmp_path, None)
+    assert pickle.loads(pickle.dumps(other)) is other
+    assert pickle.loads(pickle.dumps(own)) is own
 
 
 def test_the_model_files_stay_small_and_honest():
@@ -150,9 +164,7 @@ def test_the_model_files_stay_small_and_honest():
         assert known["left_out"][kind]["calibration_error"] <= 0.04
 
 
-@pytest.mark.parametrize(
-    ("name", "files_here"), [("outline", 4), ("outline_ranking", 5), ("crowns", 1)]
-)
+@pytest.mark.parametrize(("name", "files_here"), [("outline", 4), ("crowns", 1)])
 def test_a_model_was_learned_from_what_lies_here(name, files_here):
     """A table that grew, or another network before this one, asks for learning again."""
     known = facts(name)["learned_with"]["sha256"]

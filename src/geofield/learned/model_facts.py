@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any
 
 from geofield.errors import GeofieldError
 
 
-def facts(name: str) -> dict[str, Any]:
-    """Return what ``NAME.json`` of this package says.
+def facts(name: str, folder: Path | None = None) -> dict[str, Any]:
+    """Return what ``NAME.json`` of this package, or of another folder, says.
 
     Raises
     ------
@@ -18,8 +20,19 @@ def facts(name: str) -> dict[str, Any]:
         If there is none of that name, or its file is damaged.
     """
     try:
-        text = (files("geofield.learned") / f"{name}.json").read_text(encoding="utf-8")
+        text = model_file(f"{name}.json", folder).read_text(encoding="utf-8")
         found: dict[str, Any] = json.loads(text)
     except (OSError, ValueError) as error:
-        raise GeofieldError(f"The model {name!r} of this installation cannot be read.") from error
+        raise unreadable(name, folder) from error
     return found
+
+
+def model_file(file_name: str, folder: Path | None) -> Traversable:
+    """Return a model's file of this package, or of another folder."""
+    return (files("geofield.learned") if folder is None else folder) / file_name
+
+
+def unreadable(name: str, folder: Path | None) -> GeofieldError:
+    """Return the error of a model that is missing or damaged."""
+    place = "of this installation" if folder is None else f"in {folder}"
+    return GeofieldError(f"The model {name!r} {place} cannot be read.")

@@ -1,19 +1,18 @@
-"""Networks of this package, loaded once and run by OpenCV."""
+"""Networks of this package and of other folders, loaded once and run by OpenCV."""
 
 from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import GeofieldError
-from geofield.learned.model_facts import facts
+from geofield.learned.model_facts import facts, model_file, unreadable
 
 FloatImage = NDArray[np.float32]
 
@@ -23,7 +22,7 @@ class Network:
     """A network and what its channels mean.
 
     Any thread may call it: OpenCV's networks hold the pictures that run through them, so each
-    thread loads one of its own. It travels to other processes by its name.
+    thread loads one of its own. It travels to other processes by its name and folder.
 
     Attributes
     ----------
@@ -32,6 +31,8 @@ class Network:
         The channels' names, in the network's order.
     facts : dict
         The rest of ``NAME.json``.
+    folder : Path or None
+        Where it lies; None in this package.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Network:
     facts: dict[str, Any]
     _model: bytes = field(repr=False)
     _local: threading.local = field(default_factory=threading.local, repr=False)
+    folder: Path | None = None
 
     def __call__(self, batch: FloatImage) -> FloatImage:
         """Run the network.
@@ -86,23 +88,24 @@ class Network:
         """Run the network on one picture and return its output by name, each (rows, cols)."""
         return dict(zip(self.outputs, self(batch)[0], strict=True))
 
-    def __reduce__(self) -> tuple[Any, tuple[str]]:
-        return network, (self.name,)
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        # As it is usually asked for: then the other process has one of it, too.
+        return network, (self.name,) if self.folder is None else (self.name, self.folder)
 
 
 @cache
-def network(name: str) -> Network:
-    """Return a network of this package by its name.
+def network(name: str, folder: Path | None = None) -> Network:
+    """Return a network of this package, or of another folder, by its name.
 
     Raises
     ------
     GeofieldError
         If there is none of that name, or its file is damaged.
     """
-    known = facts(name)
+    known = facts(name, folder)
     try:
-        model = (files("geofield.learned") / f"{name}.onnx").read_bytes()
+        model = model_file(f"{name}.onnx", folder).read_bytes()
         inputs, outputs = tuple(known.pop("inputs")), tuple(known.pop("outputs"))
     except (OSError, KeyError) as error:
-        raise GeofieldError(f"The model {name!r} of this installation cannot be read.") from error
-    return Network(name, inputs, outputs, known, model)
+        raise unreadable(name, folder) from error
+    return Network(name, inputs, outputs, known, model, folder=folder)
