@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 LEARNED = Path(__file__).resolve().parent.parent / "src/geofield/learned"
+#: What was learned without one fold of sites each: figures are taken with these, nobody runs them.
+LEFT_OUT = Path(__file__).resolve().parent / "left_out"
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless")
 
 

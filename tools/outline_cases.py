@@ -2,8 +2,9 @@
 
 Fields drawn by eye, and simulated ones; each also as the pictures that users bring: colour or
 grey only, JPEG, haze, little contrast, a point elsewhere in the field. Pictures of one site, and of
-its other years, always go into the same fold, whatever else the tables hold: a figure of a
-left-out fold is one of sites that nothing was learned from.
+its other years, always go into the same fold, whatever else the tables hold. Of each fold there are
+a network and a ranking that were learned without its sites (`learned_without`): figures are taken
+with these, so that every field can be judged and every field can be learned from.
 """
 
 from __future__ import annotations
@@ -14,16 +15,20 @@ import os
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import shapely
+from learned_with import LEFT_OUT
 from rasterio.features import rasterize
 
+from geofield.field.learned import Learned
+from geofield.field.ranking import trained
 from geofield.imagery import read_scene
-from geofield.learned.network import network
+from geofield.learned import network
 from geofield.model import Scene
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -37,8 +42,8 @@ TABLES = (
     ("more", ROOT / "benchmarks" / "field_labels_more.csv", None),
     ("further", ROOT / "benchmarks" / "field_labels_further.csv", None),
 )
-#: Sites are left out of the ranking in so many folds.
-FOLDS = 4
+#: Sites are left out in so many folds, of the network and of the ranking alike.
+FOLDS = 3
 
 
 @dataclass
@@ -75,33 +80,73 @@ def site_of(image: str) -> str:
     return f"{place.rpartition('_')[0]} {number}"
 
 
-def fold_of(site: str, count: int) -> int:
+def fold_of(site: str) -> int:
     """The fold of a site: it stays when tables grow."""
-    return zlib.crc32(site.encode()) % count
+    return zlib.crc32(site.encode()) % FOLDS
+
+
+def learned_without(site: str) -> Learned:
+    """The network and the ranking of a site's fold, which were learned without it."""
+    return left_out(fold_of(site))
+
+
+@cache
+def left_out(fold: int) -> Learned:
+    """The network and the ranking that were learned without the sites of a fold.
+
+    Raises
+    ------
+    FileNotFoundError
+        When one was not learned yet.
+    ValueError
+        When the network was learned from sites of the fold, whatever it is called.
+    """
+    net, table = f"outline_{fold}", f"outline_ranking_{fold}"
+    for file, tool in (
+        (f"{net}.onnx", f"train_outlines.py --without {fold}"),
+        (f"{net}.json", f"train_outlines.py --without {fold}"),
+        (f"{table}.json", "train_ranking.py"),
+    ):
+        if not (LEFT_OUT / file).is_file():
+            raise FileNotFoundError(f"There is no {LEFT_OUT / file}: learn it with tools/{tool}.")
+    found = Learned(network(net, LEFT_OUT), trained(table, LEFT_OUT))
+    known = [site for site in found.network.facts["sites"] if fold_of(site) == fold]
+    if known:
+        raise ValueError(f"{net}.onnx was learned from sites of fold {fold}: {', '.join(known)}.")
+    return found
+
+
+def rows() -> Iterator[tuple[str, str | None, dict[str, str]]]:
+    """The rows of all tables, each with its table's mark and folder."""
+    for mark, table, folder in TABLES:
+        if table.is_file():
+            with table.open(newline="", encoding="utf-8") as file:
+                for row in csv.DictReader(file):
+                    yield mark, folder, row
+
+
+def sites() -> set[str]:
+    """The sites of all fields drawn by eye."""
+    return {site_of(row["image"]) for _, _, row in rows()}
 
 
 def labelled() -> Iterator[Case]:
     """The fields drawn by eye."""
-    for mark, table, folder in TABLES:
-        if not table.is_file():
-            continue
-        with table.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        for row in rows:
-            scene = read_scene(DATA / (folder or row["folder"]) / f"{row['image']}.tif")
-            x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
-            other_px = row.get("polygon_alt_px")
-            yield Case(
-                f"{mark} {row['image']} ({x:.0f}, {y:.0f})",
-                mark,
-                site_of(row["image"]),
-                scene,
-                x,
-                y,
-                polygon(row["polygon_px"]),
-                polygon(other_px) if other_px else None,
-                row.get("certainty", ""),
-            )
+    for mark, folder, row in rows():
+        scene = read_scene(DATA / (folder or row["folder"]) / f"{row['image']}.tif")
+        x, y = float(row["seed_x_px"]), float(row["seed_y_px"])
+        other_px = row.get("polygon_alt_px")
+        yield Case(
+            f"{mark} {row['image']} ({x:.0f}, {y:.0f})",
+            mark,
+            site_of(row["image"]),
+            scene,
+            x,
+            y,
+            polygon(row["polygon_px"]),
+            polygon(other_px) if other_px else None,
+            row.get("certainty", ""),
+        )
 
 
 def polygon(text: str) -> Any:
@@ -123,12 +168,6 @@ def simulated(count: int, seed: int = 61_000) -> Iterator[Case]:
         truth = one.field.polygon_px(one.scene.grid)
         site = f"simulated {index}"
         yield Case(site, "simulated", site, one.scene, float(x), float(y), truth)
-
-
-def unseen() -> Iterator[Case]:
-    """The fields drawn by eye of sites that the network was not trained on."""
-    seen = set(network("outline").facts["sites"])
-    yield from (case for case in labelled() if case.site not in seen)
 
 
 def reseeded(case: Case, number: int = 0) -> Case:

@@ -2,13 +2,19 @@
 
     python tools/train_ranking.py CACHE [CACHE ...] [--write] [--processes 1]
 
-Learned from fields drawn by eye on sites that the network has not seen, and from simulated ones:
-the curves over the figures of the outlines make beliefs as likely as their overlaps with the
-truth say. Every other search is asked on with points, each where its best outline errs most, as
-people correct it. Part K of the table is learned without the sites of fold K, and what certainty
-is worth from outlines taken by such parts. CACHE keeps the searches. These follow the table that
-is there, and a ranking sees other outlines where it has led the search itself: so learn and write,
-search into one more CACHE, learn from both and write.
+Learned from all fields drawn by eye, each searched with the network and the ranking that were
+learned without its site, and from simulated ones: the curves over the figures of the outlines make
+beliefs as likely as their overlaps with the truth say. Every other search is asked on with points,
+each where its best outline errs most, as people correct it.
+
+What is shipped (`learned/outline_ranking.json`) is learned from all. `left_out/outline_ranking_K`
+is learned from no outline of fold K, though behind the networks of the other folds, which have seen
+them. What certainty is worth is learned from the outlines that such tables take of their own folds,
+in table K from those of the other folds. These are also what the printed figures tell of.
+
+CACHE keeps the searches. These follow the tables that are there, and a ranking sees other outlines
+where it has led the search itself: so learn and write, search into one more CACHE, learn from both
+and write.
 
 Not the choice among the outlines is what is short, given these beliefs: the ground with the largest
 expected overlap, put together from all outlines instead of taken from one, is .750 where the choice
@@ -22,30 +28,19 @@ import argparse
 import json
 import math
 import pickle
-import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from multiprocessing import Pool
 from pathlib import Path
 
 import numpy as np
-import shapely
-from learned_with import LEARNED, learned_with
-from outline_cases import (
-    FOLDS,
-    TABLES,
-    Case,
-    fold_of,
-    middle_of_error,
-    other,
-    reseeded,
-    simulated,
-    unseen,
-)
+from learned_with import LEARNED, LEFT_OUT, learned_with
+from outline_cases import FOLDS, TABLES, left_out
+from outline_searches import Searched, all_searched
 from scipy.optimize import minimize
 
-from geofield.field.auto import evidence_of
+from geofield.field.auto import MOST_CERTAIN, evidence_of
+from geofield.field.quality import TRUSTED
 from geofield.field.ranking import (
     BEND,
     END,
@@ -57,9 +52,8 @@ from geofield.field.ranking import (
     expected_overlaps,
     trained,
 )
-from geofield.field.search import Candidate, search_field
+from geofield.field.search import Candidate
 
-TABLE = LEARNED / "outline_ranking.json"
 #: Pull towards zero, of curves and of what certainty is worth.
 RIDGE, CALM = 5e-2, 1.0
 #: What is learned is believed so much more, as outlines that are much alike are many, and would
@@ -70,15 +64,13 @@ SHARPNESS, WORST = 8.0, 0.5
 #: The same among outlines of one ground, and the pull towards zero there; from which overlap such
 #: a ground teaches anything, and from which it counts whole.
 EXACT_SHARPNESS, EXACT_RIDGE, EXACT_FROM, EXACT_WHOLE = 50.0, 1e-3, 0.5, 0.8
-#: Simulated pictures, and what one counts against a real one.
-SIMULATED, SIMULATED_COUNTS = 20, 4.0
-#: Points that correct what was found before; what the outlines with such count against those
-#: without.
-CORRECTIONS, CORRECTED_COUNTS = 3, 0.5
-#: Other pictures of the fields.
-OTHERS = ("colour", "grey", "JPEG 40", "colour", "grey", "haze", "contrast")
+#: What a simulated picture counts against a real one, and outlines that points correct against
+#: those without.
+SIMULATED_COUNTS, CORRECTED_COUNTS = 4.0, 0.5
 #: Overlap from which an outline is right, by what is asked.
 RIGHT = {"field": 0.85, "ground": 0.70, "border": 0.93}
+#: Overlaps of outlines to be warned of, and of good ones.
+BAD, GOOD = 0.8, 0.88
 #: What certainty is told from.
 EVIDENCE = (
     "expected_overlap",
@@ -91,54 +83,6 @@ EVIDENCE = (
     "long_sides_share",
     "corrections",
 )
-
-
-@dataclass
-class Searched:
-    """The outlines of one search, with their overlaps with the truth."""
-
-    name: str
-    mark: str
-    site: str
-    names: tuple[str, ...]
-    figures: np.ndarray
-    polygons: list[shapely.Polygon]
-    overlap: np.ndarray
-    corrections: int
-
-    @property
-    def fold(self) -> int:
-        return fold_of(self.site, FOLDS)
-
-
-def searched(case: Case) -> list[Searched]:
-    """The search of a case, of every other one again with points where its best outline errs."""
-    search = search_field(case.scene, case.x_px, case.y_px, part=fold_of(case.site, FOLDS))
-    truth = shapely.transform(case.truth, lambda c: c / search.factor)
-    found = []
-    include: tuple[tuple[float, float], ...] = ()
-    exclude: tuple[tuple[float, float], ...] = ()
-    for turn in range(1 + CORRECTIONS):
-        candidates = search.candidates(include, exclude)
-        if not candidates:
-            break
-        polygons = [one.polygon for one in candidates]
-        common = shapely.area(shapely.intersection(polygons, truth))
-        either = shapely.area(polygons) + truth.area - common
-        names = tuple(candidates[0].figures)
-        values = np.array([[one.figures[name] for name in names] for one in candidates])
-        name = f"{case.name} {turn}"
-        mark = case.mark if turn == 0 else f"{case.mark} clicked {turn}"
-        overlap = common / either
-        found.append(Searched(name, mark, case.site, names, values, polygons, overlap, turn))
-        wrong = middle_of_error(polygons[0], truth, search.surface.shape)
-        if wrong is None or zlib.crc32(case.name.encode()) % 2:
-            break
-        if wrong[0]:
-            include = (*include, wrong[1])
-        else:
-            exclude = (*exclude, wrong[1])
-    return found
 
 
 def weights(known: Sequence[Searched]) -> np.ndarray:
@@ -166,16 +110,16 @@ def lessons(known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray) -> 
         yield weight, bent(one, mean, spread), belief / belief.sum()
 
 
-def exact_lessons(known: Sequence[Searched], rankings: Sequence[Ranking]) -> Iterator[Lesson]:
-    """Where it ends: the outlines of the ground that a ranking takes, each judged by its part."""
+def exact_lessons(
+    known: Sequence[Searched], mean: np.ndarray, spread: np.ndarray
+) -> Iterator[Lesson]:
+    """Where it ends: of each search, the outlines of the ground that was taken."""
     for weight, one in zip(weights(known), known, strict=True):
-        ranking = rankings[one.fold]
-        order, _, expected, overlap = weighed(one, ranking)
-        order = order[overlap[int(np.argmax(expected))] >= SAME_GROUND]
-        regret = np.minimum(one.overlap[order].max() - one.overlap[order], WORST)
+        overlap = one.overlap[one.ground]
+        regret = np.minimum(overlap.max() - overlap, WORST)
         belief = np.exp(-EXACT_SHARPNESS * regret)
-        share = (one.overlap[order].max() - EXACT_FROM) / (EXACT_WHOLE - EXACT_FROM)
-        own = bent(one, ranking.mean, ranking.spread)[order]
+        share = (overlap.max() - EXACT_FROM) / (EXACT_WHOLE - EXACT_FROM)
+        own = bent(one, mean, spread)[one.ground]
         yield weight * min(max(share, 0.0), 1.0), own, belief / belief.sum()
 
 
@@ -255,53 +199,77 @@ def calibrated(some: Sequence[Chosen]) -> dict[str, dict[str, float]]:
     return found
 
 
+def coarse(known: Sequence[Searched]) -> Ranking:
+    """What is learned of which ground is meant; of where it ends nothing yet."""
+    every = np.concatenate([one.figures for one in known])
+    mean, spread = every.mean(axis=0).round(5), (every.std(axis=0) + 1e-5).round(5)
+    slope = rounded(SURER * learn(list(lessons(known, mean, spread)), RIDGE))
+    return Ranking(known[0].names, mean, spread, slope, np.zeros_like(slope), {})
+
+
+def with_edges(ranking: Ranking, known: Sequence[Searched]) -> Ranking:
+    """The ranking with what is learned of where the ground ends."""
+    some = list(exact_lessons(known, ranking.mean, ranking.spread))
+    return replace(ranking, edge=rounded(learn(some, EXACT_RIDGE)))
+
+
 def rounded(slopes: np.ndarray) -> np.ndarray:
     return slopes.round(4)
 
 
-def table_of(known: Sequence[Searched]) -> tuple[dict, list[Chosen]]:
-    """The table, and what its parts take on the sites that they have not seen."""
+def rankings_of(known: Sequence[Searched]) -> tuple[list[Ranking], Ranking, list[Chosen]]:
+    """Without each fold, and of all; and what those without take of their own folds."""
     names = trained().names
     at = [known[0].names.index(name) for name in names]
     for one in known:
         one.figures = one.figures[:, at]
         one.names = names
-    every = np.concatenate([one.figures for one in known])
-    mean, spread = every.mean(axis=0).round(5), (every.std(axis=0) + 1e-5).round(5)
-    left_out = [[one for one in known if one.fold != k] for k in range(FOLDS)]
-    slopes = [rounded(SURER * learn(list(lessons(some, mean, spread)), RIDGE)) for some in left_out]
-    none = np.zeros_like(slopes[0])
-    coarse = [Ranking(names, mean, spread, slope, none, {}) for slope in slopes]
-    edges = [rounded(learn(list(exact_lessons(some, coarse)), EXACT_RIDGE)) for some in left_out]
-    parts = [replace(one, edge=edge) for one, edge in zip(coarse, edges, strict=True)]
-    taken = [chosen(one, parts[one.fold]) for one in known]
-    real = [one for one in taken if not one.of.mark.startswith("simulated")]
-    calibration = {"all": calibrated(real)}
-    for k in range(FOLDS):
-        calibration[str(k)] = calibrated([one for one in real if one.of.fold != k])
+    folds = [[one for one in known if one.fold != k] for k in range(FOLDS)]
+    grounds = [coarse(some) for some in folds]
+    for one in known:
+        order, _, expected, overlap = weighed(one, grounds[one.fold])
+        one.ground = order[overlap[int(np.argmax(expected))] >= SAME_GROUND]
+    without = [with_edges(one, some) for one, some in zip(grounds, folds, strict=True)]
+    taken = [chosen(one, without[one.fold]) for one in known]
+    real = [one for one in taken if not simulated(one)]
+    without = [
+        replace(ranking, calibration=calibrated([one for one in real if one.of.fold != k]))
+        for k, ranking in enumerate(without)
+    ]
+    whole = replace(with_edges(coarse(known), known), calibration=calibrated(real))
+    return without, whole, taken
+
+
+def write(ranking: Ranking, file: Path, folds: Sequence[int]) -> None:
+    """Write a table that was learned from some folds, one figure per line."""
     rows = [
         {
             "name": name,
-            "mean": float(mean[n]),
-            "spread": float(spread[n]),
-            "slopes": [part[:, n].tolist() for part in slopes],
-            "edges": [part[:, n].tolist() for part in edges],
+            "mean": float(ranking.mean[n]),
+            "spread": float(ranking.spread[n]),
+            "slope": ranking.slope[:, n].tolist(),
+            "edge": ranking.edge[:, n].tolist(),
         }
-        for n, name in enumerate(names)
+        for n, name in enumerate(ranking.names)
     ]
-    tables = [table for _, table, _ in TABLES]
+    networks = [LEFT_OUT / f"outline_{fold}.onnx" for fold in folds]
     table = {
         "learned_by": "tools/train_ranking.py",
-        "learned_with": learned_with([LEARNED / "outline.onnx", *tables]),
+        "learned_with": learned_with([*networks, *(table for _, table, _ in TABLES)]),
         "bend_end": [BEND, END],
-        "calibration": calibration,
+        "calibration": ranking.calibration,
         "figures": rows,
     }
-    return table, taken
+    text = json.dumps(table).replace('{"name"', '\n{"name"')
+    file.write_text(text + "\n", encoding="utf-8")
 
 
-def report(taken: Sequence[Chosen]) -> None:
-    """Print mean overlaps by kind of case, of the best outline, of the one taken."""
+def simulated(one: Chosen) -> bool:
+    return one.of.mark.startswith("simulated")
+
+
+def report(taken: Sequence[Chosen], without: Sequence[Ranking]) -> None:
+    """Print what tables take of their own folds: overlaps by kind of case, and certainty."""
     marks = [one.of.mark for one in taken]
     for mark in dict.fromkeys(marks):
         some = [one for one in taken if one.of.mark == mark]
@@ -311,31 +279,29 @@ def report(taken: Sequence[Chosen]) -> None:
             f"{mark:24s} {len(some):4d} best {best.mean():.3f} taken {got.mean():.3f} "
             f">=.88 {np.mean(got >= 0.88):.2f} tenth {np.quantile(got, 0.1):.2f}"
         )
+    plain = {mark for mark, _, _ in TABLES}
+    first = [one for one in taken if not (one.of.corrections or simulated(one))]
+    for kind, own in (("as they are", True), ("as other pictures", False)):
+        some = [one for one in first if (one.of.mark in plain) == own]
+        print(f"fields {kind}: {certainty(some, without)}")
 
 
-def write(table: dict) -> None:
-    """Write the table, one figure per line."""
-    text = json.dumps(table).replace('{"name"', '\n{"name"')
-    TABLE.write_text(text + "\n", encoding="utf-8")
-
-
-def cases() -> Iterator[Case]:
-    """What is learned from: each field as it is and as another picture; simulated ones."""
-    for case in unseen():
-        yield case
-        pick = zlib.crc32(case.name.encode())
-        yield other(reseeded(case), OTHERS[pick % len(OTHERS)])
-    yield from simulated(SIMULATED)
-
-
-def all_searched(processes: int) -> Iterator[Searched]:
-    """The searches of every case."""
-    some = list(cases())
-    with Pool(processes) as pool:
-        for number, found in enumerate(pool.imap(searched, some, chunksize=4), 1):
-            yield from found
-            if number % 50 == 0:
-                print(f"{number} of {len(some)}", flush=True)
+def certainty(some: Sequence[Chosen], without: Sequence[Ranking]) -> str:
+    """How far off certainty is, and how many good and bad outlines it alone warns of."""
+    overlap = np.array([one.overlap for one in some])
+    told = np.array([without[one.of.fold].certainty("field", one.evidence) for one in some])
+    told = np.minimum(told, MOST_CERTAIN)
+    right = overlap >= RIGHT["field"]
+    bins = np.clip((told * 5).astype(int), 0, 4)
+    error = sum(
+        abs(float((told[bins == number] - right[bins == number]).sum())) for number in range(5)
+    )
+    warned = told < TRUSTED
+    bad, good = overlap < BAD, overlap >= GOOD
+    return (
+        f"certainty {error / len(some):.3f} off; warned of {np.sum(warned & bad)} of {bad.sum()} "
+        f"below {BAD}, {np.sum(warned & good)} of {good.sum()} from {GOOD} on"
+    )
 
 
 def main() -> None:
@@ -344,15 +310,21 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
+    for fold in range(FOLDS):
+        left_out(fold)  # one that is missing is told before the long work
     known: list[Searched] = []
     for cache in options.caches:
         if not cache.is_file():
             cache.write_bytes(pickle.dumps(list(all_searched(options.processes))))
         known += pickle.loads(cache.read_bytes())
-    table, taken = table_of(known)
-    report(taken)
+    without, whole, taken = rankings_of(known)
+    report(taken, without)
     if options.write:
-        write(table)
+        every = range(FOLDS)
+        write(whole, LEARNED / "outline_ranking.json", every)
+        for k, ranking in enumerate(without):
+            others = [fold for fold in every if fold != k]
+            write(ranking, LEFT_OUT / f"outline_ranking_{k}.json", others)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -9,15 +10,18 @@ import pytest
 import shapely
 
 from geofield.errors import FieldError
+from geofield.field import FieldSearch, extract_field
 from geofield.field.border import measure
 from geofield.field.cuts import divided
+from geofield.field.learned import Learned, shipped
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
-from geofield.field.ranking import exact, trained
+from geofield.field.ranking import Ranking, exact, trained
 from geofield.field.regions import partition
 from geofield.field.said import Said
 from geofield.field.straight import ring
 from geofield.field.surface import Surface
-from geofield.learned.network import network
+from geofield.learned import Network, network
+from geofield.simulate import SimulationSettings, simulate_field
 
 OUTLINES = (
     [(38, 42), (110, 36), (160, 50), (160, 118), (90, 126), (42, 119)],
@@ -51,19 +55,13 @@ def figures(several):
     return several[0]
 
 
-def table(monkeypatch, tmp_path, change):
+def table(tmp_path, change):
     """The ranking of a table that was changed."""
     folder = files("geofield.learned")
     known = json.loads((folder / "outline_ranking.json").read_text("utf-8"))
     change(known)
     (tmp_path / "outline_ranking.json").write_text(json.dumps(known), "utf-8")
-    monkeypatch.setattr("geofield.learned.model_facts.files", lambda package: tmp_path)
-    trained.cache_clear()
-    try:
-        return trained()
-    finally:
-        monkeypatch.undo()
-        trained.cache_clear()
+    return trained(folder=tmp_path)
 
 
 def test_no_two_figures_can_be_taken_for_each_other(several):
@@ -83,7 +81,7 @@ def test_every_figure_of_the_ranking_is_measured_and_counts(figures):
         assert len({float(known.scores([one])[0]) for one in (moved, again)} | {score}) >= 2, name
 
 
-def test_two_names_swapped_in_the_table_are_noticed(several, monkeypatch, tmp_path):
+def test_two_names_swapped_in_the_table_are_noticed(several, tmp_path):
     names = trained().names
     scores = trained().scores(several)
     for one, other in zip(names, names[1:] + names[:1], strict=True):
@@ -92,11 +90,11 @@ def test_two_names_swapped_in_the_table_are_noticed(several, monkeypatch, tmp_pa
             for row in known["figures"]:
                 row["name"] = {one: other, other: one}.get(row["name"], row["name"])
 
-        again = table(monkeypatch, tmp_path, swap).scores(several)
+        again = table(tmp_path, swap).scores(several)
         assert not np.array_equal(again, scores), (one, other)
 
 
-def test_two_names_swapped_among_the_edges_are_noticed(several, monkeypatch, tmp_path):
+def test_two_names_swapped_among_the_edges_are_noticed(several, tmp_path):
     """Where a field ends is decided by curves of their own, by name as well."""
     names = trained().names
     exactness = trained().exactness(several)
@@ -106,9 +104,9 @@ def test_two_names_swapped_among_the_edges_are_noticed(several, monkeypatch, tmp
         def swap(known, one=one, other=other):
             rows = {row["name"]: row for row in known["figures"]}
             first, second = rows[one], rows[other]
-            first["edges"], second["edges"] = second["edges"], first["edges"]
+            first["edge"], second["edge"] = second["edge"], first["edge"]
 
-        again = table(monkeypatch, tmp_path, swap).exactness(several)
+        again = table(tmp_path, swap).exactness(several)
         assert not np.array_equal(again, exactness), (one, other)
 
 
@@ -125,23 +123,79 @@ def test_of_the_likeliest_ground_the_most_exact_outline_is_taken():
     assert exact(expected, overlap, np.array([0.6, 0.4, 9.0]), [cut, *plain[1:]]) == 0
 
 
-def test_two_names_swapped_in_the_calibration_are_noticed(figures, monkeypatch, tmp_path):
+def test_two_names_swapped_in_the_calibration_are_noticed(figures, tmp_path):
     evidence = {**figures, "expected_overlap": 1.3, "belief_alike": 0.6, "belief_same": 0.4}
     for what, weights in trained().calibration.items():
         right = trained().certainty(what, evidence)
         for one, other in itertools.combinations(weights.keys() - {"constant"}, 2):
 
             def swap(known, what=what, one=one, other=other):
-                told = known["calibration"]["all"][what]
+                told = known["calibration"][what]
                 told[one], told[other] = told[other], told[one]
 
-            again = table(monkeypatch, tmp_path, swap).certainty(what, evidence)
+            again = table(tmp_path, swap).certainty(what, evidence)
             assert abs(again - right) > 1e-6, (what, one, other)
 
 
-def test_a_table_of_another_version_is_refused(monkeypatch, tmp_path):
+def of_parts(known):
+    """As tables were when one held several rankings."""
+    for row in known["figures"]:
+        row["slopes"], row["edges"] = [row.pop("slope")], [row.pop("edge")]
+
+
+@pytest.mark.parametrize(
+    "change", [of_parts, lambda known: known.pop("calibration"), lambda known: known.clear()]
+)
+def test_a_table_of_another_version_is_refused(tmp_path, change):
     with pytest.raises(FieldError, match=r"outline_ranking\.json"):
-        table(monkeypatch, tmp_path, lambda known: known.pop("calibration"))
+        table(tmp_path, change)
+
+
+@pytest.mark.parametrize("include", [(), ((320.5, 333.5),)])
+@pytest.mark.parametrize("exclude", [(), ((12.5, 20.5),)])
+def test_a_search_asks_what_it_was_given_and_nothing_else(include, exclude, monkeypatch):
+    """Outlines are judged by models that have not seen their site: no other one may answer."""
+    # Wider than the first view: the network is asked whether its ground goes on, too.
+    truth = simulate_field(101, SimulationSettings(width_px=640, height_px=640))
+    known = shipped()
+    own = Learned(replace(known.network, name="own"), replace(known.ranking))
+    asked: dict[str, set[int]] = {}
+
+    def watched(kind, name):
+        original = getattr(kind, name)
+
+        def call(self, *given):
+            asked.setdefault(name, set()).add(id(self))
+            return original(self, *given)
+
+        monkeypatch.setattr(kind, name, call)
+
+    watched(Network, "__call__")
+    for name in ("scores", "exactness", "certainty"):
+        watched(Ranking, name)
+
+    def found(search):
+        belong, apart = (
+            [truth.scene.grid.to_lonlat(*at) for at in points] for points in (include, exclude)
+        )
+        asked.clear()
+        field = extract_field(
+            truth.scene,
+            lat=truth.lat,
+            lon=truth.lon,
+            include=belong,
+            exclude=apart,
+            search=search,
+        )
+        assert asked.keys() == {"__call__", "scores", "exactness", "certainty"}
+        rankings = asked["scores"] | asked["exactness"] | asked["certainty"]
+        return field, asked["__call__"], rankings
+
+    field, *answered = found(FieldSearch((truth.lon, truth.lat), own))
+    assert answered == [{id(own.network)}, {id(own.ranking)}]
+    usual, *answered = found(None)
+    assert answered == [{id(known.network)}, {id(known.ranking)}]
+    assert usual.polygon == field.polygon
 
 
 def test_certainty_falls_with_what_is_expected(figures):

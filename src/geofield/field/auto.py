@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.field.morphology import inner, plump
-from geofield.field.ranking import WEIGHED, Figures, exact, expected_overlaps, log_odds, trained
+from geofield.field.ranking import WEIGHED, Figures, exact, expected_overlaps, log_odds
 from geofield.field.refine import carried, enlarged
 from geofield.field.search import Candidate, WindowSearch, search_field
 from geofield.model import Scene
@@ -34,7 +34,7 @@ _WEAK = 1.6
 #: crooked course below this share of long sides.
 _RIVAL, _CROOKED = 0.75, 0.8
 #: No outline from a picture is told as quite certain, and none as "100 %" in rounded words.
-_MOST_CERTAIN = 0.99
+MOST_CERTAIN = 0.99
 #: Below this certainty the doubt is told.
 _LIKELY = 0.7
 
@@ -94,11 +94,12 @@ def likely_outlines(found: Sequence[Candidate], search: WindowSearch) -> list[Li
     scores = np.array([one.score for one in found])
     polygons = [one.polygon for one in found]
     belief, expected, overlap = expected_overlaps(polygons, scores)
-    exactness = trained(search.part).exactness([one.figures for one in found])
+    ranking = search.learned.ranking
+    exactness = ranking.exactness([one.figures for one in found])
     best = exact(expected, overlap, exactness, polygons)
     evidence = evidence_of(found[best], float(expected[best]), belief, overlap[best])
     certain, ground, border = (
-        min(trained(search.part).certainty(what, evidence), _MOST_CERTAIN)
+        min(ranking.certainty(what, evidence), MOST_CERTAIN)
         for what in ("field", "ground", "border")
     )
     chosen = [Likely(found[best], certain, ground, border)]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from geofield.learned.network import network
+from geofield.learned.network import Network
 from geofield.model import Scene
 
 FloatArray = NDArray[np.float32]
@@ -55,6 +55,7 @@ class Seen:
         exclude: Points,
         shape: tuple[int, int],
         factor: int,
+        network: Network,
     ) -> FloatArray:
         """How likely each pixel of the scene, reduced by a factor, belongs to the field.
 
@@ -65,6 +66,8 @@ class Seen:
         shape : (int, int)
             Rows and columns of the reduced scene.
         factor : int
+        network : Network
+            The one that is asked.
         """
         import cv2
 
@@ -74,7 +77,7 @@ class Seen:
         )
         often = SIDE_PX // ANSWER_PX
         large = np.repeat(np.repeat(points, often, axis=1), often, axis=2)
-        odds = network("outline")(np.concatenate([self.bands, large])[None])[0, 0]
+        odds = network(np.concatenate([self.bands, large])[None])[0, 0]
         share = scale * ANSWER_PX / SIDE_PX
         shift = 0.5 * share - 0.5
         onto = np.array([[share, 0, shift], [0, share, shift]])

@@ -20,7 +20,7 @@ _SMALL_M2 = 400.0
 _COARSE_M = 3.0
 #: From this score on an outline is used without a warning. The score is the probability of a
 #: good outline, lowered for what that probability knows nothing of.
-_TRUSTED = 0.45
+TRUSTED = 0.45
 
 
 def judge(
@@ -80,7 +80,7 @@ def judge(
         *seen,
         *found.figures,
     )
-    return FieldQuality(score, tuple(reasons), figures, trusted=score >= _TRUSTED)
+    return FieldQuality(score, tuple(reasons), figures, trusted=score >= TRUSTED)
 
 
 def edge_share(outline_px: Polygon, frame_px: Polygon) -> float:

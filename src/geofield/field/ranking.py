@@ -4,15 +4,15 @@ An outline's score is a sum of curves, one for each figure that is measured on i
 so that a figure can count more on one side of what is usual than on the other. Scores become
 beliefs (their exponentials, to add up to one), and the outline with the largest expected overlap
 with the others under these beliefs holds the ground that is meant. Where exactly it ends, curves of
-their own decide among the outlines of that ground. `tools/train_ranking.py` learned all curves on
-sites that the network, whose answer is among the figures, had not seen.
+their own decide among the outlines of that ground. `tools/train_ranking.py` learned all curves
+behind networks, whose answer is among the figures, that had not seen the field's site.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -37,8 +37,6 @@ WEIGHED = 200
 SAME_GROUND = 0.92
 #: Outlines whose exactness differs less are as exact.
 _NEARLY = 0.1
-#: Of a figure, in its table: for which ground is meant, and for where exactly it ends.
-_CURVES = ("slopes", "edges")
 
 
 def log_odds(share: FloatArray | float) -> FloatArray:
@@ -106,27 +104,24 @@ def bends(standard: FloatArray) -> FloatArray:
     return np.stack([standard, np.maximum(standard - BEND, 0), np.maximum(-standard - BEND, 0)])
 
 
-@cache
-def trained(part: int | None = None) -> Ranking:
-    """The ranking of this package; of a fold, the part that has seen none of its sites.
+def trained(name: str = "outline_ranking", folder: Path | None = None) -> Ranking:
+    """The ranking of this package, or one that lies in another folder.
 
     Raises
     ------
     GeofieldError
         When there is no table; a FieldError where it is of another version.
     """
-    table = facts("outline_ranking")
+    table = facts(name, folder)
     try:
         rows = table["figures"]
         mean, spread = (np.array([row[key] for row in rows]) for key in ("mean", "spread"))
+        # Of each figure a triple of slopes: which ground is meant, and where exactly it ends.
+        slope, edge = (np.array([row[key] for row in rows]).T for key in ("slope", "edge"))
         names = tuple(row["name"] for row in rows)
-        # Of each figure, the slopes of all parts: (parts, 3, names).
-        parts = [np.moveaxis(np.array([row[key] for row in rows]), 0, -1) for key in _CURVES]
-        slope, edge = (one.mean(axis=0) if part is None else one[part] for one in parts)
-        calibration = table["calibration"]["all" if part is None else str(part)]
-        return Ranking(names, mean, spread, slope, edge, calibration)
-    except (KeyError, IndexError) as error:
-        raise FieldError("The table outline_ranking.json cannot be read.") from error
+        return Ranking(names, mean, spread, slope, edge, table["calibration"])
+    except (KeyError, ValueError) as error:
+        raise FieldError(f"The table {name}.json cannot be read.") from error
 
 
 def exact(

@@ -22,11 +22,12 @@ from geofield.errors import FieldError
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
+from geofield.field.learned import Learned, shipped
 from geofield.field.mend import mended
 from geofield.field.network import Seen, seen
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.points import EXACT_PX, drawn, obeys
-from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures, trained
+from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures
 from geofield.field.regions import (
     SMALLEST_PX,
     SMALLEST_SHARE,
@@ -112,8 +113,8 @@ class WindowSearch:
         Open ground at the seed or beside it, pixel coordinates of the searched picture.
     moved : bool
         Whether the seed itself lies on something small: a crown, a hut.
-    part : int or None
-        The only part of the ranking to ask: the one learned without the sites of this fold.
+    learned : Learned
+        The network and the ranking that are asked.
     known : dict
         What was measured, by outline.
     taken : dict
@@ -128,7 +129,7 @@ class WindowSearch:
     seen: Seen
     seed_px: tuple[float, float]
     moved: bool
-    part: int | None = None
+    learned: Learned = field(default_factory=shipped)
     known: dict[Polygon, Held] = field(default_factory=dict)
     taken: dict[tuple[Points, Points], list[Polygon]] = field(default_factory=dict)
     answered: dict[tuple[Points, Points], list[Candidate]] = field(default_factory=dict)
@@ -140,7 +141,9 @@ class WindowSearch:
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
         include = (self.seed_px, *include)
-        return self.seen.probability(include, exclude, self.surface.shape, self.factor)
+        return self.seen.probability(
+            include, exclude, self.surface.shape, self.factor, self.learned.network
+        )
 
     def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
         """Outlines that obey the points, the best first; none where nothing stands out.
@@ -241,7 +244,8 @@ class WindowSearch:
         inside = np.array([self.known[polygon].inside for polygon in ranked])
         common = inside @ (size * inside[0])
         alike = common >= SAME_GROUND * (inside @ size + size @ inside[0] - common)
-        exactness = trained(self.part).exactness([found[polygon].figures for polygon in ranked])
+        figures = [found[polygon].figures for polygon in ranked]
+        exactness = self.learned.ranking.exactness(figures)
         return ranked[int(np.argmax(np.where(alike, exactness, -np.inf)))]
 
     def _scored(self, held: Sequence[Held], said: Said) -> Iterator[tuple[Held, Figures, float]]:
@@ -251,7 +255,7 @@ class WindowSearch:
             return
         told = said.figures([one.polygon for one in some], [one.inside for one in some])
         figures = [{**(one.figures or {}), **more} for one, more in zip(some, told, strict=True)]
-        scores = trained(self.part).scores(figures).tolist()
+        scores = self.learned.ranking.scores(figures).tolist()
         yield from zip(some, figures, scores, strict=True)
 
     def _earlier(self, said: Said) -> list[BoolArray]:
@@ -309,7 +313,7 @@ def search_field(
     x_px: float,
     y_px: float,
     *,
-    part: int | None = None,
+    learned: Learned | None = None,
 ) -> WindowSearch:
     """Make a scene ready.
 
@@ -318,8 +322,8 @@ def search_field(
     scene : Scene
     x_px, y_px : float
         The seed, pixel coordinates.
-    part : int, optional
-        See `WindowSearch`.
+    learned : Learned, optional
+        The network and the ranking to ask; those of this package unless given.
 
     Raises
     ------
@@ -344,7 +348,7 @@ def search_field(
         seen(scene),
         footing,
         footing != seed,
-        part,
+        learned or shipped(),
     )
 
 

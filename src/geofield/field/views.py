@@ -17,12 +17,14 @@ from shapely import Polygon, affinity
 
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field.auto import likely_outlines
+from geofield.field.learned import Learned, shipped
 from geofield.field.network import SIDE_PX, seen
 from geofield.field.part import Part
 from geofield.field.ranking import WEIGHED
 from geofield.field.regions import Points
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
+from geofield.learned.network import Network
 from geofield.model import Scene
 
 #: Longitude and latitude, degrees.
@@ -61,8 +63,8 @@ class FieldSearch:
     ----------
     lonlat : (float, float)
         The point, degrees.
-    part : int or None
-        See `WindowSearch`.
+    learned : Learned
+        The network and the ranking that are asked.
     views : dict
         By their level: 0 is the narrowest.
     levels : dict
@@ -70,7 +72,7 @@ class FieldSearch:
     """
 
     lonlat: tuple[float, float]
-    part: int | None = None
+    learned: Learned = field(default_factory=shipped)
     views: dict[int, View] = field(default_factory=dict)
     levels: dict[tuple[Places, Places], int] = field(default_factory=dict)
 
@@ -107,7 +109,10 @@ class FieldSearch:
         try:
             seed, *belong = (seen_part.pixel_of(lat=y, lon=x) for x, y in (self.lonlat, *include))
             apart = tuple(seen_part.pixel_of(lat=y, lon=x) for x, y in exclude)
-            if level not in self.views and _ground_goes_on(seen_part, part, (seed, *belong), apart):
+            points = (seed, *belong), apart
+            if level not in self.views and _ground_goes_on(
+                seen_part, part, *points, self.learned.network
+            ):
                 return False
             view = self._at(scene, level)
         except (FieldError, PointOutsideError):
@@ -126,7 +131,8 @@ class FieldSearch:
             part = self._parts(scene)[level]
             seen_part = part.of(scene)
             lon, lat = self.lonlat
-            search = search_field(seen_part, *seen_part.pixel_of(lat=lat, lon=lon), part=self.part)
+            seed = seen_part.pixel_of(lat=lat, lon=lon)
+            search = search_field(seen_part, *seed, learned=self.learned)
             self.views[level] = View(part, search)
         return self.views[level]
 
@@ -148,7 +154,9 @@ class FieldSearch:
         return [part.magnified() for part in (*parts, Part.whole(scene))]
 
 
-def _ground_goes_on(scene: Scene, part: Part, include: Points, exclude: Points) -> bool:
+def _ground_goes_on(
+    scene: Scene, part: Part, include: Points, exclude: Points, network: Network
+) -> bool:
     """Whether the network's ground goes on beyond sides of a part that lie within the picture.
 
     It is asked long before an outline is found.
@@ -158,7 +166,7 @@ def _ground_goes_on(scene: Scene, part: Part, include: Points, exclude: Points) 
         tuple((x / factor, y / factor) for x, y in points) for points in (include, exclude)
     )
     rows, columns = (math.ceil(length / factor) for length in scene.grid.shape)
-    likely = seen(scene).probability(belong, apart, (rows, columns), factor)
+    likely = seen(scene).probability(belong, apart, (rows, columns), factor, network)
     ground = np.pad(part_at(likely > 0.5, *belong[0]), 1)
     if not ground.any():
         return False
