@@ -439,3 +439,17 @@ os._exit(0)
     assert farm["a"].settings.tracks.spacing_m == 12
     assert len(farm["a"].tracks.lines) == len(farm["d"].tracks.lines)
     assert gf.read_plan(file) == farm["a"]
+
+
+def test_a_track_taken_away_stays_away_in_the_farm(folder: Path) -> None:
+    geofield("farm", "get", folder / "farm", "a", "-o", folder / "a.gpkg")
+    tracks = pyogrio.read_dataframe(folder / "a.gpkg", layer="tracks")
+    tracks = tracks[tracks["track_no"] != 4]
+    pyogrio.write_dataframe(tracks, folder / "a.gpkg", layer="tracks", geometry_name="geom")
+    assert "planned again" not in geofield("farm", "put", folder / "a.gpkg", folder / "farm")
+    for more in ((), ("--fresh",)):
+        farm = gf.read_farm(folder / "farm")
+        assert 4 not in set(farm["a"].tracks.segments["track_no"])
+        assert 4 not in set(farm["a"].tracks.lines["track_no"])
+        assert 4 in set(farm["b"].tracks.lines["track_no"])
+        _batch(folder, *more)

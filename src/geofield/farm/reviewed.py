@@ -110,14 +110,16 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         if whole:
             # With all that was written to it, also where a program has it open.
             copy_whole(plan_file, file)
-        if settings is not None and not _has_its_tracks(plan, before):
+        edited = plan.track_edits != plan.evidence.track_edits
+        if settings is not None and (edited or not _has_its_tracks(plan, before)):
+            if not edited:
+                warnings.warn(
+                    f"{plan.field.name}: its tracks were not those of its outline and obstacles, "
+                    "and are planned again.",
+                    FieldWarning,
+                    stacklevel=2,
+                )
             plan, whole = run_tracks(plan, settings=settings), False
-            warnings.warn(
-                f"{plan.field.name}: its tracks were not those of its outline and obstacles, and "
-                "are planned again.",
-                FieldWarning,
-                stacklevel=2,
-            )
         if not whole:
             save_plan(plan, file, overwrite=True)
         # First what must not be lost; the tables follow from it.
