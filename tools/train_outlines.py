@@ -51,8 +51,9 @@ SEED = 3
 BATCH, RATE, DECAY = 8, 2.5e-3, 2e-2
 #: How much slower what ImageNet taught is changed.
 KNOWN_RATE = 0.15
-#: Share of real pictures; of batches that also see corrective points.
-REAL, CORRECTED = 0.85, 0.4
+#: Share of real pictures; of batches that also see corrective points; of fields that are laid
+#: onto other ground.
+REAL, CORRECTED, LAID = 0.85, 0.4, 0.35
 #: Simulated pictures are reduced to this side, pixels; their number; the seed of the first.
 SIMULATED_PX, SIMULATED, SIMULATION_SEED = 320, 72, 52_000
 #: What a site counts by its table: outlines nobody would see are drawn less exactly, and the last
@@ -153,6 +154,7 @@ def train(options: argparse.Namespace) -> None:
                 if rng.random() < REAL
                 else made[int(rng.integers(len(made)))],
                 rng,
+                known[int(rng.integers(len(known)))] if rng.random() < LAID else None,
             )
             for _ in range(BATCH)
         ]

@@ -129,6 +129,28 @@ def test_a_moved_outline_is_kept(plan_file, qgis):
     ).all()
 
 
+def test_tracks_that_are_deleted_and_drawn(plan_file, qgis):
+    before = read_dataset(plan_file)
+    drawn = shapely.LineString([(ORIGIN[0] + x, ORIGIN[1] + y) for x, y in ((8, 3), (30, 30))])
+    changes = [
+        {"layer": "tracks", "where": "track_no = 2", "delete": True},
+        {"layer": "segments", "where": "track_no = 3", "delete": True},
+        {"layer": "tracks", "wkt": shapely.to_wkt(shapely.MultiLineString([drawn]))},
+    ]
+    assert qgis("edit", path=str(plan_file), changes=changes) == {"done": 3}
+    for _ in range(2):
+        after = plan_again(plan_file)
+        numbers = set(before.table("tracks")["track_no"])
+        new = set(after.table("tracks")["track_no"]) - numbers
+        assert numbers - set(after.table("tracks")["track_no"]) == {2, 3}
+        assert set(after.table("segments")["track_no"]) == (numbers | new) - {2, 3}
+        (own,) = (after.table("segments").query("track_no == @each") for each in new)
+        assert drawn.buffer(0.01).covers(shapely.union_all(own.geometry.to_numpy()))
+        obstacles = after.table("obstacles")
+        for obstacle in obstacles[obstacles["status"] != "rejected"].geometry:
+            assert crossing(after, obstacle.buffer(-0.1)) == 0
+
+
 def test_a_column_that_a_person_added_survives(plan_file, qgis):
     import pyogrio
 

@@ -80,6 +80,7 @@ def test_a_person_chooses_the_status_from_a_list(opened):
 def test_what_no_run_honours_cannot_be_typed(opened):
     editable = {"field": ["field_id", "name"]}
     editable["obstacles"] = ["kind", "status", "radius_m", "buffer_m"]
+    editable |= {"tracks": [], "segments": ["track_no"]}
     for layer in schema.LAYERS:
         if not layer.optional:
             facts = opened["layers"][f"geofield_{layer.name}"]
