@@ -170,7 +170,7 @@ def laid_onto(
     """A field, and some of what lies around it, in the middle of another place.
 
     Where it ends is shown by the field, not by what else is usual there: with a third of the
-    pictures so made, what 353 fields taught was worth .02 more on 199 others.
+    pictures so made, 1 200 steps with 353 fields gave .705 on 199 others, .682 without.
 
     Returns
     -------
