@@ -140,6 +140,7 @@ def train(options: argparse.Namespace) -> None:
     average = torch.optim.swa_utils.AveragedModel(
         net, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(0.997), use_buffers=True
     )
+    fast = torch.compile(net)
     start, step, shown, running = time.time(), 0, time.time(), 0.0
     while True:
         done = step / options.steps
@@ -177,7 +178,7 @@ def train(options: argparse.Namespace) -> None:
                         points[k] = points_maps(b[4], b[5])
         optimiser.zero_grad()
         with torch.autocast("cpu", torch.bfloat16):
-            odds_now = net(x, torch.from_numpy(points))
+            odds_now = fast(x, torch.from_numpy(points))
         loss = loss_of(odds_now.float(), target, counts)
         loss.backward()
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)

@@ -19,6 +19,7 @@ from pyproj import CRS
 from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
+from geofield.formats import validate_file
 from geofield.model.track_edits import TrackEdits, TracksWritten
 from geofield.model.tracks import Tracks
 from geofield.plan import Plan, read_plan
@@ -88,6 +89,10 @@ def test_a_track_taken_away_is_driven_by_nobody(
     before = tracks_in(folder)
     lines = guidance(folder, file)
     rewritten(file, layer, without(5))
+    where, why = ("segments", "is not in") if layer == "tracks" else ("tracks", "has no segments")
+    (finding,) = validate_file(file)
+    assert finding.where == where
+    assert why in finding.message
     found = exported(folder, file)
     assert all(5 not in numbers for numbers in found.values())
     assert found["tracks"] == found["segments"] == found["track_points"]

@@ -195,5 +195,12 @@ def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
             f"tracks, track {number}",
             f"length_m is {told[number]:.2f}, its segments measure {sums[number]:.2f}",
         )
-    for number in sums.index.difference(told.index)[:5]:
-        yield Finding("error", "segments", f"track {number} is not in layer tracks")
+    apart = (
+        ("segments", sums.index.difference(told.index), "is not in layer tracks"),
+        ("tracks", told.index.difference(sums.index), "has no segments"),
+    )
+    for layer, numbers, what in apart:
+        for number in numbers[:5]:
+            yield Finding(
+                "error", layer, f"track {number} {what}: plan the tracks again (geofield tracks)"
+            )

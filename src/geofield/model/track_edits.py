@@ -8,7 +8,8 @@ is a word on the layout's line that it changed, and stays one while the layout h
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -116,16 +117,24 @@ class TrackEdits:
         return cls(*(_unlisted(value.get(name, ())) for name in ("edits", "apart")))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TracksWritten:
-    """The tracks as the planner left them: the measure of what a person changed since."""
+    """The tracks as the planner left them: the measure of what a person changed since.
+
+    Attributes
+    ----------
+    heading_deg, spacing_m : float
+        Of the layout.
+    middle : (int, int)
+        From where vertices count, metric CRS; beside it lies the place of a line.
+    rows : list of list of int
+        Of each segment its track's number and its vertices x, y, ..., millimetres.
+    """
 
     heading_deg: float
     spacing_m: float
-    #: The segments' vertices by track number.
-    segments: Mapping[int, Sequence[Vertices]] = field(default_factory=dict)
-    #: Beside which place a line's own is told, metric CRS.
-    middle: tuple[float, float] = (0.0, 0.0)
+    middle: tuple[int, int]
+    rows: list[list[int]]
 
     @classmethod
     def of(
@@ -138,7 +147,43 @@ class TracksWritten:
         middle: tuple[float, float],
     ) -> TracksWritten:
         """The record of segments, by the numbers of their tracks."""
-        return cls(heading_deg, spacing_m, _by_number(track_no, lines)[0], middle)
+        at = round(middle[0]), round(middle[1])
+        lines = np.asarray(lines, dtype=object)
+        number = np.asarray(track_no, dtype=np.int64)
+        flat = np.rint((shapely.get_coordinates(lines) - at) * 1000.0).astype(np.int64)
+        count = shapely.get_num_coordinates(lines)
+        if (count == 2).all():
+            rows = np.column_stack((number, flat.reshape(-1, 4))).tolist()
+        else:
+            parts = np.split(flat, np.cumsum(count)[:-1])
+            rows = [
+                [no, *part.ravel().tolist()]
+                for no, part in zip(number.tolist(), parts, strict=True)
+            ]
+        return cls(heading_deg, spacing_m, at, rows)
+
+    @cached_property
+    def segments(self) -> dict[int, list[Vertices]]:
+        """The segments' vertices by track number, metric CRS."""
+        found: dict[int, list[Vertices]] = {}
+        for no, *flat in self.rows:
+            found.setdefault(no, []).append(np.array(flat).reshape(-1, 2) / 1000.0 + self.middle)
+        return found
+
+    def are(self, lines: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> bool:
+        """Whether both layers are as they were written, their rows in the same order."""
+        numbers = [row[0] for row in self.rows]
+        if numbers != segments["track_no"].tolist():
+            return False
+        if list(dict.fromkeys(numbers)) != lines["track_no"].tolist():
+            return False
+        flat = np.array([value for row in self.rows for value in row[1:]], dtype=np.float64)
+        written = flat.reshape(-1, 2) / 1000.0 + self.middle
+        for table in (lines, segments):
+            now = shapely.get_coordinates(table.geometry.to_numpy())
+            if now.shape != written.shape or (np.abs(now - written) > SAME_M).any():
+                return False
+        return True
 
     def place(self, track_no: int) -> Place | None:
         """Where the line of a track runs; None where it has no length."""
@@ -153,28 +198,20 @@ class TracksWritten:
         return Place(*at, self.heading_deg, self.spacing_m)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain JSON values, millimetres from the middle; see :meth:`from_json`."""
-        x, y = (round(each) for each in self.middle)
-        rows = [
-            [no, *np.rint((line - (x, y)) * 1000.0).astype(int).ravel().tolist()]
-            for no, lines in self.segments.items()
-            for line in lines
-        ]
+        """Plain JSON values; see :meth:`from_json`."""
         return {
             "heading_deg": self.heading_deg,
             "spacing_m": self.spacing_m,
-            "middle": [x, y],
-            "segments_mm": rows,
+            "middle": list(self.middle),
+            "segments_mm": self.rows,
         }
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> TracksWritten:
         """The record that was written with :meth:`to_json`."""
-        middle = (float(value["middle"][0]), float(value["middle"][1]))
-        found: dict[int, list[Vertices]] = {}
-        for no, *flat in value["segments_mm"]:
-            found.setdefault(no, []).append(np.array(flat).reshape(-1, 2) / 1000.0 + middle)
-        return cls(float(value["heading_deg"]), float(value["spacing_m"]), found, middle)
+        x, y = value["middle"]
+        layout = float(value["heading_deg"]), float(value["spacing_m"])
+        return cls(*layout, (int(x), int(y)), value["segments_mm"])
 
 
 def edits_in(
@@ -196,6 +233,8 @@ def edits_in(
     known : TrackEdits
         Edits of earlier, whose results are what was written.
     """
+    if written.are(lines, segments):
+        return known
     as_lines, loose_lines = _by_number(lines["track_no"], lines.geometry, written)
     as_segments, loose = _by_number(segments["track_no"], segments.geometry)
     if not as_lines or not as_segments:
