@@ -8,7 +8,8 @@ the network. What is shipped (`learned/outline.onnx`) learns from all fields dra
 of the method are taken with these three, each on its own fold, and the ranking is learned behind
 them. The ``.json`` beside a network says which sites it was learned from.
 
-3 600 steps with 362 outlines take an hour of two cores.
+2 000 steps take half an hour of one core. (The networks without folds 0 and 1 were trained before
+steps were compiled, which rounds differently.)
 With the encoder of `pretrained` 1 400 steps reach more on sites left out than 5 500 without it
 did. What gained nothing before there was one: a picture seen in four or eight turns; the mean with
 an earlier network. With it, the deeper blocks did not learn faster; and to ask a second time with a
@@ -16,7 +17,7 @@ place deep in the first answer gave .756 / .814 / .828 with one, two and three p
 gives .749 / .808 / .833, and the first outline took a tenth longer. Its first answer as an input of
 a second one, features compared with their mean over it, gave .756 / .739 / .712 in four bands,
 colour and grey for .750 / .737 / .707; learned on with 124 more fields, outlines of 66 others were
-.820 / .814 / .787 for .817 / .808 / .766, with three points .863 for .879. The shipped
+.820 / .814 / .787 for .817 / .808 / .766, with three points .863 for .879. An earlier
 network, learned on with 78 more fields (900 steps at two fifths of the rate), alone gave .724 /
 .708 / .684 on 112 others for .731 / .714 / .684: a fifth more fields is too little to be seen.
 """

@@ -7,6 +7,7 @@ a drawn row has a shape and nothing else.
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
+from geofield.errors import TrackWarning
 from geofield.formats.many import Joined
 from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
@@ -64,6 +66,13 @@ def _driven(dataset: Dataset) -> Dataset:
     tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
     if tracks.edits_since(known) == known:
         return dataset
+    if tracks.route is not None:
+        warnings.warn(
+            "Tracks were edited since their route was planned: it is of before. Plan it again "
+            "(geofield tracks).",
+            TrackWarning,
+            stacklevel=3,
+        )
     from geofield.tracks.blocks import obstacle_shapes
     from geofield.tracks.by_hand import as_edited
 
