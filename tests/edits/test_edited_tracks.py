@@ -20,8 +20,9 @@ from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
 from geofield.formats import validate_file
-from geofield.model.track_edits import TrackEdits, TracksWritten
+from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
+from geofield.model.tracks_written import TracksWritten
 from geofield.plan import Plan, read_plan
 from geofield.review.session import Session
 from geofield.simulate import SimulatedField
@@ -341,3 +342,32 @@ def test_edits_are_the_same_in_another_zone(folder: Path) -> None:
         assert one.track_no == other.track_no
         if one.place is not None and other.place is not None:
             assert one.place == pytest.approx(other.place, abs=0.01)
+
+
+def test_columns_of_ones_own_stay_with_their_tracks(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+
+    def noted(table: Frame) -> Frame:
+        table["note"] = table["track_no"].map({3: "wet", 4: "done"})
+        table["rate"] = table["track_no"].map({3: 2.5, 6: 7.0})
+        return table[table["track_no"] != 5]
+
+    rewritten(file, "tracks", noted)
+    for again in (
+        lambda: run(folder, made, "--overwrite"),
+        lambda: geofield("tracks", file, "-o", file),
+        lambda: geofield("tracks", file, "--spacing", 5, "-o", file),
+        lambda: geofield("tracks", file, "--spacing", 6, "-o", file),
+    ):
+        again()
+        table = tracks_in(folder).lines.set_index("track_no")
+        if tracks_in(folder).spacing_m == 6:
+            assert table["note"].dropna().to_dict() == {3: "wet", 4: "done"}
+            assert table["rate"].dropna().to_dict() == {3: 2.5, 6: 7.0}
+            assert 5 not in table.index
+        else:
+            assert "note" not in table
+    rewritten(file, "tracks", lambda table: table.drop(columns=["note", "rate"]))
+    geofield("tracks", file, "-o", file)
+    assert "note" not in tracks_in(folder).lines
+    assert 5 not in set(tracks_in(folder).lines["track_no"])

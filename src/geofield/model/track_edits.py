@@ -9,41 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pyproj import CRS
 
+from geofield import schema
 from geofield.crs import reproject, transformer
+from geofield.model.tracks_written import DECIMALS, SAME_M, Place, TracksWritten, Vertices
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: A vertex farther than this from the one that was written was moved by a person, metres.
-SAME_M = 0.002
-_DECIMALS = 3
-
-#: The vertices of a line, (n, 2), metric CRS.
-Vertices = NDArray[np.float64]
-
-
-class Place(NamedTuple):
-    """A line of a layout: a point on it beside the field's middle, and how the layout runs."""
-
-    x: float
-    y: float
-    heading_deg: float
-    spacing_m: float
-
 
 class TrackEdit(NamedTuple):
-    """What a person made of one track.
-
-    Without `drawn` and `cut` the whole track was taken away.
-    """
+    """What a person made of one track."""
 
     track_no: int
     #: The track as drawn, whatever stands in it: a MultiLineString as WKT, metric CRS.
@@ -52,6 +33,13 @@ class TrackEdit(NamedTuple):
     cut: str | None = None
     #: Of the layout's line; None for a track that was added.
     place: Place | None = None
+    #: Values of a person's own columns, plain JSON.
+    own: Mapping[str, Any] | None = None
+
+    @property
+    def away(self) -> bool:
+        """Whether the whole track was taken away."""
+        return self.drawn is None and self.cut is None and self.own is None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +68,7 @@ class TrackEdits:
     def in_words(self) -> str:
         """What is in use, one line for people; empty where nothing was changed."""
         kinds = (
-            ("taken away", [one for one in self.edits if one.drawn is None and one.cut is None]),
+            ("taken away", [one for one in self.edits if one.away]),
             ("shortened", [one for one in self.edits if one.cut is not None]),
             ("drawn", [one for one in self.edits if one.drawn is not None]),
         )
@@ -117,103 +105,6 @@ class TrackEdits:
         return cls(*(_unlisted(value.get(name, ())) for name in ("edits", "apart")))
 
 
-@dataclass(frozen=True)
-class TracksWritten:
-    """The tracks as the planner left them: the measure of what a person changed since.
-
-    Attributes
-    ----------
-    heading_deg, spacing_m : float
-        Of the layout.
-    middle : (int, int)
-        From where vertices count, metric CRS; beside it lies the place of a line.
-    rows : list of list of int
-        Of each segment its track's number and its vertices x, y, ..., millimetres.
-    """
-
-    heading_deg: float
-    spacing_m: float
-    middle: tuple[int, int]
-    rows: list[list[int]]
-
-    @classmethod
-    def of(
-        cls,
-        track_no: Any,
-        lines: Any,
-        *,
-        heading_deg: float,
-        spacing_m: float,
-        middle: tuple[float, float],
-    ) -> TracksWritten:
-        """The record of segments, by the numbers of their tracks."""
-        at = round(middle[0]), round(middle[1])
-        lines = np.asarray(lines, dtype=object)
-        number = np.asarray(track_no, dtype=np.int64)
-        flat = np.rint((shapely.get_coordinates(lines) - at) * 1000.0).astype(np.int64)
-        count = shapely.get_num_coordinates(lines)
-        if (count == 2).all():
-            rows = np.column_stack((number, flat.reshape(-1, 4))).tolist()
-        else:
-            parts = np.split(flat, np.cumsum(count)[:-1])
-            rows = [
-                [no, *part.ravel().tolist()]
-                for no, part in zip(number.tolist(), parts, strict=True)
-            ]
-        return cls(heading_deg, spacing_m, at, rows)
-
-    @cached_property
-    def segments(self) -> dict[int, list[Vertices]]:
-        """The segments' vertices by track number, metric CRS."""
-        found: dict[int, list[Vertices]] = {}
-        for no, *flat in self.rows:
-            found.setdefault(no, []).append(np.array(flat).reshape(-1, 2) / 1000.0 + self.middle)
-        return found
-
-    def are(self, lines: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> bool:
-        """Whether both layers are as they were written, their rows in the same order."""
-        numbers = [row[0] for row in self.rows]
-        if numbers != segments["track_no"].tolist():
-            return False
-        if list(dict.fromkeys(numbers)) != lines["track_no"].tolist():
-            return False
-        flat = np.array([value for row in self.rows for value in row[1:]], dtype=np.float64)
-        written = flat.reshape(-1, 2) / 1000.0 + self.middle
-        for table in (lines, segments):
-            now = shapely.get_coordinates(table.geometry.to_numpy())
-            if now.shape != written.shape or (np.abs(now - written) > SAME_M).any():
-                return False
-        return True
-
-    def place(self, track_no: int) -> Place | None:
-        """Where the line of a track runs; None where it has no length."""
-        both = np.concatenate(self.segments[track_no])
-        start, way = both[0], both[-1] - both[0]
-        length = float(np.hypot(*way))
-        if length == 0.0:
-            return None
-        along = way / length
-        x, y = start + ((np.array(self.middle) - start) @ along) * along
-        at = round(float(x), _DECIMALS), round(float(y), _DECIMALS)
-        return Place(*at, self.heading_deg, self.spacing_m)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain JSON values; see :meth:`from_json`."""
-        return {
-            "heading_deg": self.heading_deg,
-            "spacing_m": self.spacing_m,
-            "middle": list(self.middle),
-            "segments_mm": self.rows,
-        }
-
-    @classmethod
-    def from_json(cls, value: Mapping[str, Any]) -> TracksWritten:
-        """The record that was written with :meth:`to_json`."""
-        x, y = value["middle"]
-        layout = float(value["heading_deg"]), float(value["spacing_m"])
-        return cls(*layout, (int(x), int(y)), value["segments_mm"])
-
-
 def edits_in(
     lines: gpd.GeoDataFrame,
     segments: gpd.GeoDataFrame,
@@ -233,52 +124,86 @@ def edits_in(
     known : TrackEdits
         Edits of earlier, whose results are what was written.
     """
-    if written.are(lines, segments):
+    if written.are(lines, segments) and not any(one.own for one in known.edits):
         return known
     as_lines, loose_lines = _by_number(lines["track_no"], lines.geometry, written)
     as_segments, loose = _by_number(segments["track_no"], segments.geometry)
     if not as_lines or not as_segments:
         return known
-    edits = known.by_number
+    # Columns say now what they said then, or something else.
+    shapes = {no: one._replace(own=None) for no, one in known.by_number.items()}
+    edits = {no: one for no, one in shapes.items() if known.by_number[no].away or not one.away}
     for no, before in written.segments.items():
-        line, pieces = as_lines.pop(no, None), as_segments.pop(no, [])
-        change = _change(before, line, pieces)
-        if change is None:
-            continue
-        earlier = edits.pop(no, None)
-        place = written.place(no) if earlier is None else earlier.place
-        if change.drawn is None and earlier is not None and change.cut is not None:
-            # A piece of what was drawn, or of what was shortened before, is taken away.
-            change = _further(earlier, change.cut, pieces or line or [])
-        if place is not None or change.drawn is not None:
-            edits[no] = change._replace(track_no=no, place=place)
-    numbered = {**as_segments, **as_lines}
-    for no, drawn in numbered.items():
+        change = _change(before, as_lines.pop(no, None), as_segments.pop(no, []), edits.get(no))
+        if change is not None:
+            earlier = edits.pop(no, None)
+            place = written.place(no) if earlier is None else earlier.place
+            # A track that was added and is taken away is forgotten.
+            if place is not None or not change.away:
+                edits[no] = change._replace(track_no=no, place=place)
+    for no, drawn in (as_segments | as_lines).items():
         place = edits[no].place if no in edits else None
         edits[no] = TrackEdit(no, as_text(_multi(drawn)), place=place)
     free = max([*edits, *written.segments, 0]) + 1
     # A piece drawn without a number is a track of its own, in whichever layer.
     for number, line in enumerate([*loose_lines, *([each] for each in loose)], start=free):
         edits[number] = TrackEdit(number, as_text(_multi(line)))
+    _write_own(edits, _own_values(lines), written)
     return TrackEdits(tuple(edits[no] for no in sorted(edits)), known.apart)
 
 
+def _write_own(
+    edits: dict[int, TrackEdit], own: Mapping[int, Mapping[str, Any]], written: TracksWritten
+) -> None:
+    """Note the values of own columns beside what else was changed of their tracks."""
+    for no, values in own.items():
+        if no in edits and not edits[no].away:
+            edits[no] = edits[no]._replace(own=values)
+        elif no in written.segments and no not in edits:
+            edits[no] = TrackEdit(no, place=written.place(no), own=values)
+
+
+def _own_values(lines: gpd.GeoDataFrame) -> dict[int, dict[str, Any]]:
+    """What a person wrote into columns of their own, by track number."""
+    import pandas as pd
+
+    names = schema.own_columns(schema.TRACKS, lines)
+    found: dict[int, dict[str, Any]] = {}
+    if not names:
+        return found
+    rows = lines[lines["track_no"].notna()]
+    for number, *values in zip(rows["track_no"], *(rows[name] for name in names), strict=True):
+        said = {
+            name: _plain(value)
+            for name, value in zip(names, values, strict=True)
+            if not pd.isna(value)
+        }
+        if said:
+            found.setdefault(int(number), said)
+    return found
+
+
 def _change(
-    before: Sequence[Vertices], line: list[Vertices] | None, pieces: list[Vertices]
+    before: Sequence[Vertices],
+    line: list[Vertices] | None,
+    pieces: list[Vertices],
+    earlier: TrackEdit | None,
 ) -> TrackEdit | None:
     """What became of a track, or None: its number and place are not known here."""
     left = [one for one in pieces if among(one, before)]
     new = len(left) < len(pieces)
-    whole_line = line is not None and _same(line, before)
     if len(left) == len(before) and not new:
-        if whole_line:
-            return None
         if line is None:
             return TrackEdit(0)
-        return _of_drawn(before, line)
-    if not pieces or (line is None and not new):
+        change = None if _same(line, before) else _of_drawn(before, line)
+    elif not pieces or (line is None and not new):
         return TrackEdit(0)
-    return _of_drawn(before, pieces)
+    else:
+        change = _of_drawn(before, pieces)
+    if change is not None and change.cut is not None and earlier is not None:
+        # A piece of what was drawn, or of what was shortened before, is taken away.
+        return _further(earlier, change.cut, pieces if len(left) < len(before) else line or [])
+    return change
 
 
 def _of_drawn(before: Sequence[Vertices], now: list[Vertices]) -> TrackEdit:
@@ -351,17 +276,25 @@ def parts_of(text: str | None) -> list[Any]:
 
 def as_text(lines: Any) -> str:
     """Lines as WKT, to the millimetre."""
-    return str(shapely.to_wkt(lines, rounding_precision=_DECIMALS))
+    return str(shapely.to_wkt(lines, rounding_precision=DECIMALS))
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if isinstance(value, np.generic) else value
+    return value if isinstance(value, bool | int | float | str) else str(value)
 
 
 def _listed(edits: Iterable[TrackEdit]) -> list[Any]:
-    return [[*one[:3], None if one.place is None else [*one.place]] for one in edits]
+    return [
+        [*one[:3], None if one.place is None else [*one.place], one.own and dict(one.own)]
+        for one in edits
+    ]
 
 
 def _unlisted(rows: Iterable[Sequence[Any]]) -> tuple[TrackEdit, ...]:
     return tuple(
-        TrackEdit(int(no), drawn, cut, None if place is None else Place(*place))
-        for no, drawn, cut, place in rows
+        TrackEdit(int(no), drawn, cut, None if place is None else Place(*place), own)
+        for no, drawn, cut, place, own in rows
     )
 
 

@@ -18,8 +18,9 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
-from geofield.model.track_edits import TrackEdits, TracksWritten, edits_in
+from geofield.model.track_edits import TrackEdits, edits_in
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
+from geofield.model.tracks_written import TracksWritten
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

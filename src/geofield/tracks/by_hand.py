@@ -92,6 +92,8 @@ def on_layout(
             apart.append(one)
             continue
         kept.append(one._replace(track_no=at + 1))
+        if one.cut is None and one.drawn is None and not one.away:
+            continue
         if one.cut is None:
             bars.append((float(positions[at]), -np.inf, np.inf))
             whole += 1
@@ -188,7 +190,7 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
         segments=others(tracks.segments),
         gaps=others(tracks.gaps),
     )
-    return with_drawn(rest, told, clip=False)
+    return with_own(with_drawn(rest, told, clip=False), now.values())
 
 
 def with_drawn(
@@ -226,6 +228,24 @@ def with_drawn(
             met += [] if met or not inside else [BY_HAND]
             gaps.append((one.track_no, no, way, *cause_in_words(met, border=not inside)))
     return _joined(tracks, rows, gaps)
+
+
+def with_own(tracks: Tracks, edits: Iterable[TrackEdit]) -> Tracks:
+    """Tracks with what a person wrote into columns of their own."""
+    import pandas as pd
+
+    said = {one.track_no: one.own for one in edits if one.own}
+    names = dict.fromkeys(name for own in said.values() for name in own)
+    if not names:
+        return tracks
+    numbers = tracks.lines["track_no"].tolist()
+    columns = {
+        name: pd.Series([said.get(no, {}).get(name) for no in numbers], dtype=object)
+        for name in names
+    }
+    lines = tracks.lines.reset_index(drop=True)
+    values = {name: one.infer_objects().convert_dtypes() for name, one in columns.items()}
+    return replace(tracks, lines=schema.conform(schema.TRACKS, lines.assign(**values), extras=True))
 
 
 def _free(outline: Polygon | None, shapes: ObstacleShapes | None) -> Any:

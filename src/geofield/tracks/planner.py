@@ -20,7 +20,7 @@ from geofield.model.track_edits import TrackEdits
 from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
 from geofield.tracks.blocks import obstacle_shapes
-from geofield.tracks.by_hand import on_layout, with_drawn
+from geofield.tracks.by_hand import on_layout, with_drawn, with_own
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
 from geofield.tracks.fewest import fewest_tracks
@@ -220,7 +220,8 @@ def plan_tracks(
         edits=said.edits,
         **optional,
     )
-    return with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
+    tracks = with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
+    return with_own(tracks, said.edits.edits)
 
 
 def clip_shapes(
