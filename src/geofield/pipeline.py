@@ -320,7 +320,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         tracks=tracks,
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence=evidence,
-        changes=(*plan.changes, told) if told else plan.changes,
+        changes=tuple(dict.fromkeys([*plan.changes, told])) if told else plan.changes,
     )
 
 

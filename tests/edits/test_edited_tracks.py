@@ -276,6 +276,7 @@ def test_the_review_page_goes_on_with_what_was_changed_elsewhere(folder: Path) -
         tracks = session.plan.tracks
         assert tracks is not None
         assert 5 not in set(tracks.lines["track_no"])
+        assert "tracks of yours kept: 5 taken away" in session.step.notes
         whole(tracks)
         session.do({"do": "status", "no": number, "status": "rejected"})
 

@@ -160,4 +160,5 @@ def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
     notes = dict.fromkeys(
         str(each.message) for each in caught if issubclass(each.category, GeofieldWarning)
     )
-    return Step(after, command, tuple(notes))
+    kept = after.evidence.track_edits.in_words()
+    return Step(after, command, (*notes, kept) if kept else tuple(notes))
