@@ -293,8 +293,8 @@ def main() -> None:
         say(f"| **mean** | {means} |")
         say()
         say(
-            "`auto` learned from some of these sites; `field_unseen.md` has figures of sites that "
-            f"it has not seen. Flagged: {flagged}."
+            "`auto` learned from these sites, too; `field_unseen.md` has figures of models that "
+            f"have not seen the site. Flagged: {flagged}."
         )
     say()
     for kind, fields in (("plain", simulated), ("crowded", crowded)):

@@ -19,31 +19,18 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
 import outline_cases
 from outline_cases import FOLDS, LEFT_OUT, ROOT, TABLES, fold_of, left_out, sites
 
-MISSING = [k for k in range(FOLDS) if not (LEFT_OUT / f"outline_{k}.onnx").is_file()]
-
-
-def once_trained(missing):
-    """Of a test that waits for networks; when they are there, it must hold."""
-    return pytest.mark.xfail(
-        bool(missing), reason=f"networks without folds {missing} are missing", strict=True
-    )
-
-
-NETWORKS = [pytest.param(k, marks=once_trained([k] if k in MISSING else [])) for k in range(FOLDS)]
-
 
 def sites_of(fold):
     return set(facts(f"outline_{fold}", LEFT_OUT)["sites"])
 
 
-@pytest.mark.parametrize("fold", NETWORKS)
+@pytest.mark.parametrize("fold", range(FOLDS))
 def test_a_network_has_seen_all_sites_but_those_of_its_fold(fold, shared):
     known = facts(f"outline_{fold}", LEFT_OUT)
     assert known["learned_with"]["without"] == [fold, FOLDS]
     assert sites_of(fold) == {site for site in sites() if fold_of(site) != fold}
 
 
-@once_trained(MISSING)
 def test_every_site_is_left_out_exactly_once():
     """Also where the pictures and one table are not beside the checkout."""
     seen = Counter(site for fold in range(FOLDS) for site in sites_of(fold))
@@ -54,7 +41,6 @@ def test_every_site_is_left_out_exactly_once():
         }
 
 
-@once_trained(MISSING)
 def test_what_is_shipped_has_learned_from_every_site(shared):
     known = facts("outline")
     assert known["learned_with"]["without"] == [None, FOLDS]
@@ -84,12 +70,11 @@ def digests(*names):
     return {file.name: sha256(file.read_bytes()).hexdigest() for file in here}
 
 
-@pytest.mark.parametrize("fold", NETWORKS)
+@pytest.mark.parametrize("fold", range(FOLDS))
 def test_a_network_was_learned_from_the_tables_that_lie_here(fold):
     assert digests().items() <= told(f"outline_{fold}", LEFT_OUT).items()
 
 
-@once_trained(MISSING)
 @pytest.mark.parametrize("fold", [None, *range(FOLDS)])
 def test_a_ranking_was_learned_behind_the_networks_of_its_folds(fold):
     """What is shipped behind all three, table K behind the two of the other folds."""
