@@ -20,7 +20,7 @@ from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
 from geofield.formats import validate_file
-from geofield.model.track_edits import TrackEdits
+from geofield.model.track_edits import TrackEdit, TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import TracksWritten
 from geofield.plan import Plan, read_plan
@@ -325,6 +325,22 @@ def test_a_route_drives_along_a_bent_track() -> None:
             one, other = leg[-1] - leg[-2], turn[1] - turn[0]
             angle = np.degrees(np.arctan2(*one) - np.arctan2(*other))
             assert abs((angle + 180) % 360 - 180) < 6.0
+
+
+def test_what_is_known_of_a_blocked_track_waits_for_it(folder: Path) -> None:
+    """An obstacle that leaves nothing of a track takes its row, not a person's word on it."""
+    tracks = tracks_in(folder)
+    assert tracks.written is not None
+    place = tracks.written.place(3)
+    known = TrackEdits(
+        (
+            TrackEdit(3, place=place, own={"note": "wet"}),
+            TrackEdit(98, place=place, own={"note": "steep"}),
+            TrackEdit(99, drawn="MULTILINESTRING ((0 0, 1 1))"),
+        )
+    )
+    # The row of track 3 has no such column any more; the others have no row.
+    assert tracks.edits_since(known).edits == known.edits[1:]
 
 
 def test_edits_are_the_same_in_another_zone(folder: Path) -> None:

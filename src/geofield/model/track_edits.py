@@ -130,9 +130,12 @@ def edits_in(
     as_segments, loose = _by_number(segments["track_no"], segments.geometry)
     if not as_lines or not as_segments:
         return known
-    # Columns say now what they said then, or something else.
-    shapes = {no: one._replace(own=None) for no, one in known.by_number.items()}
-    edits = {no: one for no, one in shapes.items() if known.by_number[no].away or not one.away}
+    # Columns of a track that has a row are read anew: they may say something else.
+    edits = {
+        no: one._replace(own=None) if no in written.segments else one
+        for no, one in known.by_number.items()
+        if no not in written.segments or one.own is None or one.drawn or one.cut
+    }
     for no, before in written.segments.items():
         change = _change(before, as_lines.pop(no, None), as_segments.pop(no, []), edits.get(no))
         if change is not None:
@@ -176,7 +179,7 @@ def _own_values(lines: gpd.GeoDataFrame) -> dict[int, dict[str, Any]]:
         said = {
             name: _plain(value)
             for name, value in zip(names, values, strict=True)
-            if not pd.isna(value)
+            if not (pd.api.types.is_scalar(value) and pd.isna(value))
         }
         if said:
             found.setdefault(int(number), said)
