@@ -1365,6 +1365,11 @@
     </message>
     <message>
       <location filename="description.json" />
+      <source>Forget which tracks you took away, changed or drew.</source>
+      <translation>Vergessen, welche Fahrspuren Sie entfernt, geändert oder gezeichnet haben.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
       <source>Replace files that are there already.</source>
       <translation type="unfinished" />
     </message>
