@@ -334,7 +334,7 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
     tracks = plan_with_settings(
         field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid, edits=edits
     )
-    if not (len(tracks.rows()[schema.TRACKS.name]) or tracks.blocked_count or tracks.edits):
+    if not (len(tracks.rows()[schema.TRACKS.name]) or tracks.blocked_count or tracks.edits.edits):
         raise TrackError(
             f"The field of {field.area_ha:.4f} ha is smaller than one track.",
             hint="Choose a smaller spacing or headland, or check the outline.",

@@ -370,6 +370,11 @@ def test_columns_of_ones_own_stay_with_their_tracks(folder: Path, made: Simulate
         return table[table["track_no"] != 5]
 
     rewritten(file, "tracks", noted)
+    # What was only written beside a track leaves it in every layer.
+    found = exported(folder, file)
+    assert {3, 4, 6} <= found["tracks"]
+    assert found["tracks"] == found["segments"] == found["track_points"]
+    assert 5 not in found["tracks"]
     for again in (
         lambda: run(folder, made, "--overwrite"),
         lambda: geofield("tracks", file, "-o", file),

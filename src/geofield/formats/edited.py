@@ -66,6 +66,16 @@ def _driven(dataset: Dataset) -> Dataset:
     tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
     if tracks.edits_since(known) == known:
         return dataset
+    from geofield.tracks.blocks import obstacle_shapes
+    from geofield.tracks.by_hand import as_edited
+
+    shapes = obstacle_shapes(dataset.tables.get(schema.OBSTACLES.name), dataset.crs)
+    parts = shapely.get_parts(dataset.table(schema.FIELD.name).geometry.to_numpy())
+    outline = parts[0] if len(parts) == 1 else None
+    tracks = replace(tracks, shapes=shapes, outline=outline)
+    whole = as_edited(tracks, known)
+    if whole is tracks:
+        return dataset  # columns alone
     if tracks.route is not None:
         warnings.warn(
             "Tracks were edited since their route was planned: it is of before. Plan it again "
@@ -73,13 +83,6 @@ def _driven(dataset: Dataset) -> Dataset:
             TrackWarning,
             stacklevel=3,
         )
-    from geofield.tracks.blocks import obstacle_shapes
-    from geofield.tracks.by_hand import as_edited
-
-    shapes = obstacle_shapes(dataset.tables.get(schema.OBSTACLES.name), dataset.crs)
-    parts = shapely.get_parts(dataset.table(schema.FIELD.name).geometry.to_numpy())
-    outline = parts[0] if len(parts) == 1 else None
-    whole = as_edited(replace(tracks, shapes=shapes, outline=outline), known)
     tables = {**dataset.tables, **whole.tables()}
     has_points = dataset.has(schema.TRACK_POINTS.name)
     return replace(dataset, tables=tables, points=whole.point_chunks if has_points else None)

@@ -168,7 +168,7 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
         Edits that its tracks were planned with.
     """
     before, now = known.by_number, tracks.edits_since(known).by_number
-    changed = {no for no in {*before, *now} if before.get(no) != now.get(no)}
+    changed = {no for no in {*before, *now} if _shape(before.get(no)) != _shape(now.get(no))}
     if not changed or tracks.written is None:
         return tracks
     written = tracks.written.segments
@@ -191,6 +191,13 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
         gaps=others(tracks.gaps),
     )
     return with_own(with_drawn(rest, told, clip=False), now.values())
+
+
+def _shape(one: TrackEdit | None) -> TrackEdit | None:
+    """An edit without what was written beside it; None where nothing else was."""
+    if one is None or one.own is None:
+        return one
+    return one._replace(own=None) if one.drawn or one.cut else None
 
 
 def with_drawn(
