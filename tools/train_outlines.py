@@ -9,8 +9,9 @@ of the method are taken with these three, each on its own fold, and the ranking 
 them. The ``.json`` beside a network says which sites it was learned from.
 
 2 000 steps take half an hour of one core. (The network without fold 1 was trained before steps
-were compiled, which rounds differently; that without fold 0 is an earlier one of 3 600 steps, before
-fields were laid onto other ground: .750 there in four bands, where 2 000 steps with them gave .742.)
+were compiled, which rounds differently; that without fold 0 is an earlier one of 3 600 steps,
+before fields were laid onto other ground: .750 there in four bands, where 2 000 steps with such
+fields gave .742.)
 With the encoder of `pretrained` 1 400 steps reach more on sites left out than 5 500 without it
 did. What gained nothing before there was one: a picture seen in four or eight turns; the mean with
 an earlier network. With it, the deeper blocks did not learn faster; and to ask a second time with a
