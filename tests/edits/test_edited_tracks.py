@@ -361,6 +361,28 @@ def test_edits_are_the_same_in_another_zone(folder: Path) -> None:
             assert one.place == pytest.approx(other.place, abs=0.01)
 
 
+def test_what_is_written_beside_a_track_that_one_drew_stays(
+    folder: Path, made: SimulatedField
+) -> None:
+    """A copied row keeps its number, and a drawn one has none: both are tracks of their own."""
+    file = folder / "out/field.gpkg"
+
+    def drawn(table: Frame) -> Frame:
+        some = table.iloc[[2, 4]].copy()
+        some["geometry"] = some.geometry.translate(1.5, 0.5)
+        some["track_no"] = some["track_no"].where(some["track_no"] == table["track_no"].iloc[2])
+        some["note"] = ["copied", "drawn"]
+        return gpd.GeoDataFrame(pd.concat([some, table]), crs=table.crs)
+
+    rewritten(file, "tracks", drawn)
+    before = set(tracks_in(folder).lines["track_no"].dropna())
+    for _ in range(2):
+        run(folder, made, "--overwrite")
+        notes = tracks_in(folder).lines.set_index("track_no")["note"].dropna()
+        assert sorted(notes) == ["copied", "drawn"]
+        assert not before & set(notes.index)
+
+
 def test_columns_of_ones_own_stay_with_their_tracks(folder: Path, made: SimulatedField) -> None:
     file = folder / "out/field.gpkg"
 

@@ -126,8 +126,9 @@ def edits_in(
     """
     if written.are(lines, segments) and not any(one.own for one in known.edits):
         return known
-    as_lines, loose_lines = _by_number(lines["track_no"], lines.geometry, written)
-    as_segments, loose = _by_number(segments["track_no"], segments.geometry)
+    parts, row_of, loose_rows = _rows_by_number(lines, written)
+    as_lines = {no: parts[row] for no, row in row_of.items()}
+    as_segments, loose = _segments_by_number(segments)
     if not as_lines or not as_segments:
         return known
     # Columns of a track that has a row are read anew: they may say something else.
@@ -144,14 +145,16 @@ def edits_in(
             # A track that was added and is taken away is forgotten.
             if place is not None or not change.away:
                 edits[no] = change._replace(track_no=no, place=place)
-    for no, drawn in (as_segments | as_lines).items():
+    for no, shape in (as_segments | as_lines).items():
         place = edits[no].place if no in edits else None
-        edits[no] = TrackEdit(no, as_text(_multi(drawn)), place=place)
+        edits[no] = TrackEdit(no, as_text(_multi(shape)), place=place)
     free = max([*edits, *written.segments, 0]) + 1
     # A piece drawn without a number is a track of its own, in whichever layer.
-    for number, line in enumerate([*loose_lines, *([each] for each in loose)], start=free):
-        edits[number] = TrackEdit(number, as_text(_multi(line)))
-    _write_own(edits, _own_values(lines), written)
+    row_of |= dict(enumerate(loose_rows, start=free))
+    drawn = [*(parts[row] for row in loose_rows), *([each] for each in loose)]
+    edits |= {no: TrackEdit(no, as_text(_multi(one))) for no, one in enumerate(drawn, start=free)}
+    own = _own_values(lines)
+    _write_own(edits, {no: own[row] for no, row in row_of.items() if row in own}, written)
     return TrackEdits(tuple(edits[no] for no in sorted(edits)), known.apart)
 
 
@@ -167,22 +170,19 @@ def _write_own(
 
 
 def _own_values(lines: gpd.GeoDataFrame) -> dict[int, dict[str, Any]]:
-    """What a person wrote into columns of their own, by track number."""
+    """What a person wrote into columns of their own, by the position of the row."""
     import pandas as pd
 
     names = schema.own_columns(schema.TRACKS, lines)
     found: dict[int, dict[str, Any]] = {}
-    if not names:
-        return found
-    rows = lines[lines["track_no"].notna()]
-    for number, *values in zip(rows["track_no"], *(rows[name] for name in names), strict=True):
+    for row, values in enumerate(zip(*(lines[name] for name in names), strict=True)):
         said = {
             name: _plain(value)
             for name, value in zip(names, values, strict=True)
             if not (pd.api.types.is_scalar(value) and pd.isna(value))
         }
         if said:
-            found.setdefault(int(number), said)
+            found[row] = said
     return found
 
 
@@ -225,36 +225,53 @@ def _further(earlier: TrackEdit, cut: str, left: list[Vertices]) -> TrackEdit:
     return TrackEdit(0, cut=as_text(shapely.MultiLineString(pieces)))
 
 
-def _by_number(
-    track_no: Any, lines: Any, written: TracksWritten | None = None
-) -> tuple[dict[int, list[Vertices]], list[Any]]:
-    """Vertices of lines and of the parts of lines by track number, and of those without one.
+def _rows_by_number(
+    lines: gpd.GeoDataFrame, written: TracksWritten
+) -> tuple[dict[int, list[Vertices]], dict[int, int], list[int]]:
+    """Parts of the rows of tracks by their position; rows by track number; those without one.
 
-    A copied row has the number of the one that it was copied from: of several rows of tracks with
-    one number, that which is as written has it, or else the first.
+    A copied row has the number of the one that it was copied from: of several rows with one
+    number, that which is as written has it, or else the first.
     """
-    shapes = np.asarray(lines, dtype=object)
-    numbers = np.asarray(track_no, dtype="float64")
-    found: dict[int, list[Vertices]] = {}
-    loose: list[Any] = []
-    for number, shape in zip(numbers.tolist(), shapes, strict=True):
-        parts = [shapely.get_coordinates(one) for one in shapely.get_parts(shape)]
-        parts = [one for one in parts if len(one) > 1]
-        no = 0 if np.isnan(number) else int(number)
-        if not parts:
-            continue
+    parts = {row: one for row, one in enumerate(map(_parts, lines.geometry)) if one}
+    numbers = _numbered(lines)
+    row_of: dict[int, int] = {}
+    loose: list[int] = []
+    for row, one in parts.items():
+        no = numbers[row]
         if no < 1:
-            loose += parts if written is None else [parts]
-        elif written is None:
-            found.setdefault(no, []).extend(parts)
-        elif no not in found:
-            found[no] = parts
-        elif _same(parts, written.segments.get(no, ())):
-            loose.append(found[no])
-            found[no] = parts
+            loose.append(row)
+        elif no not in row_of:
+            row_of[no] = row
+        elif _same(one, written.segments.get(no, ())):
+            loose.append(row_of[no])
+            row_of[no] = row
         else:
-            loose.append(parts)
-    return found, loose
+            loose.append(row)
+    return parts, row_of, loose
+
+
+def _segments_by_number(
+    segments: gpd.GeoDataFrame,
+) -> tuple[dict[int, list[Vertices]], list[Vertices]]:
+    """Vertices of segments by track number, and of those without one."""
+    found: dict[int, list[Vertices]] = {}
+    loose: list[Vertices] = []
+    for no, shape in zip(_numbered(segments), segments.geometry, strict=True):
+        (loose if no < 1 else found.setdefault(no, [])).extend(_parts(shape))
+    return {no: parts for no, parts in found.items() if parts}, loose
+
+
+def _numbered(rows: gpd.GeoDataFrame) -> list[int]:
+    """The track numbers of rows, 0 where there is none."""
+    numbers = rows["track_no"].to_numpy("float64", na_value=np.nan)
+    return [int(no) for no in np.nan_to_num(numbers)]
+
+
+def _parts(shape: Any) -> list[Vertices]:
+    """The vertices of the parts of a line."""
+    parts = (shapely.get_coordinates(one) for one in shapely.get_parts(shape))
+    return [one for one in parts if len(one) > 1]
 
 
 def _same(some: Sequence[Vertices], others: Sequence[Vertices]) -> bool:
