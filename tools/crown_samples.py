@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from crown_pictures import site_of
 from crown_targets import targets
+from lossy import through_jpeg
 from scipy.spatial.distance import cdist
 from standing_things import place_things
 
@@ -226,19 +227,9 @@ def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
         image = image + noise * np.float32(rng.uniform(0.5, 7))
     image = np.clip(image, 0, 255)
     if rng.random() < 0.35:
-        image = jpeg(rng, image)
+        stored = through_jpeg(np.rint(image).astype(np.uint8), int(rng.integers(25, 95)))
+        image = stored.astype(np.float32)
     return np.ascontiguousarray(np.rint(image), dtype=np.float32)
-
-
-def jpeg(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
-    """Return the picture after it was stored with losses, near infrared on its own."""
-    quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 95))]
-    eight = np.rint(image).astype(np.uint8)
-    visible = cv2.imdecode(cv2.imencode(".jpg", eight[..., :3], quality)[1], cv2.IMREAD_COLOR)
-    infrared = cv2.imdecode(
-        cv2.imencode(".jpg", np.ascontiguousarray(eight[..., 3]), quality)[1], cv2.IMREAD_GRAYSCALE
-    )
-    return np.dstack([np.asarray(visible), np.asarray(infrared)]).astype(np.float32)
 
 
 def shade(rng: np.random.Generator, side: int) -> np.ndarray:

@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 import shapely
 from learned_with import LEFT_OUT
+from lossy import through_jpeg
 from rasterio.features import rasterize
 
 from geofield.field.learned import Learned
@@ -192,7 +193,8 @@ def other(case: Case, kind: str) -> Case:
         grey = np.clip(np.rint(scene.grey), 0, 255).astype(np.uint8)
         scene = replace(scene, bands=grey[None], roles=("grey",))
     elif kind.startswith("JPEG"):
-        scene = replace(scene, bands=jpeg(scene.bands, int(kind.split()[1])))
+        stored = through_jpeg(np.moveaxis(scene.bands, 0, -1), int(kind.split()[1]))
+        scene = replace(scene, bands=np.ascontiguousarray(np.moveaxis(stored, -1, 0)))
     elif kind == "haze":
         scene = replace(scene, bands=np.rint(0.65 * bands + 0.35 * 205).astype(np.uint8))
     elif kind == "contrast":
@@ -200,18 +202,6 @@ def other(case: Case, kind: str) -> Case:
     else:
         raise ValueError(kind)
     return replace(case, name=f"{case.name} {kind}", mark=f"{case.mark} {kind}", scene=scene)
-
-
-def jpeg(bands: np.ndarray, quality: int) -> np.ndarray:
-    """Bands through JPEG, as tiles are: colours together, near infrared by itself."""
-    settings = [cv2.IMWRITE_JPEG_QUALITY, quality]
-    colour = np.ascontiguousarray(np.moveaxis(bands[:3], 0, -1)[..., ::-1])
-    back = np.asarray(cv2.imdecode(cv2.imencode(".jpg", colour, settings)[1], cv2.IMREAD_COLOR))
-    layers = [np.moveaxis(back[..., ::-1], -1, 0)]
-    for band in bands[3:]:
-        grey = cv2.imencode(".jpg", np.ascontiguousarray(band), settings)[1]
-        layers.append(np.asarray(cv2.imdecode(grey, cv2.IMREAD_GRAYSCALE))[None])
-    return np.concatenate(layers)
 
 
 def middle_of_error(

@@ -31,6 +31,12 @@ fifth less time and loses less to JPEG (quality 30 in colour .047; the shipped f
 many trees are driven through (14, 18 and 22 %; 14, 17 and 23) at less ground lost (2.2, 1.9 and
 2.8 %; 2.5, 2.9 and 3.4). But places are less exact (within 6 px in colour .748 of the areas for
 .787) and certainty errs more (.043, .043, .024; .031, .021, .032), which tests hold it to.
+
+To show the shipped one the picture enlarged by a quarter, once, finds more on sites left out (.760,
+.747 and .687 for .755, .741 and .680) in four fifths of the time, but less in JPEG (on every third
+chip .691 for .697 in colour at quality 60, .648 for .659 at 30), where more ground was lost for as
+many trees (quality 85, colour: 3.7 and 2.9 %). One look as it is and one enlarged come out as two
+as it is by a driver's figures, and take a quarter longer.
 """
 
 from __future__ import annotations
