@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import shapely
+from lossy import through_jpeg
 from numpy.typing import NDArray
 from outline_cases import Case
 from scipy import ndimage
@@ -18,6 +19,8 @@ from geofield.field.network import ANSWER_PX, SIDE_PX, normalised, points_maps
 FloatArray = NDArray[np.float32]
 #: Shares of pictures without near infrared and without colour.
 NO_NIR, GREY = 0.33, 0.2
+#: Share of the pictures that show the field large, and the least side of such, pixels.
+NEAR, LEAST_NEAR_PX = 0.35, 64
 #: How much around a field comes along onto other ground, pixels.
 LEAST_VERGE_PX, MOST_VERGE_PX = 3, 30
 
@@ -63,16 +66,23 @@ def picture_of(case: Case, side_px: int | None = None) -> Picture:
 
 
 def turned(
-    picture: Picture, rng: np.random.Generator
+    picture: Picture, rng: np.random.Generator, near: float = NEAR
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]:
-    """Bands (rows, columns, 4), mask and valid pixels of a picture turned, mirrored, scaled."""
+    """Bands (rows, columns, 4), mask and valid pixels of a picture turned, mirrored, scaled.
+
+    A share of them, ``near``, shows the field as the second look at it does.
+    """
     bands = np.ascontiguousarray(np.moveaxis(picture.bands, 0, -1))
     at = 1 if len(picture.masks) > 1 and rng.random() < 0.25 else 0
     mask = picture.masks[at]
     rows, columns = mask.shape
-    whole = rng.random()
     scale = SIDE_PX / max(rows, columns)
-    if whole > 0.3:
+    is_near = rng.random() < near
+    if is_near:
+        y, x = np.nonzero(mask)
+        extent = max(np.ptp(x), np.ptp(y)) * rng.uniform(1.2, 2.4)
+        scale = SIDE_PX / min(max(extent, LEAST_NEAR_PX), max(rows, columns))
+    elif rng.random() > 0.3:
         scale *= math.exp(rng.uniform(math.log(0.62), math.log(2.0)))
     angle = 90.0 * int(rng.integers(4))
     if rng.random() < 0.5:
@@ -91,6 +101,9 @@ def turned(
         k = int(rng.integers(len(y)))
         pin = np.array([x[k], y[k]], float)
         target = rng.uniform(0.2, 0.8, 2) * SIDE_PX
+        if is_near:
+            pin = np.array([x.min() + x.max(), y.min() + y.max()]) / 2
+            target = rng.uniform(0.42, 0.58, 2) * SIDE_PX
         # The picture still covers most of the window.
         middle = np.array([columns, rows]) / 2
         room = max(0.0, (scale * max(rows, columns) - SIDE_PX) / 2) / scale
@@ -139,12 +152,9 @@ def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
         noise: Any = np.empty(f.shape, np.float32)
         cv2.randn(noise, (0, 0, 0, 0), (float(rng.uniform(0.5, 4)),) * 4)  # type: ignore[call-overload]
         f += noise
-    if rng.random() < 0.4:
-        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 92))]
-        u = cv2.convertScaleAbs(np.maximum(f, 0))
-        rgb = cv2.imdecode(cv2.imencode(".jpg", u[..., :3], quality)[1], cv2.IMREAD_COLOR)
-        nir = cv2.imdecode(cv2.imencode(".jpg", u[..., 3], quality)[1], cv2.IMREAD_GRAYSCALE)
-        f = np.dstack([np.asarray(rgb), np.asarray(nir)]).astype(np.float32)
+    if rng.random() < 0.5:
+        stored = through_jpeg(cv2.convertScaleAbs(np.maximum(f, 0)), int(rng.integers(20, 92)))
+        f = stored.astype(np.float32)
     return np.clip(f, 0, 255)
 
 
@@ -177,7 +187,7 @@ def laid_onto(
     bands, valid
         As given, where the field is, those of the other place around it.
     """
-    under, _, covered = turned(ground, rng)
+    under, _, covered = turned(ground, rng, near=0.0)
     verge = round(math.exp(rng.uniform(math.log(LEAST_VERGE_PX), math.log(MOST_VERGE_PX))))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * verge + 1,) * 2)
     kept = np.where(valid > 127, cv2.dilate(mask, disc), 0).astype(np.uint8)

@@ -1,6 +1,6 @@
 """Learn which of the outlines of a search is taken, and what that certainty is worth.
 
-    python tools/train_ranking.py CACHE [CACHE ...] [--write] [--processes 1]
+    python tools/train_ranking.py CACHE [CACHE ...] [--write] [--processes 1] [--add FIGURE]
 
 Learned from all fields drawn by eye, each searched with the network and the ranking that were
 learned without its site, and from simulated ones: the curves over the figures of the outlines make
@@ -16,10 +16,8 @@ CACHE keeps the searches. These follow the tables that are there, and a ranking 
 where it has led the search itself: so learn and write, search into one more CACHE, learn from both
 and write.
 
-Not the choice among the outlines is what is short, given these beliefs: the ground with the largest
-expected overlap, put together from all outlines instead of taken from one, is .750 where the choice
-is .748 on the picture of the search (fields left out, four bands); mixed with the network's own
-answer, in any share, no more.
+The ground with the largest expected overlap, put together from all outlines instead of taken from
+one, was .750 where the choice was .748 on the picture of the search (fields left out, four bands).
 """
 
 from __future__ import annotations
@@ -47,6 +45,7 @@ from geofield.field.ranking import (
     SAME_GROUND,
     WEIGHED,
     Ranking,
+    agreement,
     bends,
     exact,
     expected_overlaps,
@@ -76,6 +75,7 @@ EVIDENCE = (
     "expected_overlap",
     "belief_alike",
     "network_overlap",
+    "network_exact_overlap",
     "network_fit_of_area",
     "strength_25_above_inside",
     "inside_95_above_border",
@@ -161,7 +161,9 @@ def weighed(
     """The best outlines' order, beliefs in them, their expected overlaps and overlaps."""
     score = bent(one, ranking.mean, ranking.spread) @ ranking.slope.ravel()
     order = np.argsort(-score, kind="stable")[:WEIGHED]
-    return order, *expected_overlaps([one.polygons[k] for k in order], score[order])
+    answer = one.figures[order, one.names.index("network_exact_overlap")]
+    answered = agreement(answer, one.corrections)
+    return order, *expected_overlaps([one.polygons[k] for k in order], score[order], answered)
 
 
 def chosen(one: Searched, ranking: Ranking) -> Chosen:
@@ -217,9 +219,14 @@ def rounded(slopes: np.ndarray) -> np.ndarray:
     return slopes.round(4)
 
 
-def rankings_of(known: Sequence[Searched]) -> tuple[list[Ranking], Ranking, list[Chosen]]:
-    """Without each fold, and of all; and what those without take of their own folds."""
-    names = trained().names
+def rankings_of(
+    known: Sequence[Searched], added: Sequence[str] = ()
+) -> tuple[list[Ranking], Ranking, list[Chosen]]:
+    """Without each fold, and of all; and what those without take of their own folds.
+
+    By the figures of the shipped table, and some that it does not have yet.
+    """
+    names = tuple(dict.fromkeys((*trained().names, *added)))
     at = [known[0].names.index(name) for name in names]
     for one in known:
         one.figures = one.figures[:, at]
@@ -309,6 +316,9 @@ def main() -> None:
     parser.add_argument("caches", type=Path, nargs="+", metavar="CACHE")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--write", action="store_true")
+    parser.add_argument(
+        "--add", nargs="*", default=(), metavar="FIGURE", help="not yet in the table"
+    )
     options = parser.parse_args()
     for fold in range(FOLDS):
         left_out(fold)  # one that is missing is told before the long work
@@ -317,7 +327,7 @@ def main() -> None:
         if not cache.is_file():
             cache.write_bytes(pickle.dumps(list(all_searched(options.processes))))
         known += pickle.loads(cache.read_bytes())
-    without, whole, taken = rankings_of(known)
+    without, whole, taken = rankings_of(known, options.add)
     report(taken, without)
     if options.write:
         every = range(FOLDS)

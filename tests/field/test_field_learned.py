@@ -42,7 +42,8 @@ def several():
     likely = np.clip(surface.parted.mean(stack[0]) / 9 + 0.1, 0.02, 0.97)
     outlines = [shapely.Polygon(corners) for corners in OUTLINES]
     inside = [surface.members(ring(one)) for one in outlines]
-    said = Said(likely, surface.size_px, ((162.0, 44.0), (150.0, 5.0)), inside[1])
+    picture = likely[surface.parted.labels].astype(np.float32)
+    said = Said(likely, surface.size_px, picture, ((162.0, 44.0), (150.0, 5.0)), inside[1])
     told = said.figures(outlines, inside)
     return [
         {**measure(surface, outline, held), **more}

@@ -14,6 +14,7 @@ from geofield.field import extract_field, prepare_field
 from geofield.field.mend import mended
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.points import drawn, obeys
+from geofield.field.ranking import log_odds
 from geofield.field.refine import carried
 from geofield.field.said import Said
 from geofield.grid import Grid
@@ -121,13 +122,21 @@ def test_points_close_to_each_other_are_no_error_in_a_reduced_picture():
 
 def test_what_the_points_say_is_told_of_each_outline():
     size = np.array([10.0, 20.0, 30.0])
-    said = Said(np.array([0.9, 0.8, 0.1]), size, ((45.0, 80.0),), np.array([True, True, False]))
+    picture = np.full((160, 160), 0.1, np.float32)
+    picture[40:120, 40:120] = 0.9
+    likely, before = np.array([0.9, 0.8, 0.1]), np.array([True, True, False])
+    said = Said(likely, size, picture, ((45.0, 80.0),), before)
     both = [np.array([True, True, False]), np.array([True, False, True])]
     same, other = said.figures([SQUARE, box(0, 0, 160, 160)], both)
     assert [same["kept"], other["kept"]] == pytest.approx([1.0, 10 / 60])
     assert (same["clearance"], other["clearance"]) == (5.0, 12.0)
     assert same["network_overlap"] > other["network_overlap"]
-    first = Said(np.array([0.9, 0.8, 0.1]), size).figures([SQUARE], both[:1])[0]
+    # Pixel by pixel: what the square holds of all that is likely.
+    area, everywhere = SQUARE.area, float(picture.sum())
+    whole = 0.9 * area / (area + everywhere - 0.9 * area)
+    assert same["network_exact_overlap"] == pytest.approx(float(log_odds(whole)), abs=0.02)
+    assert same["network_exact_overlap"] > other["network_exact_overlap"]
+    first = Said(likely, size, picture).figures([SQUARE], both[:1])[0]
     assert (first["kept"], first["clearance"]) == (1.0, 12.0)
 
 

@@ -13,7 +13,7 @@ from geofield.field.ranking import expected_overlaps
 from geofield.field.refine import aligned
 from geofield.field.regions import partition
 from geofield.field.regions import regions as regions_around
-from geofield.field.search import open_ground
+from geofield.field.search import network_outlines, open_ground
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 
@@ -254,3 +254,19 @@ def test_the_weakest_border_merges_first_and_all_ends_in_one():
     assert tree.chain(0) == [0, 4, 6]
     assert tree.beside(4) == 5
     assert tree.height[4:].tolist() == [1.0, 2.0, 9.0]
+
+
+def test_what_the_network_takes_for_the_field_is_an_outline_of_its_own():
+    """A strip of 12 px, as narrow as two superpixels, and its turned-off end are kept."""
+    likely = np.full((160, 200), 0.1, np.float32)
+    likely[60:72, 20:180] = 0.9
+    likely[72:130, 20:32] = 0.8
+    likely[5:20, 5:60] = 0.9  # other ground
+    likely[64:68, 100:104] = 0.2  # a hole
+    outlines = network_outlines(likely, (50.0, 66.0))
+    truth = shapely.union(shapely.box(20, 60, 180, 72), shapely.box(20, 72, 32, 130))
+    assert outlines
+    for polygon, holes in outlines.items():
+        assert overlap(polygon, truth) > 0.97
+        assert holes.sum() == 16
+    assert network_outlines(np.full((50, 50), 0.3, np.float32), (5.0, 5.0)) == {}

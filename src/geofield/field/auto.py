@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.field.morphology import inner, plump
-from geofield.field.ranking import WEIGHED, Figures, exact, expected_overlaps, log_odds
+from geofield.field.ranking import (
+    WEIGHED,
+    Figures,
+    agreement,
+    exact,
+    expected_overlaps,
+    log_odds,
+)
 from geofield.field.refine import carried, enlarged
 from geofield.field.search import Candidate, WindowSearch, search_field
 from geofield.model import Scene
@@ -93,7 +100,9 @@ def likely_outlines(found: Sequence[Candidate], search: WindowSearch) -> list[Li
     """
     scores = np.array([one.score for one in found])
     polygons = [one.polygon for one in found]
-    belief, expected, overlap = expected_overlaps(polygons, scores)
+    answer = np.array([one.figures["network_exact_overlap"] for one in found])
+    answered = agreement(answer, int(found[0].figures["corrections"]))
+    belief, expected, overlap = expected_overlaps(polygons, scores, answered)
     ranking = search.learned.ranking
     exactness = ranking.exactness([one.figures for one in found])
     best = exact(expected, overlap, exactness, polygons)

@@ -18,7 +18,8 @@ from shapely import Polygon, affinity
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field.auto import likely_outlines
 from geofield.field.learned import Learned, shipped
-from geofield.field.network import SIDE_PX, seen
+from geofield.field.looks import seen
+from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
 from geofield.field.ranking import WEIGHED
 from geofield.field.regions import Points
