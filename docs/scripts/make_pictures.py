@@ -46,10 +46,10 @@ def wrong_outline() -> None:
     hard = SimulationSettings(
         width_px=320, height_px=320, obstacles=60, equal_brightness=True, nir=False
     )
-    made = next(gf.simulate_fields(1, 110, hard))
+    made = next(gf.simulate_fields(1, 156, hard))
     settings = gf.load_settings(overrides={"tracks": {"spacing_m": 6.0}})
     with tempfile.TemporaryDirectory() as folder:
-        plan = gf.plan_field(made.scene, lat=35.074923, lon=33.530822, settings=settings)
+        plan = gf.plan_field(made.scene, lat=35.075904, lon=33.531605, settings=settings)
         plan.write(Path(folder) / "out", formats=["gpkg"])
         _keep(Path(folder) / "out" / "map.png", "wrong_outline.jpg", width_px=900)
 
