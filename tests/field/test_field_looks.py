@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -121,3 +121,11 @@ def test_a_large_picture_is_answered_on_its_own_pixels(factor):
     row, column = np.nonzero(found > 0.5)
     assert np.mean(column) + 0.5 == pytest.approx(at[0], abs=12 / factor)
     assert np.mean(row) + 0.5 == pytest.approx(at[1], abs=12 / factor)
+
+
+def test_pixels_that_were_only_made_show_nothing_more(scene):
+    """A picture of 50 px, each made into six: its ground of 15 px is not looked at again."""
+    for times, looks in ((1, 2), (6, 1)):
+        net = Discs(45.0, 300)
+        seen(scene, times).probability([(150.0, 120.0)], [], (240, 300), 1, cast("Any", net))
+        assert len(net.asked) == looks

@@ -26,6 +26,8 @@ _KEPT_PX = 2 * SIDE_PX
 #: Side of the part that is looked at again: of the ground's extent; of the picture's, at least
 #: and at most.
 _AROUND, _LEAST, _MOST = 1.6, 0.31, 0.85
+#: The same, at least, in pixels that the picture came with: of fewer nothing more is to be seen.
+_LEAST_PX = 44
 #: What the second look counts where both were taken.
 _SECOND = 2 / 3
 
@@ -61,12 +63,15 @@ class Seen:
     valid : bool array (rows, columns)
     scale : float
         Pixels of these along one of the scene.
+    times : int
+        So many pixels of the scene were made along one that it came with.
     """
 
     rgb: FloatArray
     nir: FloatArray | None
     valid: BoolArray
     scale: float
+    times: int = 1
     _bands: dict[Square, FloatArray] = field(default_factory=dict)
 
     @property
@@ -136,7 +141,8 @@ class Seen:
             y += [row * pixel, (row + 1) * pixel]
         low = np.array([np.concatenate(x).min(), np.concatenate(y).min()])
         high = np.array([np.concatenate(x).max(), np.concatenate(y).max()])
-        side = round(max(_AROUND * float((high - low).max()), _LEAST * whole))
+        least = max(_LEAST * whole, _LEAST_PX * self.times * self.scale)
+        side = round(max(_AROUND * float((high - low).max()), least))
         if side > _MOST * whole:
             return None
         rows, columns = self.valid.shape
@@ -145,8 +151,15 @@ class Seen:
         return Square(left, top, side)
 
 
-def seen(scene: Scene) -> Seen:
-    """A scene, kept for the network's looks."""
+def seen(scene: Scene, times: int = 1) -> Seen:
+    """A scene, kept for the network's looks.
+
+    Parameters
+    ----------
+    scene : Scene
+    times : int
+        So many of its pixels were made along one that it came with.
+    """
     scale = min(1.0, _KEPT_PX / max(scene.grid.shape))
     rows, columns = (max(1, round(length * scale)) for length in scene.grid.shape)
 
@@ -159,7 +172,7 @@ def seen(scene: Scene) -> Seen:
     else:
         rgb = np.repeat(kept(scene.grey)[None], 3, axis=0)
     nir = None if scene.nir is None else kept(scene.nir)
-    return Seen(rgb, nir, kept(scene.valid) > 0.5, scale)
+    return Seen(rgb, nir, kept(scene.valid) > 0.5, scale, times)
 
 
 def _resized(band: FloatArray, size: tuple[int, int]) -> FloatArray:

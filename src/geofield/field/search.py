@@ -339,6 +339,7 @@ def search_field(
     y_px: float,
     *,
     learned: Learned | None = None,
+    times: int = 1,
 ) -> WindowSearch:
     """Make a scene ready.
 
@@ -349,6 +350,8 @@ def search_field(
         The seed, pixel coordinates.
     learned : Learned, optional
         The network and the ranking to ask; those of this package unless given.
+    times : int
+        So many pixels of the scene were made along one that it came with.
 
     Raises
     ------
@@ -370,7 +373,7 @@ def search_field(
         factor,
         surface,
         second,
-        seen(scene),
+        seen(scene, times),
         footing,
         footing != seed,
         learned or shipped(),

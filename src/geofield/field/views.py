@@ -133,7 +133,7 @@ class FieldSearch:
             seen_part = part.of(scene)
             lon, lat = self.lonlat
             seed = seen_part.pixel_of(lat=lat, lon=lon)
-            search = search_field(seen_part, *seed, learned=self.learned)
+            search = search_field(seen_part, *seed, learned=self.learned, times=part.times)
             self.views[level] = View(part, search)
         return self.views[level]
 
@@ -167,7 +167,7 @@ def _ground_goes_on(
         tuple((x / factor, y / factor) for x, y in points) for points in (include, exclude)
     )
     rows, columns = (math.ceil(length / factor) for length in scene.grid.shape)
-    likely = seen(scene).probability(belong, apart, (rows, columns), factor, network)
+    likely = seen(scene, part.times).probability(belong, apart, (rows, columns), factor, network)
     ground = np.pad(part_at(likely > 0.5, *belong[0]), 1)
     if not ground.any():
         return False
