@@ -7,7 +7,8 @@ truth by .771 instead of .752 in four bands, .767 (.745) in colour and .745 (.72
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,6 @@ class Seen:
     valid: BoolArray
     scale: float
     times: int = 1
-    _bands: dict[Square, FloatArray] = field(default_factory=dict)
 
     @property
     def whole(self) -> Square:
@@ -81,12 +81,15 @@ class Seen:
 
     def bands(self, part: Square) -> FloatArray:
         """The picture's channels in a part, (bands, SIDE_PX, SIDE_PX)."""
-        if part not in self._bands:
-            nir = None if self.nir is None else _framed(self.nir, part)
-            rgb = np.stack([_framed(band, part) for band in self.rgb])
-            valid = _framed(self.valid.astype(np.float32), part) > 0.5
-            self._bands[part] = normalised(rgb, nir, valid)
-        return self._bands[part]
+        nir = None if self.nir is None else _framed(self.nir, part)
+        rgb = np.stack([_framed(band, part) for band in self.rgb])
+        valid = _framed(self.valid.astype(np.float32), part) > 0.5
+        return normalised(rgb, nir, valid)
+
+    @cached_property
+    def _whole_bands(self) -> FloatArray:
+        """What every further point is asked with again."""
+        return self.bands(self.whole)
 
     def probability(
         self,
@@ -125,7 +128,8 @@ class Seen:
         belong, apart = (
             [part.of(x, y) for x, y in one if part.holds(x, y)] for one in (include, exclude)
         )
-        return np.asarray(network(shown(self.bands(part), belong, apart))[0, 0])
+        bands = self._whole_bands if part == self.whole else self.bands(part)
+        return np.asarray(network(shown(bands, belong, apart))[0, 0])
 
     def _near(self, odds: FloatArray, include: Points) -> Square | None:
         """The part that holds the ground at the points, unless that is most of the picture."""
