@@ -4,6 +4,8 @@ import itertools
 import json
 from dataclasses import replace
 from importlib.resources import files
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +13,15 @@ import shapely
 
 from geofield.errors import FieldError
 from geofield.field import FieldSearch, extract_field
+from geofield.field.auto import likely_outlines
 from geofield.field.border import measure
 from geofield.field.cuts import divided
 from geofield.field.learned import Learned, shipped
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
-from geofield.field.ranking import Ranking, exact, trained
+from geofield.field.ranking import Ranking, exact, log_odds, trained
 from geofield.field.regions import partition
 from geofield.field.said import Said
+from geofield.field.search import Candidate
 from geofield.field.straight import ring
 from geofield.field.surface import Surface
 from geofield.learned import Network, network
@@ -122,6 +126,31 @@ def test_of_the_likeliest_ground_the_most_exact_outline_is_taken():
     cut = shapely.Polygon([(0, 2), (2, 0), (9, 0), (9, 9), (0, 9)])
     assert exact(expected, overlap, np.array([0.42, 0.4, 9.0]), [cut, *plain[1:]]) == 1
     assert exact(expected, overlap, np.array([0.6, 0.4, 9.0]), [cut, *plain[1:]]) == 0
+
+
+@pytest.mark.parametrize(("corrections", "taken"), [(0, "answered"), (1, "believed")])
+def test_a_first_outline_agrees_with_the_network_one_after_points_with_beliefs(corrections, taken):
+    outlines = {"believed": shapely.box(0, 0, 10, 10), "answered": shapely.box(20, 0, 30, 10)}
+    answer = {"believed": 0.1, "answered": 0.9}
+    score = {"believed": 0.5, "answered": 0.0}
+    found = [
+        Candidate(
+            outline,
+            np.zeros((1, 1), bool),
+            {
+                "network_exact_overlap": float(log_odds(answer[name])),
+                "corrections": float(corrections),
+            },
+            score[name],
+        )
+        for name, outline in outlines.items()
+    ]
+    ranking = SimpleNamespace(
+        exactness=lambda some: np.zeros(len(some)), certainty=lambda what, evidence: 0.5
+    )
+    search: Any = SimpleNamespace(learned=SimpleNamespace(ranking=ranking))
+    first, *_ = likely_outlines(found, search)
+    assert first.candidate.polygon == outlines[taken]
 
 
 def test_two_names_swapped_in_the_calibration_are_noticed(figures, tmp_path):

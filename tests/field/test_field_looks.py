@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,9 +36,9 @@ class Discs:
         return ((radius - away) * 2).astype(np.float32)[None, None]
 
 
-def answer(scene, include, exclude, shape, factor, net: Any):
+def answer(scene, include, exclude, shape, factor, net: Any, times=1):
     """What a network, or what stands for one, says of a scene."""
-    return seen(scene).probability(include, exclude, shape, factor, net)
+    return seen(scene, times).probability(include, exclude, shape, factor, net)
 
 
 @pytest.fixture(scope="module")
@@ -127,5 +127,5 @@ def test_pixels_that_were_only_made_show_nothing_more(scene):
     """A picture of 50 px, each made into six: its ground of 15 px is not looked at again."""
     for times, looks in ((1, 2), (6, 1)):
         net = Discs(45.0, 300)
-        seen(scene, times).probability([(150.0, 120.0)], [], (240, 300), 1, cast("Any", net))
+        answer(scene, [(150.0, 120.0)], [], (240, 300), 1, net, times)
         assert len(net.asked) == looks

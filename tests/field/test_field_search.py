@@ -5,6 +5,7 @@ import pytest
 import shapely
 from shapely import Polygon, box
 
+from geofield.field.answer import network_outlines
 from geofield.field.border import measure as measure_inside
 from geofield.field.clearing import clear
 from geofield.field.hierarchy import merge
@@ -13,7 +14,7 @@ from geofield.field.ranking import expected_overlaps
 from geofield.field.refine import aligned
 from geofield.field.regions import partition
 from geofield.field.regions import regions as regions_around
-from geofield.field.search import network_outlines, open_ground
+from geofield.field.search import open_ground
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 

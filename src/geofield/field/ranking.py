@@ -173,17 +173,17 @@ def expected_overlaps(
     return belief, expected, overlap
 
 
-def agreement(log_odds: FloatArray, corrections: int) -> FloatArray | None:
+def agreement(answer: FloatArray, corrections: int) -> FloatArray | None:
     """Overlaps with the network's answer, None where points correct what was found before.
 
     Parameters
     ----------
-    log_odds : float array (outlines,)
-        The figure ``network_exact_overlap``.
+    answer : float array (outlines,)
+        The figure ``network_exact_overlap``, log odds.
     corrections : int
         What the points say of the outline before them counts more than the answer to them.
     """
-    return None if corrections else np.asarray(expit(log_odds))
+    return None if corrections else np.asarray(expit(answer))
 
 
 def _small_masks(polygons: Sequence[Polygon]) -> NDArray[np.float32]:

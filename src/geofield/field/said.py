@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.answer import exact_overlaps
 from geofield.field.ranking import log_odds
 
 BoolArray = NDArray[np.bool_]
@@ -60,7 +61,7 @@ class Said:
         """
         figures = {
             **self._shares(np.array(inside)),
-            "network_exact_overlap": self._exact_overlap(polygons),
+            "network_exact_overlap": log_odds(exact_overlaps(self.picture, polygons)),
             "clearance": self._clearance(polygons),
             "corrections": np.full(len(polygons), float(len(self.corrections))),
         }
@@ -90,26 +91,6 @@ class Said:
             # Whole where nothing was taken before.
             "kept": np.ones_like(area) if self.before is None else kept / (area + earlier - kept),
         }
-
-    def _exact_overlap(self, polygons: Sequence[Polygon]) -> FloatArray:
-        """Agreement with the network's answer pixel by pixel: superpixels are too coarse for it."""
-        import cv2
-
-        everywhere = float(self.picture.sum())
-        found = np.empty(len(polygons))
-        for at, polygon in enumerate(polygons):
-            corners = shapely.get_coordinates(polygon.exterior)
-            (left, top), (right, bottom) = corners.min(axis=0), corners.max(axis=0)
-            x, y = max(int(left), 0), max(int(top), 0)
-            part = self.picture[y : int(bottom) + 1, x : int(right) + 1]
-            mask = np.zeros(part.shape, np.uint8)
-            # OpenCV counts from pixel centres, in sixteenths.
-            cv2.fillPoly(
-                mask, [np.rint((corners - (x, y) - 0.5) * 16).astype(np.int32)], 1, shift=4
-            )
-            common = float(part[mask > 0].sum())
-            found[at] = common / max(polygon.area + everywhere - common, 1.0)
-        return log_odds(found)
 
     def _clearance(self, polygons: Sequence[Polygon]) -> FloatArray:
         """How far borders keep from the nearest correction, pixels, up to a bound."""

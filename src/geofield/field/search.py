@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
+from geofield.field.answer import network_outlines
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
 from geofield.field.learned import Learned, shipped
 from geofield.field.looks import Seen, seen
 from geofield.field.mend import mended
-from geofield.field.morphology import filled
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.points import EXACT_PX, drawn, obeys
 from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures
@@ -38,7 +38,6 @@ from geofield.field.regions import (
     regions,
 )
 from geofield.field.said import Said
-from geofield.field.segmentation import part_at
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
 from geofield.model import Scene
@@ -299,27 +298,6 @@ class WindowSearch:
             figures = measure(self.surface, polygon, inside)
             self.known[polygon] = Held(polygon, holes, inside, figures)
         return self.known[polygon]
-
-
-def network_outlines(
-    likely: NDArray[np.float32], seed_px: tuple[float, float]
-) -> dict[Polygon, BoolArray]:
-    """Straight outlines of what the network takes for the field, with what was filled in them.
-
-    Regions of superpixels follow the picture's borders and lose what is narrow: over 128 fields of
-    sites left out the network's answer overlaps by .769, straight or not, and the superpixels that
-    it takes by .725, tidied and straight by .753.
-    """
-    if not (likely > 0.5).any():
-        return {}
-    part = part_at(likely > 0.5, *seed_px)
-    whole = filled(part)
-    found = {}
-    for tolerance_px in (_TOLERANCE_PX, 0.5 * _TOLERANCE_PX):
-        with suppress(FieldError):
-            outline = straight_outline(whole, tolerance_px=tolerance_px)
-            found[Polygon(outline.exterior)] = whole & ~part
-    return found
 
 
 def _shorter(include: Points, exclude: Points) -> list[tuple[Points, Points]]:

@@ -83,10 +83,15 @@ class Surface:
 
     def members(self, vertices: FloatArray) -> BoolArray:
         """The superpixels with their centres in a polygon, given by its vertices (n, 2)."""
-        import cv2
-
-        mask = np.zeros(self.shape, np.uint8)
-        # OpenCV counts from pixel centres, in sixteenths.
-        cv2.fillPoly(mask, [np.rint((vertices - 0.5) * 16).astype(np.int32)], 1, shift=4)
         rows, columns = self.centres
-        return np.asarray(mask[rows, columns] > 0)
+        return np.asarray(covered(vertices, self.shape)[rows, columns] > 0)
+
+
+def covered(vertices: FloatArray, shape: tuple[int, int]) -> NDArray[np.uint8]:
+    """The pixels with their centres in a polygon, given by its vertices (n, 2), as ones."""
+    import cv2
+
+    mask = np.zeros(shape, np.uint8)
+    # OpenCV counts from pixel centres, in sixteenths.
+    cv2.fillPoly(mask, [np.rint((vertices - 0.5) * 16).astype(np.int32)], 1, shift=4)
+    return mask
