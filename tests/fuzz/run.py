@@ -7,11 +7,13 @@ import random
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from .corpus import Sample
@@ -76,13 +78,15 @@ def read(kind: str, what: str, target: Path, command: str, point: str) -> Outcom
     """Run a command on a file in a child process.
 
     The child is a fork of this process, which has everything imported: the files are read by
-    the command line as it is, without the second that each start would cost.
+    the command line as it is, without the second that each start would cost. What other tests
+    left in this process is no memory of the command's.
     """
     out = target.parent / "OUT"
     out.mkdir()
     log = target.parent / "said.txt"
     words = command.replace("POINT", point).split()
     words = [word.replace("FILE", str(target)).replace("OUT", str(out)) for word in words]
+    left_mb = max(_resident_mb() - _imported_mb(), 0.0)
     start = time.monotonic()
     child = os.fork()
     if child == 0:
@@ -94,10 +98,27 @@ def read(kind: str, what: str, target: Path, command: str, point: str) -> Outcom
         command,
         os.waitstatus_to_exitcode(status),
         time.monotonic() - start,
-        usage.ru_maxrss / 1024,
+        usage.ru_maxrss / 1024 - left_mb,
         log.read_text(errors="replace") if log.exists() else "",
         tuple(path.name for path in out.iterdir()),
     )
+
+
+def _resident_mb() -> float:
+    """What a child inherits of this process at once."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 2**20
+
+
+@cache
+def _imported_mb() -> float:
+    """What a process takes that has just begun and imported everything."""
+    code = (
+        "import resource, geofield.cli.main;"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return float(said.stdout)
 
 
 def _wait(child: int) -> tuple[int, resource.struct_rusage]:

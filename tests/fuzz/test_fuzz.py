@@ -5,6 +5,7 @@ This is the short run; `benchmarks/fuzz.py` damages 2 000 files.
 
 from __future__ import annotations
 
+import sys
 import warnings
 from pathlib import Path
 
@@ -62,3 +63,23 @@ def test_hostile_files(corpus: tuple[list[Sample], str], tmp_path: Path) -> None
                 found.append((sample.kind, command, outcome.faults))
     assert not found
     assert not list(tmp_path.rglob("escaped.txt"))
+
+
+def test_memory_is_the_commands_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither does what other tests left here count, nor is what the command takes overlooked."""
+
+    def greedy(words: list[str]) -> None:
+        assert len(bytearray(b"x") * (int(words[0]) << 20))
+
+    monkeypatch.setattr(sys.modules["geofield.cli.main"], "main", greedy)
+    left = bytearray(b"x") * (1100 << 20)
+    outcomes = []
+    for megabytes in (10, 1100):
+        place = tmp_path / str(megabytes)
+        place.mkdir()
+        outcomes.append(read("", "", place / "file", str(megabytes), ""))
+    assert len(left) == 1100 << 20
+    little, much = outcomes
+    assert not [fault for fault in little.faults if fault.endswith(" MB")]
+    assert much.code == 0
+    assert [fault for fault in much.faults if fault.endswith(" MB")]
