@@ -154,17 +154,24 @@ def test_a_first_outline_agrees_with_the_network_one_after_points_with_beliefs(c
 
 
 def test_two_names_swapped_in_the_calibration_are_noticed(figures, tmp_path):
-    evidence = {**figures, "expected_overlap": 1.3, "belief_alike": 0.6, "belief_same": 0.4}
-    for what, weights in trained().calibration.items():
+    beliefs = {"expected_overlap": 1.3, "belief_alike": 0.6, "belief_same": 0.4}
+    questions = [
+        (kind, what, weights)
+        for kind, of_kind in trained().calibration.items()
+        for what, weights in of_kind.items()
+    ]
+    assert len(questions) == 6
+    for kind, what, weights in questions:
+        evidence = {**figures, **beliefs, "corrections": 2.0 * (kind == "corrected")}
         right = trained().certainty(what, evidence)
         for one, other in itertools.combinations(weights.keys() - {"constant"}, 2):
 
-            def swap(known, what=what, one=one, other=other):
-                told = known["calibration"][what]
+            def swap(known, kind=kind, what=what, one=one, other=other):
+                told = known["calibration"][kind][what]
                 told[one], told[other] = told[other], told[one]
 
             again = table(tmp_path, swap).certainty(what, evidence)
-            assert abs(again - right) > 1e-6, (what, one, other)
+            assert abs(again - right) > 1e-6, (kind, what, one, other)
 
 
 def of_parts(known):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -55,8 +56,8 @@ def test_rankings_without_different_folds_are_different():
             assert one.names == other.names
             assert not np.array_equal(one.slope, other.slope)
             assert not np.array_equal(one.edge, other.edge)
-            for what in ("field", "ground", "border"):
-                assert one.calibration[what] != other.calibration[what]
+            for kind, what in product(("first", "corrected"), ("field", "ground", "border")):
+                assert one.calibration[kind][what] != other.calibration[kind][what]
 
 
 def told(name, folder):

@@ -20,7 +20,7 @@ _SMALL_M2 = 400.0
 _COARSE_M = 3.0
 #: From this score on an outline is used without a warning. The score is the probability of a
 #: good outline, lowered for what that probability knows nothing of.
-TRUSTED = 0.6
+TRUSTED = 0.65
 
 
 def judge(

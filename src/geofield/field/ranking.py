@@ -63,7 +63,8 @@ class Ranking:
         Everywhere; above the upper bend; below the lower one. For which ground is meant; and for
         where exactly it ends.
     calibration : mapping
-        By what is asked (see `certainty`): weights of named evidence.
+        By whether points corrected the outline, and by what is asked (see `certainty`): weights
+        of named evidence.
     """
 
     names: tuple[str, ...]
@@ -71,7 +72,7 @@ class Ranking:
     spread: FloatArray
     slope: FloatArray
     edge: FloatArray
-    calibration: Mapping[str, Mapping[str, float]]
+    calibration: Mapping[str, Mapping[str, Mapping[str, float]]]
 
     def scores(self, outlines: Sequence[Figures]) -> FloatArray:
         """Scores of outlines; only differences mean something."""
@@ -95,12 +96,17 @@ class Ranking:
             piece of ground) or ``border`` (93 %: its border, too).
         evidence : mapping
         """
-        weights = self.calibration[what]
+        weights = self.calibration[asked(evidence["corrections"])][what]
         total = weights["constant"]
         for name, weight in weights.items():
             if name != "constant":
                 total += weight * evidence[name]
         return float(expit(total))
+
+
+def asked(corrections: float) -> str:
+    """Of which question an outline is the answer: figures of the two are worth different things."""
+    return "corrected" if corrections else "first"
 
 
 def bends(standard: FloatArray) -> FloatArray:
