@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 CELL_PX = 2
-SPREAD_CELLS = 1.1
+SPREAD_CELLS = 1.5
 """Of the slope around a centre: how much less wrong an answer beside it is."""
-NEAR_CELLS = 1.6
+NEAR_CELLS = 2.3
 """Offsets and radius are asked for this near to a centre."""
 
 

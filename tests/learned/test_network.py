@@ -17,6 +17,7 @@ from geofield.field.looks import seen
 from geofield.field.network import shown
 from geofield.learned import facts, network
 from geofield.obstacles.crowns import (
+    ALIGN_PX,
     CELL_PX,
     OVERLAP_PX,
     REACH_CELLS,
@@ -31,13 +32,34 @@ def crowns():
     return network("crowns")
 
 
+CORNER_PX, SIDE_PX = 80, 160
+
+
 @pytest.fixture(scope="module")
-def picture(simulated):
-    """A part of a simulated field with trees, normalised."""
+def factor(simulated):
+    """Pixels of the simulated field along one that the network sees."""
+    from geofield.obstacles.picture import working_factor
+
+    return working_factor(simulated.scene.grid.ground_resolution_m)
+
+
+@pytest.fixture(scope="module")
+def picture(simulated, factor):
+    """A part of a simulated field with trees, normalised, as the network sees it."""
     from geofield.obstacles.picture import tone_of, working_bands
 
-    part = simulated.scene.crop(80, 80, 160, 160)
-    return working_bands(part, tone_of(simulated.scene), 1.0)
+    part = simulated.scene.crop(CORNER_PX, CORNER_PX, SIDE_PX, SIDE_PX)
+    return working_bands(part, tone_of(simulated.scene), factor)
+
+
+@pytest.fixture(scope="module")
+def trees(simulated, factor):
+    """x, y and radius of the trees in that part, not on its border, pixels that are seen."""
+    every = simulated.obstacles[["x_px", "y_px", "radius_px"]].to_numpy()
+    every = every - [CORNER_PX, CORNER_PX, 0]
+    inner = (every[:, :2] > 8) & (every[:, :2] < SIDE_PX - 8)
+    assert inner.all(axis=1).sum() >= 2
+    return every[inner.all(axis=1)] / factor
 
 
 def test_every_channel_of_the_network_has_a_part(crowns, picture):
@@ -51,13 +73,12 @@ def test_every_channel_of_the_network_has_a_part(crowns, picture):
             assert change > 0.05, (one, other)
 
 
-def test_outputs_are_what_their_names_say(crowns, picture, simulated):
-    named = crowns.named(crowns.stacked(**picture))
+def test_outputs_are_what_their_names_say(crowns, picture, trees):
+    batch = crowns.stacked(**picture)
+    fill = [(0, 0), (0, 0), *((0, -length % ALIGN_PX) for length in batch.shape[2:])]
+    named = crowns.named(np.pad(batch, fill, mode="edge"))
     assert tuple(named) == crowns.outputs
-    trees = simulated.obstacles[["x_px", "y_px", "radius_px"]].to_numpy() - [80, 80, 0]
-    inner = (trees[:, :2] > 8).all(axis=1) & (trees[:, :2] < 152).all(axis=1)
-    assert inner.sum() >= 2
-    for x, y, radius in trees[inner]:
+    for x, y, radius in trees:
         at = int(y // 2), int(x // 2)
         near = np.s_[at[0] - 2 : at[0] + 3, at[1] - 2 : at[1] + 3]
         assert named["centre"][near].max() > named["centre"].mean() + 3
@@ -82,10 +103,8 @@ def noticed(named, trees):
     )
 
 
-def test_every_output_of_the_network_has_a_part(crowns, picture, simulated, monkeypatch):
+def test_every_output_of_the_network_has_a_part(crowns, picture, trees, monkeypatch):
     """Two outputs swapped in the model's description change what is found, whichever they are."""
-    trees = simulated.obstacles[["x_px", "y_px", "radius_px"]].to_numpy() - [80, 80, 0]
-    trees = trees[((trees[:, :2] > 8) & (trees[:, :2] < 152)).all(axis=1)]
     right = noticed(answers(picture), trees)
     assert (right[0] < 3).all()
     assert (np.abs(right[1]) < 0.35).all()

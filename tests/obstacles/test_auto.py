@@ -13,7 +13,9 @@ from geofield.errors import ObstacleError, ObstacleWarning
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.obstacles.costs import thresholds
+from geofield.obstacles.crowns import ALIGN_PX
 from geofield.obstacles.detect import STRATEGIES
+from geofield.obstacles.picture import WORKING_RESOLUTION_M, working_factor
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -90,31 +92,28 @@ def test_a_crown_that_leans_in_from_outside_is_driven_around(simulated):
 
 
 @pytest.mark.parametrize("core_px", [96, 160])
-def test_results_do_not_depend_on_the_window(simulated, monkeypatch, core_px):
-    whole = gf.detect_obstacles(simulated.scene, simulated.field)
+@pytest.mark.parametrize("resolution_m", [0.17, 0.3, 0.6, 0.9, 1.3])
+def test_results_do_not_depend_on_the_window(resolution_m, monkeypatch, core_px):
+    """Windows start on whole pixels of the picture and of the working grid."""
+    size = round(200 / resolution_m)
+    settings = SimulationSettings(width_px=size, height_px=size, resolution_m=resolution_m)
+    made = simulate_field(3, settings)
+    whole = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15))
     monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
-    parts = gf.detect_obstacles(simulated.scene, simulated.field)
+    parts = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15))
     assert len(whole) == len(parts) > 5
     for column in ("x_px", "y_px", "radius_px", "confidence"):
         assert parts[column].to_numpy() == pytest.approx(
-            whole[column].to_numpy(), abs=2e-3, nan_ok=True
+            whole[column].to_numpy(), abs=1e-6, nan_ok=True
         )
 
 
-def test_trees_lie_in_the_same_place_where_windows_begin_between_working_pixels(monkeypatch):
-    coarse = SimulationSettings(width_px=260, height_px=260, resolution_m=1.3, obstacles=30)
-    made = simulate_field(3, coarse)
-    places = []
-    for core_px in (1024, 160):
-        monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
-        found = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15), others=False)
-        places.append(found[["x_px", "y_px"]].to_numpy())
-    whole, parts = places
-    nearest = np.hypot(*(parts[:, None] - whole).T).argmin(axis=0)
-    away = parts - whole[nearest]
-    away = away[np.hypot(*away.T) < 1.0]
-    assert len(away) > 20
-    assert np.hypot(*away.T).mean() < 0.12
+@pytest.mark.parametrize("resolution_m", [0.036, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 1.0, 1.7, 2.4, 10])
+def test_the_working_grid_is_near_what_the_network_learned(resolution_m):
+    factor = working_factor(resolution_m)
+    assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.15
+    if resolution_m < 2:
+        assert (ALIGN_PX * factor).is_integer()
 
 
 @pytest.mark.parametrize("core_px", [1024, 96])

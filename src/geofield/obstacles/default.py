@@ -42,7 +42,7 @@ Progress = Callable[[int, int, str], None]
 Polarity = Literal["dark", "bright", "both"]
 FloatArray = NDArray[np.float64]
 
-CORE_PX = 1024
+CORE_PX = 1408
 """Side of a window without its overlap, working pixels."""
 _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""
@@ -186,12 +186,12 @@ def _look(
             bands = working_bands(scene, tone, factor)
             named = answers(bands)
             here = _candidates(named, bands, scene.valid, factor, polarity)
-            # A window starts on a whole pixel of the picture, seldom on one of the working grid.
             start = window.col / factor, window.row / factor
             here = here.scaled(1.0, *start)
             crowns = crowns.joined(here.take(_in_core(here, window, factor)))
-            region = search_region(scene, area)
-            seen_px += int(region[window.core_slices].sum())
+            region = np.zeros(scene.valid.shape, dtype=bool)
+            region[window.core_slices] = search_region(scene, area)[window.core_slices]
+            seen_px += int(region.sum())
             if standing is not None:
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
                 standing.fill(named["other"], cells, *(round(each / CELL_PX) for each in start))

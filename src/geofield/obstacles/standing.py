@@ -17,18 +17,20 @@ from skimage.filters import apply_hysteresis_threshold
 
 from geofield.model.circles import Circles
 from geofield.obstacles.crowns import CELL_PX
+from geofield.obstacles.picture import WORKING_RESOLUTION_M
 from geofield.raster import Image
 
 MAX_CELLS = 100e6
 """Larger fields are searched for trees alone, for their cells would not fit into memory."""
 RIM = 0.5
 """A thing reaches as far as its cells are at least this share of its clearest ones."""
-BORDER_CELLS, DEEP_CELLS = 2.5, 7.5
-"""What begins within 3 m of the field's border and ends within 9 m is the border: a road's edge,
-a ditch, the neighbour's wall."""
+BORDER_M, DEEP_M = 3.0, 9.0
+"""What begins so near to the field's border and ends so near is the border: a road's edge, a ditch,
+the neighbour's wall."""
 _EXPLAINED, _CROWN_REACH = 0.5, 1.2
 """Of a thing's cells within so many radii of a tree: then it is the tree, or its shade."""
-_CLEAR_CELLS = 3
+_CLEAR_CELLS = 5
+CELL_M = CELL_PX * WORKING_RESOLUTION_M
 
 
 @dataclass(slots=True)
@@ -64,7 +66,7 @@ class StandingMap:
         if c0 < c1 and r0 < r1:
             part = np.s_[row + r0 - self.row : row + r1 - self.row,
                          col + c0 - self.col : col + c1 - self.col]  # fmt: skip
-            # Where windows overlap they agree, but for those whose region ends there.
+            # Regions do not overlap; elsewhere a window has nothing to say.
             np.maximum(self.cells[part], values[r0:r1, c0:c1], out=self.cells[part])
 
     def things(
@@ -100,7 +102,7 @@ class StandingMap:
             if float(known[where][part].mean()) >= _EXPLAINED:
                 continue
             deep = depth[where][part]
-            if float(deep.min()) <= BORDER_CELLS and float(deep.max()) <= DEEP_CELLS:
+            if deep.min() * CELL_M <= BORDER_M and deep.max() * CELL_M <= DEEP_M:
                 continue
             clearest = np.sort(p[where][part])[-_CLEAR_CELLS:]
             thing = part & (p[where] >= RIM * float(clearest.mean()))
