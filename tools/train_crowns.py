@@ -13,8 +13,8 @@ The file that is shipped was trained by PyTorch 2.13 in two runs from the one be
 on sites left out .755, .739 and .679 in four bands, colour and grey, looking twice at the picture
 in its own pixels): 4 500 steps with lessons enlarged by a quarter (``--rate 8e-4``), then 6 000 as
 this file is now (``--rate 1e-3 --seed 13``). It looks once at the picture enlarged by a third:
-.765, .751 and .708. 7 000 steps enlarged by a quarter (``--rate 2e-3``) gave .767, .755 and .702, in
-JPEG of quality 30 .654 for .662 (colour, every third chip), and 8 000 more after those, with the
+.765, .751 and .708. 7 000 steps enlarged by a quarter (``--rate 2e-3``) gave .767, .755 and .702,
+in JPEG of quality 30 .654 for .662 (colour, every third chip), and 8 000 more after those, with the
 lessons as they are now, no more: .749, .734 and .690 on every third chip (the shipped one .758,
 .741 and .699). The network before, shown the picture enlarged by a quarter without having learned
 so, gave .739, .721 and .666 there, and .737, .724 and .671 in two looks.
