@@ -34,7 +34,7 @@ from geofield.evaluation import draw_reliability, match_points
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.obstacles.crowns import answers
-from geofield.obstacles.picture import tone_of, working_bands
+from geofield.obstacles.picture import tone_of, working_bands, working_factor
 from geofield.simulate import SimulationSettings, simulate_fields
 from geofield.study.phase_code import find_circles
 
@@ -202,7 +202,7 @@ def speed_rows() -> list[str]:
     )
     grid = gf.Grid(1024, 1024, tiles[0].grid.transform, tiles[0].grid.crs)
     scene = Scene(grid, pixels, tiles[0].roles, np.ones(grid.shape, bool))
-    bands = working_bands(scene, tone_of(scene), 1.0)
+    bands = working_bands(scene, tone_of(scene), working_factor(grid.ground_resolution_m))
     crop = scene.crop(100, 100, 300, 300)
     rows = [
         ("`auto`, all of it", seconds_of(lambda: gf.detect_obstacles(scene))),

@@ -71,7 +71,8 @@ def judge(
         reasons.append(f"the picture is coarse ({pixel_m:.3g} m per pixel): it may be metres off")
     if not outline_px.covers(shapely.Point(seed_px)):
         reasons.append("the point lies on something else (a tree, a road, a roof?)")
-        score -= 0.4
+        # Alone it is no warning where a person has chosen the region: see `TRUSTED`.
+        score -= 1.0 - TRUSTED
     score = max(0.0, score)
     figures = (
         ("edge_share", touching),
