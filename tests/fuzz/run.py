@@ -105,20 +105,24 @@ def read(kind: str, what: str, target: Path, command: str, point: str) -> Outcom
 
 
 def _resident_mb() -> float:
-    """What a child inherits of this process at once."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * resource.getpagesize() / 2**20
+    """What a child inherits of this process at once: pages of files come as they are touched."""
+    return _status_mb("RssAnon", Path("/proc/self/status").read_text())
 
 
 @cache
 def _imported_mb() -> float:
-    """What a process takes that has just begun and imported everything."""
-    code = (
-        "import resource, geofield.cli.main;"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
-    )
+    """What a process takes at most that has just begun and imported everything.
+
+    By its own memory: what `getrusage` tells of it holds that of the process which began it, too.
+    """
+    code = "import geofield.cli.main; print(open('/proc/self/status').read())"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return float(said.stdout)
+    return _status_mb("VmHWM", said.stdout)
+
+
+def _status_mb(name: str, status: str) -> float:
+    line = next(line for line in status.splitlines() if line.startswith(f"{name}:"))
+    return float(line.split()[1]) / 1024
 
 
 def _wait(child: int) -> tuple[int, resource.struct_rusage]:
