@@ -15,7 +15,7 @@ from geofield.model.scene import Scene
 from geofield.obstacles.costs import thresholds
 from geofield.obstacles.crowns import ALIGN_PX
 from geofield.obstacles.detect import STRATEGIES
-from geofield.obstacles.picture import WORKING_RESOLUTION_M, working_factor
+from geofield.obstacles.picture import WHOLE_PX, WORKING_RESOLUTION_M, working_factor
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -92,15 +92,16 @@ def test_a_crown_that_leans_in_from_outside_is_driven_around(simulated):
 
 
 @pytest.mark.parametrize("core_px", [96, 160])
-@pytest.mark.parametrize("resolution_m", [0.17, 0.3, 0.6, 0.9, 1.3])
+@pytest.mark.parametrize("resolution_m", [0.17, 0.3, 0.6, 0.9, 1.3, 3.0])
 def test_results_do_not_depend_on_the_window(resolution_m, monkeypatch, core_px):
     """Windows start on whole pixels of the picture and of the working grid."""
-    size = round(200 / resolution_m)
+    size = max(round(200 / resolution_m), 200)
     settings = SimulationSettings(width_px=size, height_px=size, resolution_m=resolution_m)
     made = simulate_field(3, settings)
-    whole = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15))
+    radius_m = (max(1.0, 1.65 * resolution_m), 15.0)
+    whole = gf.detect_obstacles(made.scene, made.field, radius_m=radius_m)
     monkeypatch.setattr("geofield.obstacles.default.CORE_PX", core_px)
-    parts = gf.detect_obstacles(made.scene, made.field, radius_m=(2.2, 15))
+    parts = gf.detect_obstacles(made.scene, made.field, radius_m=radius_m)
     assert len(whole) == len(parts) > 5
     for column in ("x_px", "y_px", "radius_px", "confidence"):
         assert parts[column].to_numpy() == pytest.approx(
@@ -108,12 +109,12 @@ def test_results_do_not_depend_on_the_window(resolution_m, monkeypatch, core_px)
         )
 
 
-@pytest.mark.parametrize("resolution_m", [0.036, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 1.0, 1.7, 2.4, 10])
+@pytest.mark.parametrize("resolution_m", [0.036, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 1, 1.7, 3, 6, 10])
 def test_the_working_grid_is_near_what_the_network_learned(resolution_m):
     factor = working_factor(resolution_m)
     assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.15
-    if resolution_m < 2:
-        assert (ALIGN_PX * factor).is_integer()
+    assert (WHOLE_PX * factor).is_integer()
+    assert WHOLE_PX % ALIGN_PX == 0
 
 
 @pytest.mark.parametrize("core_px", [1024, 96])

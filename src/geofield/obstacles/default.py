@@ -17,7 +17,6 @@ from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
 from geofield.model.field import Field
 from geofield.obstacles.crowns import (
-    ALIGN_PX,
     CELL_PX,
     NETWORK,
     OVERLAP_PX,
@@ -26,6 +25,7 @@ from geofield.obstacles.crowns import (
     once_each,
 )
 from geofield.obstacles.picture import (
+    WHOLE_PX,
     Picture,
     Tone,
     on_working_grid,
@@ -43,7 +43,7 @@ Polarity = Literal["dark", "bright", "both"]
 FloatArray = NDArray[np.float64]
 
 CORE_PX = 1408
-"""Side of a window without its overlap, working pixels."""
+"""Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
 _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""
 MIN_RADIUS_PX = 1.6
@@ -176,7 +176,7 @@ def _look(
     The reach is in pixels of the picture, candidates are in working pixels. Told, too, is how
     many pixels of the area have data.
     """
-    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, ALIGN_PX, factor))
+    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor))
     if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns, seen_px = Circles(), 0

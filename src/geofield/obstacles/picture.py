@@ -17,6 +17,8 @@ from geofield.raster import Image, pixel_centres, resample
 WORKING_RESOLUTION_M = 0.45
 """Ground size of a pixel of the working grid: three quarters of the pictures' that the network
 learned from, for it sees more of what is enlarged."""
+WHOLE_PX = 64
+"""Windows start at multiples of so many working pixels."""
 _AS_IT_IS = (0.87, 1.15)
 """Between these factors a picture is used as it is."""
 _OVERVIEW_PX = 1024
@@ -113,16 +115,13 @@ def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
 def working_factor(resolution_m: float) -> float:
     """Return the scene's pixels per working pixel, 1 where the picture is near enough.
 
-    Sixteenths where they are as near: then windows, which start at multiples of sixteen working
-    pixels, start on whole pixels of the picture, too, and show what the whole picture shows.
+    So many that `WHOLE_PX` working pixels are whole pixels of the picture: a window that starts
+    at a multiple of them shows what the whole picture shows.
     """
     factor = WORKING_RESOLUTION_M / resolution_m
-    sixteenths = round(16 * factor) / 16
-    low, high = _AS_IT_IS
-    for near in (1.0, sixteenths):
-        if low <= factor / max(near, 1 / 16) <= high:
-            return near
-    return factor
+    if _AS_IT_IS[0] <= factor <= _AS_IT_IS[1]:
+        return 1.0
+    return max(round(factor * WHOLE_PX), 1) / WHOLE_PX
 
 
 def working_bands(scene: Scene, tone: Tone, factor: float) -> dict[str, Image | float]:
