@@ -286,8 +286,13 @@ def test_reading_and_writing_is_no_edit(folder: Path) -> None:
     assert not plan.track_edits
     plan.write(folder / "copy", formats=["gpkg", "rdf"])
     assert not read_plan(folder / "copy/field.gpkg").track_edits
-    rewritten(folder / "out/field.gpkg", "segments", lambda t: t.iloc[::-1].assign(note="mine"))
+    rewritten(folder / "out/field.gpkg", "segments", lambda table: table.iloc[::-1])
     assert not plan_in(folder).track_edits
+    # What is written beside segments is kept, and changes no track.
+    rewritten(folder / "out/field.gpkg", "segments", lambda table: table.assign(note="mine"))
+    kept = plan_in(folder).track_edits
+    assert not kept.edits
+    assert {one.own["note"] for one in kept.beside} == {"mine"}
     rewritten(folder / "out/field.gpkg", "tracks", without(5))
     edited = plan_in(folder)
     # Written as it is, it is still known to be edited.
@@ -415,3 +420,81 @@ def test_columns_of_ones_own_stay_with_their_tracks(folder: Path, made: Simulate
     geofield("tracks", file, "-o", file)
     assert "note" not in tracks_in(folder).lines
     assert 5 not in set(tracks_in(folder).lines["track_no"])
+
+
+def test_columns_of_ones_own_stay_with_their_segments(folder: Path, made: SimulatedField) -> None:
+    """A value stands beside a piece of ground: planning may cut the tracks anew."""
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder).segments
+    cut = before[before["segment_no"] == 2]["track_no"].iloc[0]
+    lines = before.set_index(["track_no", "segment_no"]).geometry
+
+    def noted(table: Frame) -> Frame:
+        said = {(cut, 1): "wet", (cut, 2): "stones", (6, 1): "sown"}
+        keys = zip(table["track_no"], table["segment_no"], strict=True)
+        table["note"] = [said.get(key) for key in keys]
+        table["rate"] = table["track_no"].map({6: 7.5})
+        return table
+
+    def told() -> dict[tuple[int, int], str]:
+        table = tracks_in(folder).segments
+        if "note" not in table:
+            return {}
+        rows = table[table["note"].notna()]
+        keys = zip(rows["track_no"], rows["segment_no"], strict=True)
+        return dict(zip(keys, rows["note"], strict=True))
+
+    rewritten(file, "segments", noted)
+    said = {(cut, 1): "wet", (cut, 2): "stones", (6, 1): "sown"}
+    assert told() == said
+    for again in (
+        lambda: run(folder, made, "--overwrite"),
+        lambda: geofield("tracks", file, "-o", file),
+        lambda: geofield("tracks", file, "--direction", "0", "-o", file),
+        lambda: geofield("tracks", file, "--direction", "dominant", "-o", file),
+    ):
+        again()
+        table = tracks_in(folder).segments
+        if told():
+            assert told() == said
+            assert table.loc[table["rate"].notna(), "rate"].tolist() == [7.5]
+        # Another layout has none of these pieces: what was written waits.
+        assert len(read_plan(file).track_edits.beside) == 3
+    assert told() == said
+    # A track is taken away in the other layer: its segments' values go on elsewhere only.
+    rewritten(file, "tracks", lambda table: table[table["track_no"] != 6])
+    geofield("tracks", file, "-o", file)
+    assert told() == {key: note for key, note in said.items() if key[0] != 6}
+    # An emptied cell is a word, too.
+    rewritten(file, "segments", lambda table: table.assign(note=None))
+    geofield("tracks", file, "-o", file)
+    assert not told()
+    assert lines[(cut, 1)].length > 0
+
+
+def test_a_segment_that_is_cut_in_two_has_its_values_twice(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    plan = read_plan(file)
+    tracks = plan.tracks
+    assert tracks is not None
+    longest = tracks.segments.loc[tracks.segments["length_m"].idxmax()]
+    number = longest["track_no"]
+
+    def noted(table: Frame) -> Frame:
+        here = (table["track_no"] == number) & (table["segment_no"] == longest["segment_no"])
+        table["note"] = ["here" if one else None for one in here]
+        return table
+
+    rewritten(file, "segments", noted)
+    middle = longest.geometry.interpolate(0.5, normalized=True)
+
+    def stands_there(table: Frame) -> Frame:
+        post = gpd.GeoDataFrame(geometry=[middle.buffer(2.0)], crs=tracks.crs).to_crs(table.crs)
+        return pd.concat([table, post], ignore_index=True)
+
+    rewritten(file, "obstacles", stands_there)
+    geofield("tracks", file, "-o", file)
+    table = tracks_in(folder).segments
+    both = table[table["note"].notna()]
+    assert len(both) == 2
+    assert set(both["track_no"]) == {number}

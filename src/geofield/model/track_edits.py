@@ -8,7 +8,7 @@ is a word on the layout's line that it changed, and stays one while the layout h
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,8 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import reproject, transformer
+from geofield.model.own_values import own_values
+from geofield.model.segment_values import SegmentValues, values_in
 from geofield.model.tracks_written import DECIMALS, SAME_M, Place, TracksWritten, Vertices
 
 if TYPE_CHECKING:
@@ -52,13 +54,16 @@ class TrackEdits:
         By track number.
     apart : tuple of TrackEdit
         Of lines that the layout in use does not have: they wait for the one that has them.
+    beside : tuple of SegmentValues
+        What stands in columns of a person's own beside segments.
     """
 
     edits: tuple[TrackEdit, ...] = ()
     apart: tuple[TrackEdit, ...] = ()
+    beside: tuple[SegmentValues, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.edits or self.apart)
+        return bool(self.edits or self.apart or self.beside)
 
     @property
     def by_number(self) -> dict[int, TrackEdit]:
@@ -93,16 +98,23 @@ class TrackEdits:
                 for one in some
             )
 
-        return TrackEdits(all_of(self.edits), all_of(self.apart))
+        beside = tuple(
+            one._replace(line=as_text(reproject(shapely.from_wkt(one.line), source, target)))
+            for one in self.beside
+        )
+        return TrackEdits(all_of(self.edits), all_of(self.apart), beside)
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; see :meth:`from_json`."""
-        return {"edits": _listed(self.edits), "apart": _listed(self.apart)}
+        beside = [[one.line, dict(one.own)] for one in self.beside]
+        return {"edits": _listed(self.edits), "apart": _listed(self.apart), "beside": beside}
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> TrackEdits:
         """The edits that were written with :meth:`to_json`."""
-        return cls(*(_unlisted(value.get(name, ())) for name in ("edits", "apart")))
+        edits, apart = (_unlisted(value.get(name, ())) for name in ("edits", "apart"))
+        beside = tuple(SegmentValues(str(line), own) for line, own in value.get("beside", ()))
+        return cls(edits, apart, beside)
 
 
 def edits_in(
@@ -125,7 +137,7 @@ def edits_in(
         Edits of earlier, whose results are what was written.
     """
     if written.are(lines, segments) and not any(one.own for one in known.edits):
-        return known
+        return replace(known, beside=values_in(segments, known.beside, written.spacing_m))
     parts, row_of, loose_rows = _rows_by_number(lines, written)
     as_lines = {no: parts[row] for no, row in row_of.items()}
     as_segments, loose = _segments_by_number(segments)
@@ -153,9 +165,12 @@ def edits_in(
     row_of |= dict(enumerate(loose_rows, start=free))
     drawn = [*(parts[row] for row in loose_rows), *([each] for each in loose)]
     edits |= {no: TrackEdit(no, as_text(_multi(one))) for no, one in enumerate(drawn, start=free)}
-    own = _own_values(lines)
+    own = own_values(schema.TRACKS, lines)
     _write_own(edits, {no: own[row] for no, row in row_of.items() if row in own}, written)
-    return TrackEdits(tuple(edits[no] for no in sorted(edits)), known.apart)
+    # What stands beside segments of a track that was taken away goes with it.
+    left = segments[~segments["track_no"].isin([no for no, one in edits.items() if one.away])]
+    beside = values_in(left, known.beside, written.spacing_m)
+    return TrackEdits(tuple(edits[no] for no in sorted(edits)), known.apart, beside)
 
 
 def _write_own(
@@ -167,23 +182,6 @@ def _write_own(
             edits[no] = edits[no]._replace(own=values)
         elif no in written.segments and no not in edits:
             edits[no] = TrackEdit(no, place=written.place(no), own=values)
-
-
-def _own_values(lines: gpd.GeoDataFrame) -> dict[int, dict[str, Any]]:
-    """What a person wrote into columns of their own, by the position of the row."""
-    import pandas as pd
-
-    names = schema.own_columns(schema.TRACKS, lines)
-    found: dict[int, dict[str, Any]] = {}
-    for row, values in enumerate(zip(*(lines[name] for name in names), strict=True)):
-        said = {
-            name: _plain(value)
-            for name, value in zip(names, values, strict=True)
-            if not (pd.api.types.is_scalar(value) and pd.isna(value))
-        }
-        if said:
-            found[row] = said
-    return found
 
 
 def _change(
@@ -297,11 +295,6 @@ def parts_of(text: str | None) -> list[Any]:
 def as_text(lines: Any) -> str:
     """Lines as WKT, to the millimetre."""
     return str(shapely.to_wkt(lines, rounding_precision=DECIMALS))
-
-
-def _plain(value: Any) -> Any:
-    value = value.item() if isinstance(value, np.generic) else value
-    return value if isinstance(value, bool | int | float | str) else str(value)
 
 
 def _listed(edits: Iterable[TrackEdit]) -> list[Any]:

@@ -19,6 +19,8 @@ from shapely import Polygon
 from geofield import schema
 from geofield.crs import grid_north_deg
 from geofield.model.obstacles import ObstacleShapes
+from geofield.model.own_values import with_own_values
+from geofield.model.segment_values import values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits, among, as_text, parts_of
 from geofield.model.tracks import Tracks, points_per_segment
 from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
@@ -109,7 +111,8 @@ def on_layout(
         kept.append(one._replace(track_no=number))
     drawn = [one for one in kept if one.drawn is not None]
     kept.sort(key=lambda one: one.track_no)
-    return OnLayout(TrackEdits(tuple(kept), tuple(apart)), _bars(bars, owner), drawn, whole)
+    in_use = TrackEdits(tuple(kept), tuple(apart), edits.beside)
+    return OnLayout(in_use, _bars(bars, owner), drawn, whole)
 
 
 def _line_of(
@@ -167,7 +170,8 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
     known : TrackEdits
         Edits that its tracks were planned with.
     """
-    before, now = known.by_number, tracks.edits_since(known).by_number
+    edits = tracks.edits_since(known)
+    before, now = known.by_number, edits.by_number
     changed = {no for no in {*before, *now} if _shape(before.get(no)) != _shape(now.get(no))}
     if not changed or tracks.written is None:
         return tracks
@@ -190,7 +194,7 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
         segments=others(tracks.segments),
         gaps=others(tracks.gaps),
     )
-    return with_own(with_drawn(rest, told, clip=False), now.values())
+    return with_own(with_drawn(rest, told, clip=False), edits)
 
 
 def _shape(one: TrackEdit | None) -> TrackEdit | None:
@@ -237,22 +241,19 @@ def with_drawn(
     return _joined(tracks, rows, gaps)
 
 
-def with_own(tracks: Tracks, edits: Iterable[TrackEdit]) -> Tracks:
-    """Tracks with what a person wrote into columns of their own."""
-    import pandas as pd
-
-    said = {one.track_no: one.own for one in edits if one.own}
-    names = dict.fromkeys(name for own in said.values() for name in own)
-    if not names:
-        return tracks
-    numbers = tracks.lines["track_no"].tolist()
-    columns = {
-        name: pd.Series([said.get(no, {}).get(name) for no in numbers], dtype=object)
-        for name in names
-    }
-    lines = tracks.lines.reset_index(drop=True)
-    values = {name: one.infer_objects().convert_dtypes() for name, one in columns.items()}
-    return replace(tracks, lines=schema.conform(schema.TRACKS, lines.assign(**values), extras=True))
+def with_own(tracks: Tracks, edits: TrackEdits) -> Tracks:
+    """Tracks with what a person wrote into columns of their own, in both layers."""
+    said = {one.track_no: one.own for one in edits.edits if one.own}
+    numbers = tracks.lines["track_no"].tolist() if said else []
+    beside = edits.beside
+    segments = with_values(tracks.segments, beside, tracks.spacing_m)
+    return replace(
+        tracks,
+        lines=with_own_values(schema.TRACKS, tracks.lines, [said.get(no) for no in numbers]),
+        segments=segments,
+        # Of the pieces as they are now, as they will be read again.
+        edits=replace(tracks.edits, beside=values_in(segments, beside, tracks.spacing_m)),
+    )
 
 
 def _free(outline: Polygon | None, shapes: ObstacleShapes | None) -> Any:

@@ -221,7 +221,7 @@ def plan_tracks(
         **optional,
     )
     tracks = with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
-    return with_own(tracks, said.edits.edits)
+    return with_own(tracks, said.edits)
 
 
 def clip_shapes(

@@ -1,0 +1,123 @@
+"""What a person wrote beside segments of tracks, and how it finds them again.
+
+Columns of one's own in the layer `segments`: which piece is wet, which was sown. Planning cuts the
+tracks anew, so a value belongs to the piece of ground that it was written for, and stands beside
+each segment of which most lies there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from geofield import schema
+from geofield.model.own_values import own_values, with_own_values
+from geofield.model.tracks_written import DECIMALS, SAME_M
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: How far beside its piece a segment may run, of the spacing, which share of it lies there at
+#: least, and how far it may turn away, degrees.
+_NEAR, _SHARE, _TURNED_DEG = 0.25, 0.5, 20.0
+
+
+class SegmentValues(NamedTuple):
+    """Values that a person wrote beside a piece of a track."""
+
+    #: The piece: a LineString as WKT, metric CRS.
+    line: str
+    #: By the names of the columns, plain JSON.
+    own: Mapping[str, Any]
+
+
+def values_in(
+    segments: gpd.GeoDataFrame, known: Sequence[SegmentValues], spacing_m: float
+) -> tuple[SegmentValues, ...]:
+    """Read what stands beside segments, after what was known before.
+
+    What was written for ground where no segment is now waits for one.
+
+    Parameters
+    ----------
+    segments : GeoDataFrame
+        Layer `segments`, edited or not.
+    known : sequence of SegmentValues
+    spacing_m : float
+    """
+    own = own_values(schema.SEGMENTS, segments)
+    if not own and not known:
+        return ()
+    lines = np.asarray(segments.geometry.to_numpy(), dtype=object)
+    at = _piece_of_each(lines, known, spacing_m)
+    now = []
+    for row, values in own.items():
+        if not shapely.is_empty(lines[row]) and shapely.length(lines[row]) > 0:
+            same = at[row] >= 0 and _is_same(known[at[row]].line, lines[row])
+            line = known[at[row]].line if same else _as_text(lines[row])
+            now.append(SegmentValues(line, values))
+    found = set(at.tolist())
+    now += [one for number, one in enumerate(known) if number not in found]
+    return tuple(sorted(now, key=lambda one: one.line))  # whatever order the rows are in
+
+
+def with_values(
+    segments: gpd.GeoDataFrame, values: Sequence[SegmentValues], spacing_m: float
+) -> gpd.GeoDataFrame:
+    """Segments with what a person wrote for the ground where they are.
+
+    Parameters
+    ----------
+    segments : GeoDataFrame
+        Layer `segments`.
+    values : sequence of SegmentValues
+    spacing_m : float
+    """
+    if not values:
+        return segments
+    lines = np.asarray(segments.geometry.to_numpy(), dtype=object)
+    at = _piece_of_each(lines, values, spacing_m)
+    return with_own_values(
+        schema.SEGMENTS, segments, [values[one].own if one >= 0 else None for one in at.tolist()]
+    )
+
+
+def _piece_of_each(
+    lines: NDArray[np.object_], values: Sequence[SegmentValues], spacing_m: float
+) -> NDArray[np.int64]:
+    """For each segment which piece most of it lies along, or -1."""
+    best = np.full(len(lines), -1, np.int64)
+    if not values or not len(lines):
+        return best
+    pieces = shapely.from_wkt([one.line for one in values])
+    around = shapely.buffer(pieces, _NEAR * spacing_m, cap_style="flat")
+    piece, row = shapely.STRtree(lines).query(around, predicate="intersects")
+    length = shapely.length(lines[row])
+    inside = shapely.length(shapely.intersection(lines[row], around[piece]))
+    share = np.divide(inside, length, out=np.zeros_like(inside), where=length > 0)
+    turned = np.abs((_heading_deg(lines[row]) - _heading_deg(pieces[piece]) + 90) % 180 - 90)
+    fits = (share >= _SHARE) & (turned <= _TURNED_DEG)
+    order = np.argsort(share[fits], kind="stable")
+    best[row[fits][order]] = piece[fits][order]
+    return best
+
+
+def _heading_deg(lines: NDArray[np.object_]) -> NDArray[np.float64]:
+    """From the begin of lines to their ends."""
+    begin = shapely.get_coordinates(shapely.get_point(lines, 0))
+    end = shapely.get_coordinates(shapely.get_point(lines, -1))
+    x, y = (end - begin).T
+    return np.asarray(np.degrees(np.arctan2(y, x)), np.float64)
+
+
+def _is_same(text: str, line: Any) -> bool:
+    one, other = (shapely.get_coordinates(each) for each in (shapely.from_wkt(text), line))
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= SAME_M)
+
+
+def _as_text(line: Any) -> str:
+    return str(shapely.to_wkt(line, rounding_precision=DECIMALS))
