@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import geopandas as gpd
+import pandas as pd
 import pyogrio
 import pytest
 import shapely
@@ -453,3 +454,71 @@ def test_a_track_taken_away_stays_away_in_the_farm(folder: Path) -> None:
         assert 4 not in set(farm["a"].tracks.lines["track_no"])
         assert 4 in set(farm["b"].tracks.lines["track_no"])
         _batch(folder, *more)
+
+
+@pytest.mark.parametrize("door", ["batch", "put"])
+def test_tracks_edited_in_the_overview_stand(folder: Path, door: str) -> None:
+    """Taken away, drawn and written beside: of the fields where that was done, and of no other."""
+    before = {plan.field.field_id: plan for plan in gf.read_farm(folder / "farm")}
+
+    def gone(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        return table[~((table["field_id"] == "b") & (table["track_no"] == 4))]
+
+    _edit(folder, "tracks", gone)
+    _edit(folder, "segments", gone)
+    _sql(folder / "farm" / "farm.gpkg", "ALTER TABLE segments ADD COLUMN note TEXT")
+    _sql(
+        folder / "farm" / "farm.gpkg",
+        "UPDATE segments SET note = 'wet' WHERE field_id = 'c' AND track_no = 2",
+    )
+    x, y = before["d"].field.polygon.centroid.coords[0]
+    drawn = shapely.LineString([(x - 50, y - 50), (x + 50, y + 45)])
+
+    def and_drawn(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        line = gpd.GeoDataFrame(
+            geometry=[shapely.MultiLineString([drawn])], crs=before["d"].field.crs
+        )
+        return pd.concat([table, line.to_crs(table.crs)], ignore_index=True)
+
+    _edit(folder, "tracks", and_drawn)
+    if door == "batch":
+        said = _batch(folder)
+        assert [one for one in "abcd" if f"{one} as edited" in said] == ["b", "c", "d"]
+    else:
+        geofield("farm", "put", folder / "farm" / "farm.gpkg", folder / "farm")
+    # The overview is written anew, and nothing in it counts as an edit.
+    assert "as edited" not in _batch(folder)
+    for more in ((), ("--fresh",)):
+        after = {plan.field.field_id: plan for plan in gf.read_farm(folder / "farm")}
+        assert set(before["b"].tracks.lines["track_no"]) - set(
+            after["b"].tracks.lines["track_no"]
+        ) == {4}
+        noted = after["c"].tracks.segments
+        assert set(noted.loc[noted["note"].notna(), "track_no"]) == {2}
+        assert "note" not in after["d"].tracks.segments
+        (new,) = set(after["d"].tracks.lines["track_no"]) - set(
+            before["d"].tracks.lines["track_no"]
+        )
+        line = after["d"].tracks.lines.set_index("track_no").geometry[new]
+        assert line.within(drawn.buffer(0.01))
+        assert after["a"].tracks.lines.equals(before["a"].tracks.lines)
+        assert "as edited" not in _batch(folder, *more)
+
+
+def test_tracks_edited_here_and_changed_in_the_farm_are_refused(folder: Path) -> None:
+    def without(number: int) -> Callable[[Any], Any]:
+        return lambda table: table[table["track_no"] != number]
+
+    path = folder / "a.gpkg"
+    geofield("farm", "get", folder / "farm", "a", "-o", path)
+    for layer in ("tracks", "segments"):
+        table = without(4)(pyogrio.read_dataframe(path, layer=layer))
+        pyogrio.write_dataframe(table, path, layer=layer, geometry_name="geom")
+
+    def also(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        return table[~((table["field_id"] == "a") & (table["track_no"] == 7))]
+
+    for layer in ("tracks", "segments"):
+        _edit(folder, layer, also)
+    said = geofield("farm", "put", path, folder / "farm", code=1)
+    assert "is edited in farm.gpkg, too" in said

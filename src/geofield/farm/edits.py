@@ -1,9 +1,9 @@
 """What a person edited in a farm's overview, taken into the farm before anything is written anew.
 
 ``farm.gpkg`` remembers digests of each field as it was written. A field whose outline, name,
-obstacles or columns of a person's own differ from them was edited: its plan takes the edits in, its
-tracks are planned again, and it counts as reviewed from then on, like one put back with ``geofield
-farm put``.
+obstacles, tracks or columns of a person's own differ from them was edited: its plan takes the edits
+in, its tracks are planned again, and it counts as reviewed from then on, like one put back with
+``geofield farm put``.
 """
 
 from __future__ import annotations
@@ -24,9 +24,11 @@ import shapely
 
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning, GeofieldError
+from geofield.farm import edited_tracks
 from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
 from geofield.farm.folder import REVIEWED
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.reviewed import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
@@ -48,6 +50,8 @@ DETAILS = "has_obstacles"
 #: What stands in columns of a person's own: by layer their names in the file, with those in the
 #: farm, and a digest per field.
 OWN = "own_as_written"
+#: And of the tracks of each field.
+TRACKS = "tracks_as_written"
 #: The edits that the farm holds already, while the overview is older than it.
 TAKEN = f"{REVIEWED}/.taken.json"
 #: Outlines that differ by less, in the units of the overview, are the same.
@@ -59,7 +63,9 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
 
     `written` are the tables that it was made of: in the file some columns have other names.
     """
-    layers = [of for of in (schema.FIELD, schema.OBSTACLES) if of.name in written]
+    layers = [
+        of for of in (schema.FIELD, schema.OBSTACLES, *edited_tracks.EDITED) if of.name in written
+    ]
     if not any(own_names(of, written[of.name]) for of in layers):
         return
     tables = {of: _table(overview, of) for of in layers}
@@ -67,12 +73,19 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
         of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
         for of, table in tables.items()
     }
+    more: dict[str, Any] = {}
+    if all(of in tables for of in edited_tracks.EDITED):
+        more = {TRACKS: edited_tracks.track_digests(tables)}
+    tables = {of: table for of, table in tables.items() if of not in edited_tracks.EDITED}
     with closing(sqlite3.connect(overview)) as file, file:
         (text,) = file.execute(
             "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
         ).fetchone()
         content = json.loads(text)
-        content["evidence"][OWN] = {"columns": names, "digests": own_digests(tables)}
+        content["evidence"] |= {
+            OWN: {"columns": names, "digests": own_digests(tables)},
+            **more,
+        }
         text = json.dumps(content, ensure_ascii=False, indent=1)
         file.execute(
             "UPDATE gpkg_metadata SET metadata = ? WHERE md_standard_uri = ?", (text, origin.URI)
@@ -90,6 +103,9 @@ class Edits:
     obstacles: gpd.GeoDataFrame | None
     #: By layer, what columns of a person's own are called in the file, and in the farm.
     names: Mapping[str, Mapping[str, str]]
+    #: Tracks and segments, and the fields where these were edited.
+    tracks: edited_tracks.Tables
+    driven_else: Collection[str]
 
 
 def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
@@ -105,7 +121,7 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     written = record[DIGESTS]
     fields, obstacles = (_table(overview, of) for of in (schema.FIELD, schema.OBSTACLES))
     _refuse_strange(overview, fields, written)
-    obstacles = _with_owners(obstacles, fields, written)
+    obstacles = obstacles_with_owners(obstacles, fields, written)
     tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}
     now = digests_of(fields, obstacles)
     gone = sorted(written.keys() - set(fields[FIELD_ID]))
@@ -115,17 +131,32 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
             "farm holds every place. Take their rows out of the places file, then --fresh."
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)
+    tracks = _tracks(overview, fields, record)
+    driven = edited_tracks.changed(
+        edited_tracks.track_digests(tracks) if tracks else {}, record.get(TRACKS)
+    )
     marks = {
-        one: f"{written[one]} {now[one]} {own.get(one)}"
+        one: " ".join([written[one], now[one], str(own.get(one)), *driven.get(one, "").split()])
         for one in fields[FIELD_ID]
         if now[one] != written[one]
+        or one in driven
         or (own_before is not None and own.get(one) != own_before.get(one))
     }
     marks = {one: mark for one, mark in marks.items() if taken.get(one) != mark}
     if not anyway:
         _refuse_double(farm, overview, marks, record, fields)
     standing = obstacles if record[DETAILS] else None
-    return Edits(marks, fields, standing, record.get(OWN, {}).get("columns", {}))
+    names = record.get(OWN, {}).get("columns", {})
+    return Edits(marks, fields, standing, names, tracks, driven.keys())
+
+
+def _tracks(
+    overview: Path, fields: gpd.GeoDataFrame, record: Mapping[str, Any]
+) -> edited_tracks.Tables:
+    """Tracks and segments of an overview; none where it does not remember how they were."""
+    if TRACKS not in record or not edited_tracks.layers_in(overview):
+        return {}
+    return {of: lines_with_owners(_table(overview, of), fields) for of in edited_tracks.EDITED}
 
 
 def _tell(words: str) -> None:
@@ -189,6 +220,14 @@ def _refuse_double(
         ours[ours[FIELD_ID].isin(list(edited))], theirs[theirs[FIELD_ID].isin(list(edited))]
     )
     double = [one for one in there if there[one] != record[DIGESTS][one]]
+    if TRACKS in record and not double:
+        layers = {of: farm.layer(of.name).to_crs(ours.crs) for of in edited_tracks.EDITED}
+        mine = {of: table[table[FIELD_ID].isin(list(edited))] for of, table in layers.items()}
+        double = [
+            one
+            for one, digest in edited_tracks.track_digests(mine).items()
+            if digest != record[TRACKS].get(one)
+        ]
     if double:
         raise FormatError(
             f"Field {double[0]} was edited in {overview.name}, and changed in the farm since that "
@@ -231,30 +270,6 @@ def _table(overview: Path, of: schema.Layer) -> gpd.GeoDataFrame:
     return table.assign(**{FIELD_ID: table.pop("_owner")})
 
 
-def _with_owners(
-    obstacles: gpd.GeoDataFrame, fields: gpd.GeoDataFrame, known: Mapping[str, str]
-) -> gpd.GeoDataFrame:
-    """Obstacles that a person drew or moved belong to the field that they stand in.
-
-    One that stands in none stays with the field that it names, or else is of the nearest.
-    """
-    outlines, ids = fields.geometry.to_numpy(), pd.Index(fields[FIELD_ID])
-    shapes, owners = obstacles.geometry.to_numpy(), obstacles[FIELD_ID].to_numpy(dtype=object)
-    if not len(ids) or not len(shapes):
-        return obstacles
-    tree, at = shapely.STRtree(outlines), ids.get_indexer(owners)
-    stands = np.isin(np.arange(len(shapes)), tree.query(shapes, predicate="intersects")[0])
-    elsewhere = (at >= 0) & stands & shapely.disjoint(outlines[at], shapes)
-    nameless = ~np.isin(owners.astype(str), list(known))
-    other = (elsewhere | nameless) & ~shapely.is_missing(shapes) & ~shapely.is_empty(shapes)
-    if not other.any():
-        return obstacles
-    nearest = tree.nearest(shapely.centroid(shapes[other]))
-    owners = owners.copy()
-    owners[other] = ids.to_numpy(dtype=object)[nearest]
-    return obstacles.assign(**{FIELD_ID: owners})
-
-
 def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     """A plan as it was edited, its tracks planned again; `outlines` are the farm's, by id."""
     field_id = plan.field.field_id
@@ -278,6 +293,8 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
         table = table.rename(columns=edits.names.get(schema.OBSTACLES.name, {}))
         standing = schema.conform(schema.OBSTACLES, table, extras=True)
     settings = plan.settings or Settings()
+    if field_id in edits.driven_else and edits.tracks:
+        plan = edited_tracks.with_tracks(plan, edits.tracks, edits.names)
     try:
         return run_tracks(replace(plan, field=field, obstacles=standing), settings=settings)
     except GeofieldError as error:

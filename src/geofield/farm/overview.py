@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from geofield import __version__, schema
 from geofield.crs import LONLAT
 from geofield.farm.as_written import digests_of
-from geofield.farm.edits import DETAILS, DIGESTS, OWN, remember_own
+from geofield.farm.edited_tracks import EDITED, track_digests
+from geofield.farm.edits import DETAILS, DIGESTS, OWN, TRACKS, remember_own
 from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined
@@ -72,8 +73,10 @@ def dataset_of(farm: Farm, name: str) -> Joined:
         DETAILS: details,
         OWN: {"columns": {}, "digests": {}},
     }
+    if details:
+        evidence[TRACKS] = track_digests({of: tables[of.name] for of in EDITED})
     origin = Provenance(f"geofield {__version__}", _source(fields), {}, evidence)
-    return Joined(tables, crs, name, origin, further=(schema.PLACES,))
+    return Joined(tables, crs, name, origin, further=(schema.PLACES,), of_farm=True)
 
 
 def _source(fields: gpd.GeoDataFrame) -> ImagerySource:

@@ -36,9 +36,17 @@ class Joined(Dataset):
     ----------
     further : tuple of Layer
         Layers beside those of a field.
+    of_farm : bool
+        Whether it is the overview of a farm, which takes in what is edited of tracks, too.
     """
 
     further: tuple[schema.Layer, ...] = ()
+    of_farm: bool = False
+
+    @property
+    def tracks_stand(self) -> bool:
+        """Whether tracks that are edited in its file stand in a later run."""
+        return self.of_farm or super().tracks_stand
 
     def layers(self, *, working: bool = False) -> list[schema.Layer]:
         """The layers to write: those of a field but its points, and further ones with rows."""

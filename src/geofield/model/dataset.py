@@ -86,6 +86,11 @@ class Dataset:
     def __post_init__(self) -> None:
         refuse_other_crs(self.tables, self.crs)
 
+    @property
+    def tracks_stand(self) -> bool:
+        """Whether tracks that are edited in its file stand in a later run."""
+        return len(self.table(schema.FIELD.name)) < 2
+
     def table(self, name: str) -> gpd.GeoDataFrame:
         """The table of a layer; an empty one where the dataset has none."""
         if name in self.tables:

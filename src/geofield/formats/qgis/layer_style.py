@@ -31,8 +31,8 @@ EDITABLE = {
     "segments": ("track_no",),
 }
 
-#: Of many fields at once, tracks are planned anew from outlines and obstacles alone.
-_OF_ONE_FIELD = ("tracks", "segments")
+#: In a file of many fields that is no farm's, tracks are planned anew from the rest alone.
+_OF_TRACKS = ("tracks", "segments")
 
 _LAT = "round(y(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
 _LON = "round(x(transform(point_on_surface($geometry), @layer_crs, 'EPSG:4326')), 7)"
@@ -51,7 +51,7 @@ def look_of(layer: Layer) -> Look:
 
 
 def style_elements(
-    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, one_field: bool = True
+    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, tracks_stand: bool = True
 ) -> list[ET.Element]:
     """The elements that a QML file and a project's layer have in common.
 
@@ -62,8 +62,8 @@ def style_elements(
         The picture's, as :func:`geofield.formats.qgis.looks.field_rules` takes it.
     obstacle_doubts : sequence of str
         What the picture did not allow when obstacles were looked for, in words.
-    one_field : bool
-        Whether the file is the plan of one field: what may be edited is more then.
+    tracks_stand : bool
+        Whether tracks that are edited in the file stand in a later run.
     """
     look = look_of(layer)
     rules = field_rules(frame) if layer.name == "field" else look.rules
@@ -76,7 +76,7 @@ def style_elements(
         node("default", field=name, expression=value, applyOnUpdate="0")
         for name, value in first.items()
     )
-    open_ = _open_to_edit(layer, one_field=one_field) or ()
+    open_ = _open_to_edit(layer, tracks_stand=tracks_stand) or ()
     editable = (
         node("field", name=name, editable=str(int(name in open_))) for name in layer.column_names
     )
@@ -95,7 +95,7 @@ def style_elements(
     ]
 
 
-def style_attributes(layer: Layer, *, one_field: bool = True) -> dict[str, str]:
+def style_attributes(layer: Layer, *, tracks_stand: bool = True) -> dict[str, str]:
     """The attributes that a QML file and a project's layer have in common."""
     look = look_of(layer)
     return {
@@ -106,26 +106,26 @@ def style_attributes(layer: Layer, *, one_field: bool = True) -> dict[str, str]:
         "maxScale": "0",
         "labelsEnabled": "1" if look.labels else "0",
         # The next planning makes the other layers anew: nothing typed there could stand.
-        "readOnly": "1" if _open_to_edit(layer, one_field=one_field) is None else "0",
+        "readOnly": "1" if _open_to_edit(layer, tracks_stand=tracks_stand) is None else "0",
     }
 
 
-def _open_to_edit(layer: Layer, *, one_field: bool) -> tuple[str, ...] | None:
+def _open_to_edit(layer: Layer, *, tracks_stand: bool) -> tuple[str, ...] | None:
     """The columns that a person may change; None where a layer is not to be edited at all."""
-    if layer.name in _OF_ONE_FIELD and not one_field:
+    if layer.name in _OF_TRACKS and not tracks_stand:
         return None
     return EDITABLE.get(layer.name)
 
 
 def qml(
-    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, one_field: bool = True
+    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, tracks_stand: bool = True
 ) -> str:
     """The style of a layer as a QML document, made as :func:`style_elements`."""
     root = node(
         "qgis",
         {"styleCategories": "AllStyleCategories"},
-        style_attributes(layer, one_field=one_field),
-        *style_elements(layer, frame, obstacle_doubts, one_field=one_field),
+        style_attributes(layer, tracks_stand=tracks_stand),
+        *style_elements(layer, frame, obstacle_doubts, tracks_stand=tracks_stand),
         node("layerGeometryType", _GEOMETRY[layer.geometry.removeprefix("Multi")]),
     )
     return document(root)

@@ -155,18 +155,18 @@ def _source(gpkg_name: str, layer: str) -> str:
 
 def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str, frame: str) -> ET.Element:
     shape = layer.geometry.removeprefix("Multi").removesuffix("String")
-    one_field = len(dataset.table(schema.FIELD.name)) < 2
+    stand = dataset.tracks_stand
     return node(
         "maplayer",
         {"type": "vector", "geometry": shape, "autoRefreshEnabled": "0"},
-        style_attributes(layer, one_field=one_field),
+        style_attributes(layer, tracks_stand=stand),
         node("id", _ID.format(layer.name)),
         node("datasource", _source(gpkg_name, layer.name)),
         node("layername", layer.title),
         node("abstract", layer.description),
         node("srs", _system(dataset.crs)),
         node("provider", "ogr", encoding="UTF-8"),
-        *style_elements(layer, frame, dataset.provenance.obstacle_doubts, one_field=one_field),
+        *style_elements(layer, frame, dataset.provenance.obstacle_doubts, tracks_stand=stand),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sqlite3
 
-from geofield import schema
 from geofield.formats.qgis.layer_style import qml
 from geofield.formats.qgis.project import frame_strip
 from geofield.formats.qgis.sld import sld
@@ -35,7 +34,6 @@ def add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str)
     """The table `layer_styles`: one default style per layer, as QML and SLD."""
     connection.execute(_STYLES)
     frame, doubts = frame_strip(dataset), dataset.provenance.obstacle_doubts
-    one_field = len(dataset.table(schema.FIELD.name)) < 2
     for layer in dataset.layers(working=True):
         connection.execute(
             "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
@@ -44,7 +42,7 @@ def add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str)
             (
                 layer.name,
                 layer.title[:30],
-                qml(layer, frame, doubts, one_field=one_field),
+                qml(layer, frame, doubts, tracks_stand=dataset.tracks_stand),
                 sld(layer),
                 layer.description,
                 timestamp,
