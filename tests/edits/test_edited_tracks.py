@@ -20,6 +20,7 @@ from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
 from geofield.formats import validate_file
+from geofield.model.segment_values import values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import TracksWritten
@@ -498,3 +499,25 @@ def test_a_segment_that_is_cut_in_two_has_its_values_twice(folder: Path) -> None
     both = table[table["note"].notna()]
     assert len(both) == 2
     assert set(both["track_no"]) == {number}
+
+
+def test_values_beside_lines_of_several_parts_and_none_at_all() -> None:
+    """Editors write lines of parts, rows without a shape, and lines that have come apart."""
+    lines = [
+        MultiLineString([[(0, 0), (40, 0)]]),
+        MultiLineString([[(0, 6), (20, 6)], [(24, 6), (40, 6)]]),
+        LineString(),
+        None,
+        LineString([(0, 12), (40, 12)]),
+        LineString([(20, -3), (20, 3)]),  # across the first one
+    ]
+    table = gpd.GeoDataFrame(
+        {"track_no": range(1, 7), "segment_no": 1, "length_m": 1.0, "note": [*"abcde", None]},
+        geometry=lines,
+        crs=32633,
+    )
+    known = values_in(table, (), 6.0)
+    assert sorted(one.own["note"] for one in known) == ["a", "b", "e"]
+    again = with_values(table.drop(columns="note"), known, 6.0).set_index("track_no")["note"]
+    assert again.dropna().to_dict() == {1: "a", 2: "b", 5: "e"}
+    assert values_in(table, known, 6.0) == known

@@ -108,8 +108,10 @@ def _piece_of_each(
 
 def _heading_deg(lines: NDArray[np.object_]) -> NDArray[np.float64]:
     """From the begin of lines to their ends."""
-    begin = shapely.get_coordinates(shapely.get_point(lines, 0))
-    end = shapely.get_coordinates(shapely.get_point(lines, -1))
+    # An editor may have made a line of several parts of one.
+    first, last = shapely.get_geometry(lines, 0), shapely.get_geometry(lines, -1)
+    begin = shapely.get_coordinates(shapely.get_point(first, 0))
+    end = shapely.get_coordinates(shapely.get_point(last, -1))
     x, y = (end - begin).T
     return np.asarray(np.degrees(np.arctan2(y, x)), np.float64)
 
