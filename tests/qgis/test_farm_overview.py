@@ -78,8 +78,10 @@ def test_everything_opens_styled(qgis, overview):
     assert "field_id" in layers["Tracks"]["fields"]
     # What the next run makes anew cannot be typed into.
     assert layers["Places"]["read_only"]
-    assert layers["Tracks"]["read_only"]
-    assert layers["Segments"]["read_only"]
+    assert layers["Gaps"]["read_only"]
+    # What is edited of tracks is taken in, as in the plan of one field.
+    assert not layers["Tracks"]["read_only"]
+    assert not layers["Segments"]["read_only"]
     assert {"field_id", "name"} <= set(layers["Field"]["editable"])
     # From afar there are only fields and places.
     assert layers["Tracks"]["scales"] == [True, 30_000]
