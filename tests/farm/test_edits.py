@@ -505,20 +505,61 @@ def test_tracks_edited_in_the_overview_stand(folder: Path, door: str) -> None:
         assert "as edited" not in _batch(folder, *more)
 
 
+def _without(number: int) -> Callable[[Any], Any]:
+    """Without a track of field a, or of the only one."""
+
+    def gone(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        here = table["field_id"] == "a" if "field_id" in table else True
+        return table[~(here & (table["track_no"] == number))]
+
+    return gone
+
+
 def test_tracks_edited_here_and_changed_in_the_farm_are_refused(folder: Path) -> None:
-    def without(number: int) -> Callable[[Any], Any]:
-        return lambda table: table[table["track_no"] != number]
-
-    path = folder / "a.gpkg"
-    geofield("farm", "get", folder / "farm", "a", "-o", path)
+    farm, path = folder / "farm", folder / "farm" / "farm.gpkg"
+    geofield("farm", "get", farm, "a", "-o", folder / "a.gpkg")
     for layer in ("tracks", "segments"):
-        table = without(4)(pyogrio.read_dataframe(path, layer=layer))
-        pyogrio.write_dataframe(table, path, layer=layer, geometry_name="geom")
-
-    def also(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-        return table[~((table["field_id"] == "a") & (table["track_no"] == 7))]
-
+        table = _without(4)(pyogrio.read_dataframe(folder / "a.gpkg", layer=layer))
+        pyogrio.write_dataframe(table, folder / "a.gpkg", layer=layer, geometry_name="geom")
+    unedited = path.read_bytes()
     for layer in ("tracks", "segments"):
-        _edit(folder, layer, also)
-    said = geofield("farm", "put", path, folder / "farm", code=1)
-    assert "is edited in farm.gpkg, too" in said
+        _edit(folder, layer, _without(7))
+    edited = path.read_bytes()
+    said = geofield("farm", "put", folder / "a.gpkg", farm, code=1)
+    assert "a is edited in farm.gpkg, too" in " ".join(said.split())
+    # Put back while the overview had no edits; it is edited as it was before that.
+    path.write_bytes(unedited)
+    geofield("farm", "put", folder / "a.gpkg", farm)
+    path.write_bytes(edited)
+    said = " ".join(_batch(folder, code=1).split())
+    assert "a was edited in farm.gpkg, and changed in the farm since" in said
+    assert path.read_bytes() == edited
+    before = set(gf.read_farm(farm)["b"].tracks.lines["track_no"])
+    geofield("farm", "put", path, farm)
+    assert set(gf.read_farm(farm)["a"].tracks.lines["track_no"]) == before - {7}
+    assert "as edited" not in _batch(folder)
+
+
+def test_what_stands_beside_tracks_is_no_other_edit_and_stays(folder: Path) -> None:
+    """A later edit of the field is not taken for one in two places."""
+    path = folder / "farm" / "farm.gpkg"
+    _sql(path, "ALTER TABLE tracks ADD COLUMN rate REAL")
+    _sql(path, "UPDATE tracks SET rate = 2.5 WHERE field_id = 'c' AND track_no = 2")
+    assert "c as edited" in _batch(folder)
+    _edit(folder, "obstacles", _tree_grown)
+    said = _batch(folder)
+    assert "c as edited" in said
+    assert "a as edited" not in said
+    lines = gf.read_farm(folder / "farm")["c"].tracks.lines.set_index("track_no")
+    assert lines["rate"].dropna().to_dict() == {2: 2.5}
+
+
+@pytest.mark.parametrize(
+    "deleted", ["DROP TABLE segments", "DELETE FROM segments", "DELETE FROM tracks"]
+)
+def test_a_layer_of_tracks_that_is_gone_is_no_word_on_any(folder: Path, deleted: str) -> None:
+    before = {plan.field.field_id: plan for plan in gf.read_farm(folder / "farm")}
+    _sql(folder / "farm" / "farm.gpkg", deleted)
+    assert "as edited" not in _batch(folder)
+    for plan in gf.read_farm(folder / "farm"):
+        assert plan.tracks.lines.equals(before[plan.field.field_id].tracks.lines)

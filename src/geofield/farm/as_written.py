@@ -32,7 +32,7 @@ def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[st
         for one, shape, row in zip(table[FIELD_ID], shapes, told, strict=True):
             plain = ["" if pd.isna(value) else str(value) for value in row]
             parts.setdefault(str(one), []).append(json.dumps(plain).encode() + (shape or b""))
-    return _hashed(parts)
+    return hashed(parts)
 
 
 def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:
@@ -46,10 +46,10 @@ def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, st
             if told:
                 row = of.name + json.dumps(told, sort_keys=True)
                 parts.setdefault(str(one), []).append(row.encode())
-    return _hashed(parts)
+    return hashed(parts)
 
 
-def _hashed(parts: Mapping[str, list[bytes]]) -> dict[str, str]:
+def hashed(parts: Mapping[str, list[bytes]]) -> dict[str, str]:
     """A digest per field of its parts, whatever their order."""
     return {
         one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]

@@ -6,24 +6,28 @@ like what is edited in the plan of one field.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from pyproj import CRS
 
 from geofield import schema
-from geofield.farm.as_written import own_names, text_of
+from geofield.farm.as_written import hashed, own_names, text_of
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.plan import Plan
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
+    from geofield.farm.value import Farm
+
 Tables = Mapping[schema.Layer, "gpd.GeoDataFrame"]
+#: By layer, what columns of a person's own are called in the file, and in the farm.
+Names = Mapping[str, Mapping[str, str]]
 
 #: The layers that a person may edit, and what tells their rows apart.
 EDITED = {schema.TRACKS: ("track_no",), schema.SEGMENTS: ("track_no", "segment_no")}
@@ -37,27 +41,41 @@ def track_digests(tables: Tables) -> dict[str, str]:
     tables : mapping
         The layers `EDITED` of many fields.
     """
-    found: dict[str, list[bytes]] = {}
+    parts: dict[str, list[bytes]] = {}
     for of, keys in EDITED.items():
         table = tables[of]
         shapes = shapely.to_wkb(shapely.force_2d(table.geometry.to_numpy()), byte_order=1)
-        numbers = table[list(keys)].to_numpy("float64", na_value=np.nan).tobytes()
-        size = 8 * len(keys)
-        rows = [
-            numbers[size * at : size * (at + 1)] + (shape or b"") for at, shape in enumerate(shapes)
-        ]
-        for name in own_names(of, table):
+        numbers = table[list(keys)].to_numpy("float64", na_value=np.nan)
+        rows = [key.tobytes() + (shape or b"") for key, shape in zip(numbers, shapes, strict=True)]
+        for name in sorted(own_names(of, table)):
             for at, text in enumerate(map(text_of, table[name])):
                 rows[at] += f"{name}={text}".encode() if text else b""
         for one, row in zip(table[FIELD_ID].astype(str), rows, strict=True):
-            found.setdefault(one, []).append(row)
-    return {
-        one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
-        for one, rows in found.items()
-    }
+            parts.setdefault(one, []).append(row)
+    return hashed(parts)
 
 
-def with_tracks(plan: Plan, tables: Tables, names: Mapping[str, Mapping[str, str]]) -> Plan:
+def tracks_of(farm: Farm, ids: Collection[str], crs: CRS, names: Names) -> Tables:
+    """Tracks and segments of some of a farm's fields, with columns called as in the overview.
+
+    Parameters
+    ----------
+    farm : Farm
+    ids : collection of str
+    crs : CRS
+        Of the overview.
+    names : mapping
+    """
+    tables = {}
+    for of in EDITED:
+        table = farm.layer(of.name)
+        there = {name: called for called, name in names.get(of.name, {}).items()}
+        some = table[table[FIELD_ID].isin(list(ids))]
+        tables[of] = some.to_crs(crs).rename(columns=there)
+    return tables
+
+
+def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
     """A plan with the tracks and segments of its field as they were edited.
 
     Parameters
@@ -66,19 +84,17 @@ def with_tracks(plan: Plan, tables: Tables, names: Mapping[str, Mapping[str, str
     tables : mapping
         The layers `EDITED` of many fields.
     names : mapping
-        By layer, what columns of a person's own are called in the file, and in the farm.
     """
     if plan.tracks is None:
         return plan
 
     def mine(of: schema.Layer) -> gpd.GeoDataFrame:
         table = tables[of]
-        own = table[table[FIELD_ID] == plan.field.field_id].to_crs(plan.field.crs)
-        own = own.drop(columns=[name for name in (FIELD_ID, EPSG) if name in own])
+        rows = table[table[FIELD_ID] == plan.field.field_id].to_crs(plan.field.crs)
         # A column of the other fields alone says nothing here.
-        empty = [name for name in schema.own_columns(of, own) if own[name].isna().all()]
-        own = own.drop(columns=empty).rename(columns=names.get(of.name, {}))
-        return schema.conform(of, own, extras=True)
+        empty = [name for name in own_names(of, rows) if rows[name].isna().all()]
+        rows = rows.drop(columns=[FIELD_ID, EPSG, *empty], errors="ignore")
+        return schema.conform(of, rows.rename(columns=names.get(of.name, {})), extras=True)
 
     lines, segments = (mine(of) for of in (schema.TRACKS, schema.SEGMENTS))
     return replace(plan, tracks=replace(plan.tracks, lines=lines, segments=segments))
@@ -90,10 +106,3 @@ def layers_in(overview: Path) -> bool:
 
     found = {str(name) for name in pyogrio.list_layers(overview)[:, 0]}
     return {of.name for of in EDITED} <= found
-
-
-def changed(now: Mapping[str, str], before: Mapping[str, str] | None) -> dict[str, str]:
-    """The digests of fields whose tracks are others than before; none where nothing is known."""
-    if before is None:
-        return {}
-    return {one: now.get(one, "") for one in {*now, *before} if now.get(one) != before.get(one)}

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from numbers import Real
@@ -63,29 +63,29 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
 
     `written` are the tables that it was made of: in the file some columns have other names.
     """
-    layers = [
-        of for of in (schema.FIELD, schema.OBSTACLES, *edited_tracks.EDITED) if of.name in written
-    ]
-    if not any(own_names(of, written[of.name]) for of in layers):
-        return
-    tables = {of: _table(overview, of) for of in layers}
+
+    def as_read(layers: Iterable[schema.Layer]) -> dict[schema.Layer, gpd.GeoDataFrame]:
+        """Layers of which one has such columns; none where none has: tracks are many."""
+        some = [of for of in layers if of.name in written]
+        has_own = any(own_names(of, written[of.name]) for of in some)
+        return {of: _table(overview, of) for of in some} if has_own else {}
+
+    standing, driven = as_read((schema.FIELD, schema.OBSTACLES)), as_read(edited_tracks.EDITED)
     names = {
         of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
-        for of, table in tables.items()
+        for of, table in {**standing, **driven}.items()
     }
-    more: dict[str, Any] = {}
-    if all(of in tables for of in edited_tracks.EDITED):
-        more = {TRACKS: edited_tracks.track_digests(tables)}
-    tables = {of: table for of, table in tables.items() if of not in edited_tracks.EDITED}
+    if not names:
+        return
+    told: dict[str, Any] = {OWN: {"columns": names, "digests": own_digests(standing)}}
+    if driven:
+        told[TRACKS] = edited_tracks.track_digests(driven)
     with closing(sqlite3.connect(overview)) as file, file:
         (text,) = file.execute(
             "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
         ).fetchone()
         content = json.loads(text)
-        content["evidence"] |= {
-            OWN: {"columns": names, "digests": own_digests(tables)},
-            **more,
-        }
+        content["evidence"] |= told
         text = json.dumps(content, ensure_ascii=False, indent=1)
         file.execute(
             "UPDATE gpkg_metadata SET metadata = ? WHERE md_standard_uri = ?", (text, origin.URI)
@@ -101,11 +101,10 @@ class Edits:
     fields: gpd.GeoDataFrame
     #: None where the overview has none.
     obstacles: gpd.GeoDataFrame | None
-    #: By layer, what columns of a person's own are called in the file, and in the farm.
-    names: Mapping[str, Mapping[str, str]]
+    names: edited_tracks.Names
     #: Tracks and segments, and the fields where these were edited.
     tracks: edited_tracks.Tables
-    driven_else: Collection[str]
+    driven: Collection[str]
 
 
 def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
@@ -132,11 +131,11 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)
     tracks = _tracks(overview, fields, record)
-    driven = edited_tracks.changed(
-        edited_tracks.track_digests(tracks) if tracks else {}, record.get(TRACKS)
-    )
+    digests = edited_tracks.track_digests(tracks) if tracks else {}
+    # A field of which no track is left is no word on any one of them.
+    driven = {one: told for one, told in digests.items() if told != record[TRACKS].get(one)}
     marks = {
-        one: " ".join([written[one], now[one], str(own.get(one)), *driven.get(one, "").split()])
+        one: f"{written[one]} {now[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
         for one in fields[FIELD_ID]
         if now[one] != written[one]
         or one in driven
@@ -147,16 +146,20 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         _refuse_double(farm, overview, marks, record, fields)
     standing = obstacles if record[DETAILS] else None
     names = record.get(OWN, {}).get("columns", {})
-    return Edits(marks, fields, standing, names, tracks, driven.keys())
+    return Edits(marks, fields, standing, names, tracks, driven)
 
 
 def _tracks(
     overview: Path, fields: gpd.GeoDataFrame, record: Mapping[str, Any]
 ) -> edited_tracks.Tables:
-    """Tracks and segments of an overview; none where it does not remember how they were."""
+    """Tracks and segments of an overview; none where it does not remember how they were.
+
+    A layer that was deleted or emptied is no word on any one track.
+    """
     if TRACKS not in record or not edited_tracks.layers_in(overview):
         return {}
-    return {of: lines_with_owners(_table(overview, of), fields) for of in edited_tracks.EDITED}
+    tables = {of: lines_with_owners(_table(overview, of), fields) for of in edited_tracks.EDITED}
+    return tables if all(len(table) for table in tables.values()) else {}
 
 
 def _tell(words: str) -> None:
@@ -220,14 +223,10 @@ def _refuse_double(
         ours[ours[FIELD_ID].isin(list(edited))], theirs[theirs[FIELD_ID].isin(list(edited))]
     )
     double = [one for one in there if there[one] != record[DIGESTS][one]]
-    if TRACKS in record and not double:
-        layers = {of: farm.layer(of.name).to_crs(ours.crs) for of in edited_tracks.EDITED}
-        mine = {of: table[table[FIELD_ID].isin(list(edited))] for of, table in layers.items()}
-        double = [
-            one
-            for one, digest in edited_tracks.track_digests(mine).items()
-            if digest != record[TRACKS].get(one)
-        ]
+    if TRACKS in record:
+        names = record.get(OWN, {}).get("columns", {})
+        driven = edited_tracks.track_digests(edited_tracks.tracks_of(farm, edited, ours.crs, names))
+        double += [one for one in edited if driven.get(one) != record[TRACKS].get(one)]
     if double:
         raise FormatError(
             f"Field {double[0]} was edited in {overview.name}, and changed in the farm since that "
@@ -293,7 +292,7 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
         table = table.rename(columns=edits.names.get(schema.OBSTACLES.name, {}))
         standing = schema.conform(schema.OBSTACLES, table, extras=True)
     settings = plan.settings or Settings()
-    if field_id in edits.driven_else and edits.tracks:
+    if field_id in edits.driven:
         plan = edited_tracks.with_tracks(plan, edits.tracks, edits.names)
     try:
         return run_tracks(replace(plan, field=field, obstacles=standing), settings=settings)

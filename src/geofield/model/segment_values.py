@@ -52,14 +52,16 @@ def values_in(
     own = own_values(schema.SEGMENTS, segments)
     if not own and not known:
         return ()
-    lines = np.asarray(segments.geometry.to_numpy(), dtype=object)
+    lines = shapely.force_2d(segments.geometry.to_numpy())
     at = _piece_of_each(lines, known, spacing_m)
-    now = []
-    for row, values in own.items():
-        if not shapely.is_empty(lines[row]) and shapely.length(lines[row]) > 0:
-            same = at[row] >= 0 and _is_same(known[at[row]].line, lines[row])
-            line = known[at[row]].line if same else _as_text(lines[row])
-            now.append(SegmentValues(line, values))
+    texts = shapely.to_wkt(lines, rounding_precision=DECIMALS)
+    has_length = shapely.length(lines) > 0
+    if known:
+        # A piece that is as it was keeps its text: reading a file is no edit.
+        before = np.array([one.line for one in known], dtype=object)[at]
+        same = (at >= 0) & shapely.equals_exact(shapely.from_wkt(before), lines, SAME_M)
+        texts = np.where(same, before, texts)
+    now = [SegmentValues(texts[row], values) for row, values in own.items() if has_length[row]]
     found = set(at.tolist())
     now += [one for number, one in enumerate(known) if number not in found]
     return tuple(sorted(now, key=lambda one: one.line))  # whatever order the rows are in
@@ -79,8 +81,7 @@ def with_values(
     """
     if not values:
         return segments
-    lines = np.asarray(segments.geometry.to_numpy(), dtype=object)
-    at = _piece_of_each(lines, values, spacing_m)
+    at = _piece_of_each(segments.geometry.to_numpy(), values, spacing_m)
     return with_own_values(
         schema.SEGMENTS, segments, [values[one].own if one >= 0 else None for one in at.tolist()]
     )
@@ -114,12 +115,3 @@ def _heading_deg(lines: NDArray[np.object_]) -> NDArray[np.float64]:
     end = shapely.get_coordinates(shapely.get_point(last, -1))
     x, y = (end - begin).T
     return np.asarray(np.degrees(np.arctan2(y, x)), np.float64)
-
-
-def _is_same(text: str, line: Any) -> bool:
-    one, other = (shapely.get_coordinates(each) for each in (shapely.from_wkt(text), line))
-    return one.shape == other.shape and bool(np.abs(one - other).max() <= SAME_M)
-
-
-def _as_text(line: Any) -> str:
-    return str(shapely.to_wkt(line, rounding_precision=DECIMALS))

@@ -19,7 +19,7 @@ from geofield import schema
 from geofield.crs import reproject, transformer
 from geofield.model.own_values import own_values
 from geofield.model.segment_values import SegmentValues, values_in
-from geofield.model.tracks_written import DECIMALS, SAME_M, Place, TracksWritten, Vertices
+from geofield.model.tracks_written import Place, TracksWritten, Vertices, among, as_text
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -276,13 +276,6 @@ def _same(some: Sequence[Vertices], others: Sequence[Vertices]) -> bool:
     return len(some) == len(others) and all(among(one, others) for one in some)
 
 
-def among(one: Vertices, others: Sequence[Vertices]) -> bool:
-    """Whether a line is one of some others, its direction the same."""
-    return any(
-        one.shape == other.shape and bool(np.abs(one - other).max() <= SAME_M) for other in others
-    )
-
-
 def _multi(lines: Sequence[Vertices]) -> shapely.MultiLineString:
     return shapely.MultiLineString(list(lines))
 
@@ -290,11 +283,6 @@ def _multi(lines: Sequence[Vertices]) -> shapely.MultiLineString:
 def parts_of(text: str | None) -> list[Any]:
     """The lines of a MultiLineString as WKT."""
     return [] if text is None else list(shapely.get_parts(shapely.from_wkt(text)))
-
-
-def as_text(lines: Any) -> str:
-    """Lines as WKT, to the millimetre."""
-    return str(shapely.to_wkt(lines, rounding_precision=DECIMALS))
 
 
 def _listed(edits: Iterable[TrackEdit]) -> list[Any]:

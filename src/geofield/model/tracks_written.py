@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -134,3 +134,15 @@ class TracksWritten:
         x, y = value["middle"]
         layout = float(value["heading_deg"]), float(value["spacing_m"])
         return cls(*layout, (int(x), int(y)), value["segments_mm"])
+
+
+def among(one: Vertices, others: Sequence[Vertices]) -> bool:
+    """Whether a line is one of some others, its direction the same."""
+    return any(
+        one.shape == other.shape and bool(np.abs(one - other).max() <= SAME_M) for other in others
+    )
+
+
+def as_text(lines: Any) -> str:
+    """Lines as WKT, to the millimetre."""
+    return str(shapely.to_wkt(lines, rounding_precision=DECIMALS))

@@ -21,8 +21,9 @@ from geofield.crs import grid_north_deg
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.own_values import with_own_values
 from geofield.model.segment_values import values_in, with_values
-from geofield.model.track_edits import TrackEdit, TrackEdits, among, as_text, parts_of
+from geofield.model.track_edits import TrackEdit, TrackEdits, parts_of
 from geofield.model.tracks import Tracks, points_per_segment
+from geofield.model.tracks_written import among, as_text
 from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
 from geofield.tracks.shapes import Edges
 from geofield.tracks.tables import BY_HAND, cause_in_words
