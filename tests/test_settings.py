@@ -326,6 +326,38 @@ def test_a_stage_on_a_plan_begins_with_its_settings(
     assert {name: getattr(now, name) for name in expected} == expected
 
 
+@pytest.mark.parametrize(
+    ("earlier", "said", "expected"),
+    [
+        # What follows is of the plan's spacing and overlap, not of the defaults.
+        ({"spacing_m": 6}, {"headland_passes": 2}, {"spacing_m": 6, "headland_m": 12}),
+        (
+            {"width_m": 6, "overlap_m": 0.5},
+            {"width_m": 6, "headland_passes": 2},
+            {"spacing_m": 5.5, "overlap_m": 0.5, "headland_m": 11},
+        ),
+        ({"spacing_m": 6, "headland_m": 5}, {"width_m": 4}, {"spacing_m": 4, "headland_m": 5}),
+    ],
+)
+def test_what_follows_from_what_is_said_is_not_said(
+    earlier: dict[str, Any], said: dict[str, Any], expected: dict[str, Any]
+) -> None:
+    settings = load_settings(None, {"tracks": said})
+    assert settings.tracks.model_fields_set == said.keys()
+    before = load_settings(None, {"tracks": earlier})
+    now = as_before(settings, before, "tracks").tracks
+    assert {name: getattr(now, name) for name in expected} == expected
+
+
+@pytest.mark.parametrize("heading", [30, 30.5])
+def test_a_direction_may_be_a_number(tmp_path: Path, heading: float) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text(f"[tracks]\ndirection = {heading}\n")
+    assert load_settings(file).tracks.direction == str(heading)
+    with pytest.raises(SettingsError, match="direction"):
+        load_settings(None, {"tracks": {"direction": True}})
+
+
 def test_a_place_to_pass_through_gives_way_to_an_offset() -> None:
     earlier = load_settings(None, {"tracks": {"through_lonlat": (33, 35)}})
     now = as_before(load_settings(None, {"tracks": {"offset_m": 1}}), earlier, "tracks").tracks

@@ -79,7 +79,8 @@ def outline_changed(previous: Plan, field: Field, *, kept: bool) -> str:
     if kept and not _drawn(previous) and _without_record(previous):
         return (
             "outline kept, for the file has lost the record of what was written (as copies made "
-            "by other programs do) and it may be yours; obstacles deleted there may be found again"
+            "by other programs do) and it may be yours; obstacles deleted there may be found "
+            "again, and tracks changed there are planned anew"
         )
     if kept:
         return "your outline kept"

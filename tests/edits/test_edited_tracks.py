@@ -84,6 +84,30 @@ def is_free(plan: Plan) -> None:
 
 
 @pytest.mark.parametrize("layer", ["tracks", "segments"])
+def test_the_last_track_may_be_exchanged_for_a_drawn_one(
+    folder: Path, made: SimulatedField, layer: str
+) -> None:
+    """There are as many rows as before then, one of them without a number."""
+    file, middle = folder / "out/field.gpkg", plan_in(folder).field.polygon.centroid
+    last = int(tracks_in(folder).lines["track_no"].max())
+    way = [(middle.x - 30, middle.y - 33), (middle.x + 31, middle.y + 29)]
+
+    def exchanged(table: Frame) -> Frame:
+        gone = table["track_no"] == last
+        shape = MultiLineString([way]) if layer == "tracks" else LineString(way)
+        drawn = gpd.GeoDataFrame(geometry=[shape], crs=table.crs)
+        more = [drawn] * int(gone.sum() if layer == "segments" else 1)
+        return pd.concat([table[~gone], *more], ignore_index=True)
+
+    rewritten(file, layer, exchanged)
+    told = geofield("tracks", file, "-o", file)
+    assert f"{last} taken away" in told
+    assert "drawn" in told
+    assert tracks_in(folder).lines["track_no"].max() > last
+    whole(tracks_in(folder))
+
+
+@pytest.mark.parametrize("layer", ["tracks", "segments"])
 def test_a_track_taken_away_is_driven_by_nobody(
     folder: Path, made: SimulatedField, layer: str
 ) -> None:

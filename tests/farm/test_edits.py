@@ -563,3 +563,147 @@ def test_a_layer_of_tracks_that_is_gone_is_no_word_on_any(folder: Path, deleted:
     assert "as edited" not in _batch(folder)
     for plan in gf.read_farm(folder / "farm"):
         assert plan.tracks.lines.equals(before[plan.field.field_id].tracks.lines)
+
+
+def _exported(folder: Path) -> str:
+    return geofield("export", folder / "farm", "-f", "geojson", "--out", folder / "out")
+
+
+def _drawn(table: gpd.GeoDataFrame, *points: tuple[float, float]) -> gpd.GeoDataFrame:
+    """A layer with a line that somebody drew, of no number and no field."""
+    line = gpd.GeoDataFrame(geometry=[shapely.MultiLineString([points])], crs=table.crs)
+    return pd.concat([table, line], ignore_index=True)
+
+
+def test_tracks_edited_in_a_reviewed_plan_stand(folder: Path) -> None:
+    """They were passed over, and gone with the next edit of the field in the overview."""
+    farm = folder / "farm"
+    file = _reviewed_edited(folder, "a", "segments", lambda t: t[t["track_no"] != 4])
+    assert "reviewed/a.gpkg has edits" in _exported(folder)
+    said = _batch(folder)
+    assert "a as edited in reviewed/a.gpkg" in said
+    for plan in (gf.read_plan(file), gf.read_farm(farm)["a"]):
+        assert 4 not in set(plan.tracks.lines["track_no"])
+    assert "as edited" not in _batch(folder)
+    _sql(file, "ALTER TABLE segments ADD COLUMN note TEXT")
+    _sql(file, "UPDATE segments SET note = 'wet' WHERE track_no = 2")
+    assert "a as edited in reviewed/a.gpkg" in _batch(folder)
+    segments = gf.read_farm(farm)["a"].tracks.segments
+    assert set(segments["track_no"][segments["note"] == "wet"]) == {2}
+
+
+def test_edits_of_a_reviewed_plan_are_not_written_over(folder: Path) -> None:
+    farm = folder / "farm"
+    file = _reviewed_edited(folder, "b", "segments", lambda t: t[t["track_no"] != 4])
+    edited = file.read_bytes()
+    _edit(folder, "obstacles", lambda t: t.assign(status=t["status"].where(t["obstacle_no"] != 3,
+                                                                          "rejected")))  # fmt: skip
+    for plan in (farm / "farm.gpkg", folder / "b.gpkg"):
+        if plan.name == "b.gpkg":
+            _edit(folder, "obstacles", lambda t: t.assign(status="added"))
+        said = " ".join(geofield("farm", "put", plan, farm, code=1).split())
+        assert "reviewed/b.gpkg has edits that the farm does not hold yet" in said
+        assert file.read_bytes() == edited
+    geofield("farm", "put", file, farm)
+    assert 4 not in set(gf.read_farm(farm)["b"].tracks.lines["track_no"])
+
+
+def test_a_drawn_track_in_the_place_of_the_last_one(folder: Path) -> None:
+    """The layer has as many rows as before, one of them without a number."""
+    last = int(gf.read_farm(folder / "farm")["d"].tracks.lines["track_no"].max())
+    x = gf.read_farm(folder / "farm")["d"].field.polygon.centroid.x
+
+    def exchanged(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        kept = table[(table["field_id"] != "d") | (table["track_no"] != last)]
+        return _drawn(kept, (x - 40, 5_300_010.0), (x + 40, 5_300_100.0))
+
+    _edit(folder, "tracks", exchanged)
+    assert "d as edited" in _batch(folder)
+    lines = gf.read_farm(folder / "farm")["d"].tracks.lines.set_index("track_no")
+    assert last not in lines.index
+    assert lines.geometry.loc[last + 1].length > 100
+
+
+@pytest.mark.parametrize("layer", ["obstacles", "tracks", "field"])
+def test_a_layer_in_another_crs_is_refused(folder: Path, layer: str) -> None:
+    """What was drawn there went to the first field, for its degrees lie in none."""
+    before = gf.read_farm(folder / "farm").obstacles
+    _edit(folder, layer, lambda table: table.to_crs(4326))
+    for arguments in (("batch",), ("put", folder / "farm" / "farm.gpkg", folder / "farm")):
+        said = _batch(folder, code=1) if len(arguments) == 1 else geofield(
+            "farm", *arguments, code=1)  # fmt: skip
+        assert f"layer '{layer}' is no longer in WGS 84 / UTM zone 33N" in " ".join(said.split())
+    assert gf.read_farm(folder / "farm").obstacles.equals(before)
+
+
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        ("ALTER TABLE obstacles RENAME TO trees", "the layer 'obstacles' is gone"),
+        ("DROP TABLE field", "the layer 'field' is gone"),
+        ("DROP TABLE gpkg_metadata", "has no record of what geofield wrote"),
+        ("DELETE FROM gpkg_metadata", "has no record of what geofield wrote"),
+    ],
+)
+def test_an_overview_that_lost_a_part_is_told(folder: Path, statement: str, words: str) -> None:
+    path = folder / "farm" / "farm.gpkg"
+    _sql(path, statement)
+    edited = path.read_bytes()
+    said = " ".join(_batch(folder, code=1).split())
+    assert words in said
+    assert "out of the farm" in said
+    assert "farm.gpkg has edits" in _exported(folder)
+    assert path.read_bytes() == edited
+    path.unlink()
+    _batch(folder)
+    assert path.is_file()
+
+
+def test_what_is_no_word_is_told(folder: Path) -> None:
+    _sql(folder / "farm" / "farm.gpkg", "DELETE FROM tracks WHERE field_id = 'c'")
+    assert "no tracks are left of field c" in " ".join(_batch(folder).split())
+
+    def shapeless(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        return table.set_geometry(table.geometry.where(table["obstacle_no"] != 3, None))
+
+    _edit(folder, "obstacles", shapeless)
+    said = " ".join(_batch(folder).split())
+    assert "1 row(s) of layer 'obstacles' have no geometry, and count as deleted" in said
+    assert list(gf.read_farm(folder / "farm")["b"].obstacles["obstacle_no"]) == [4]
+
+
+def test_columns_are_known_in_any_case(folder: Path) -> None:
+    path = folder / "farm" / "farm.gpkg"
+    _sql(path, "UPDATE obstacles SET status = 'rejected' WHERE obstacle_no = 3")
+    _sql(path, "ALTER TABLE obstacles RENAME COLUMN status TO STATUS")
+    assert "b as edited" in _batch(folder)
+    assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["rejected", "added"]
+
+
+def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path) -> None:
+    """An edit that was taken back there was passed over without a word."""
+
+    def said(status: str) -> None:
+        _edit(folder, "obstacles", lambda table: table.assign(
+            status=table["status"].where(table["obstacle_no"] != 3, status)))  # fmt: skip
+
+    said("rejected")
+    refused = _batch(folder, "--spacing", 8, code=1)
+    assert "b as edited" in refused
+    assert "farm of other work" in refused
+    said("added")
+    assert "b as edited" in _batch(folder, "--fresh", "--spacing", 8)
+    assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["added", "added"]
+
+
+def test_an_edit_taken_back_before_the_overview_is_written_is_no_silence(folder: Path) -> None:
+    path = folder / "farm" / "farm.gpkg"
+    as_it_was = path.read_bytes()
+    _edit(folder, "obstacles", _tree_grown)
+    assert "as edited" in _batch(folder, "--no-overview")
+    path.write_bytes(as_it_was)
+    assert "was edited in farm.gpkg, and changed in the farm" in " ".join(
+        _batch(folder, code=1).split()
+    )
+    geofield("farm", "put", path, folder / "farm")
+    assert "as edited" not in _batch(folder)

@@ -35,6 +35,28 @@ def test_a_parcel_by_name_or_number():
         field_from_boundary(parcels(), lat=LAT, lon=LON, name="C")
 
 
+def test_parcels_of_one_name_are_told_apart_by_a_point():
+    """The smallest was taken, wherever the point lay."""
+    both = parcels().assign(name="West", crop="wheat")
+    both.loc[1, "geometry"] = shapely.box(10.002, 49.999, 10.003, 50.001)
+    for name in ("West", "wheat"):
+        found = field_from_boundary(both, lat=LAT, lon=LON, name=name)
+        assert found.polygon_lonlat.covers(shapely.Point(LON, LAT))
+        with pytest.raises(FieldError, match="2 parcels of the boundary file are named") as caught:
+            field_from_boundary(both, name=name)
+        assert "--lat and --lon" in caught.value.hint
+    with pytest.raises(FieldError, match="contains lat 51"):
+        field_from_boundary(both, lat=51.0, lon=LON, name="West")
+
+
+def test_a_name_counts_before_an_id_and_other_values():
+    mixed = parcels().assign(name=["8", "B"], crop=["B", "rye"])
+    assert field_from_boundary(mixed, name="8").name == "8"
+    assert field_from_boundary(mixed, name="B").polygon_lonlat.centroid.x > 10.002
+    # An id beside a missing one is read as 7.0.
+    assert field_from_boundary(parcels().assign(name=None, id=[7.0, None]), name="7").name == "7"
+
+
 def test_a_parcel_without_a_point():
     """The only one, or the one named: the CRS is that of its own place."""
     alone = field_from_boundary(parcels().iloc[:1])

@@ -258,3 +258,9 @@ def test_what_ends_just_behind_the_180th_meridian_ends_there_again():
     line = shapely.LineString([(179.9999, -17.0), (-179.9999995, -17.0)])
     (back,) = joined(split(np.array([line])), LONLAT)
     assert shapely.get_coordinates(back)[-1][0] == pytest.approx(180.0000005, abs=1e-9)
+
+
+def test_a_shape_round_a_pole_is_refused_in_degrees() -> None:
+    ring = shapely.Polygon([(x, 89.99) for x in range(-180, 180, 20)])
+    with pytest.raises(FormatError, match="round a pole"):
+        split(np.array([ring]))

@@ -203,3 +203,47 @@ def test_a_machine_of_the_settings_file(tmp_path: Path, monkeypatch: pytest.Monk
     tree = shapely.Point(500100, 5600040)
     nearest_m = segments.distance(tree).min() / 0.9996
     assert nearest_m >= 5.0 - 1e-3
+
+
+def test_plans_in_one_file_keep_what_stands_in_them(tmp_path: Path) -> None:
+    """Planned again, tracks went through the trees, for only outlines were read."""
+    outlines(2).to_file(tmp_path / "parcels.gpkg")
+    places = [shapely.Point(500050 + 300 * k, 5600030).buffer(4) for k in range(2)]
+    gpd.GeoDataFrame({"status": ["added", "rejected"]}, geometry=places, crs=CRS).to_file(
+        tmp_path / "trees.gpkg"
+    )
+    made, again, farm = tmp_path / "made.gpkg", tmp_path / "again.gpkg", tmp_path / "farm"
+    run(tmp_path / "parcels.gpkg", "--obstacles", tmp_path / "trees.gpkg", "--spacing", "5",
+        "-o", made)  # fmt: skip
+    run(made, "--spacing", "5", "-o", again)
+    done = CliRunner().invoke(
+        cli, ["batch", str(made), "--layer", "field", "--spacing", "5", "--out", str(farm),
+              "--workers", "1"],
+    )  # fmt: skip
+    assert done.exception is None, done.output
+    for file in (made, again, farm / "farm.gpkg"):
+        standing = gpd.read_file(file, layer="obstacles").set_index("field_id")
+        assert sorted(standing["status"]) == ["added", "rejected"]
+        segments = gpd.read_file(file, layer="segments")
+        avoided = standing[standing["status"] == "added"].geometry.iloc[0]
+        passed = standing[standing["status"] == "rejected"].geometry.iloc[0]
+        assert segments.intersection(avoided).length.sum() < 1e-6
+        assert segments.intersection(passed).length.sum() > 5
+    untold = CliRunner().invoke(cli, ["tracks", str(made), "-o", str(tmp_path / "two.gpkg")])
+    assert "Obstacles  those of made.gpkg" in untold.output
+    assert "keeps no settings of its fields: their spacing is 2 m" in untold.output
+
+
+def test_a_plan_that_lost_its_record_is_told(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    run(tmp_path / "parcel.gpkg", "--spacing", "5", "-o", tmp_path / "plan.gpkg")
+    for layer in ("field", "tracks", "segments"):
+        gpd.read_file(tmp_path / "plan.gpkg", layer=layer).to_file(
+            tmp_path / "copy.gpkg", layer=layer
+        )
+    for name, lost in (("plan", False), ("copy", True)):
+        done = CliRunner().invoke(
+            cli, ["tracks", str(tmp_path / f"{name}.gpkg"), "-o", str(tmp_path / f"{name}_2.gpkg")]
+        )
+        assert done.exception is None, done.output
+        assert ("has lost the record" in " ".join(done.output.split())) == lost

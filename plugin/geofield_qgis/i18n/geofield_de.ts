@@ -1335,7 +1335,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: a farm, as of `geofield batch`.</source>
+      <source>GeoPackage to write, may be FILE of one field; for several fields another one with all of them, or a folder: a farm, as of `geofield batch`.</source>
       <translation type="unfinished" />
     </message>
     <message>

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +13,7 @@ from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
+from geofield.cli.many_tracks import obstacles_for
 from geofield.cli.options import acknowledge_option, stage_options
 from geofield.cli.place_options import place_options, places_of
 from geofield.errors import FieldError, GeofieldError
@@ -128,6 +131,7 @@ def batch(
             f"{places.name} holds points, and a point alone has no outline.",
             hint="Name the IMAGERY behind PLACES, or give parcels (polygons).",
         )
+    obstacle_file = obstacles_for(found, obstacle_file, imagery=imagery)
     pictures, about = _imagery(imagery, settings, found, acknowledged=acknowledge_terms)
     job = Job(settings, pictures, None if obstacle_file is None else obstacle_file.absolute(),
               options.get("places_crs"))  # fmt: skip
@@ -136,7 +140,11 @@ def batch(
         raise click.UsageError("Name --workers or --scheduler, not both.")
     say(f"Places     {len(found)} of {places.name}")
     waiting = take_in(store)
-    with progress_bar(quiet=as_json) as progress, two_interrupts() as control:
+    with (
+        _overview_renewed(store, overview=overview),
+        progress_bar(quiet=as_json) as progress,
+        two_interrupts() as control,
+    ):
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
@@ -161,6 +169,20 @@ def batch(
         )
     if count.failed == count.total:
         raise GeofieldError("No place could be planned.", hint="The reasons are in failed.csv.")
+
+
+@contextmanager
+def _overview_renewed(store: Store, *, overview: bool) -> Iterator[None]:
+    """Where a run is refused, an overview in which what was taken in is no edit any more."""
+    from geofield.farm.finish import renew_unless_edited
+    from geofield.farm.marks import CHANGED
+
+    try:
+        yield
+    except GeofieldError:
+        if overview and store.get(CHANGED) is not None:
+            renew_unless_edited(store)
+        raise
 
 
 def take_in(store: Store, only: list[str] | None = None) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geofield.cli.console import progress_bar, say_note
+from geofield.cli.console import progress_bar, say, say_note
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -57,6 +57,37 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     for note in places.notes:
         say_note(note)
     return places
+
+
+def obstacles_for(
+    places: Places | None, given: Path | None, *, imagery: str | None = None
+) -> Path | None:
+    """The file of what stands in fields: the one given, or else that of the places themselves.
+
+    Those of a plan, or of several in one GeoPackage, unless a picture shows what stands there.
+    """
+    from geofield.farm.standing import own_obstacles
+
+    if places is None or given is not None or imagery is not None:
+        return given
+    own = own_obstacles(Path(places.path))
+    if own is not None:
+        say(f"Obstacles  those of {own.name}")
+    return own
+
+
+def tell_spacing(places: Places | None, settings: Settings) -> None:
+    """Tell by which spacing several plans in one GeoPackage are planned: it keeps no settings."""
+    from geofield.farm.standing import is_of_geofield
+
+    if places is None or not is_of_geofield(Path(places.path)):
+        return
+    said = {*settings.tracks.model_fields_set, *places.settings.column_names}
+    if said.isdisjoint(("spacing_m", "width_m", "machine")):
+        say_note(
+            f"{Path(places.path).name} keeps no settings of its fields: their spacing is "
+            f"{settings.tracks.spacing_m:g} m now, where --spacing says no other."
+        )
 
 
 def of_many(places: Places, job: Job, wanted: Wanted) -> Told:

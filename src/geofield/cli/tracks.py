@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, say
+from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.files import OLD_PATH, PATH, claim_file, claim_folder, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
@@ -40,8 +40,8 @@ Examples (the first two on the project's own sample):
 )
 @click.argument("file", metavar="FILE", type=OLD_PATH)
 @output_option(
-    "GeoPackage to write, may be FILE; for several fields one with all of them, or a folder: "
-    "a farm, as of `geofield batch`.",
+    "GeoPackage to write, may be FILE of one field; for several fields another one with all of "
+    "them, or a folder: a farm, as of `geofield batch`.",
     PATH,
 )
 @click.option("--each", is_flag=True, help="A GeoPackage for each of several fields, in a folder.")
@@ -78,16 +78,26 @@ def tracks(
     polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field. Their columns come
     along, and those named like settings (spacing_m, heading_deg, ...) hold for their field.
     """
-    from geofield.cli.many_tracks import Wanted, file_name, line_of, of_many, parcels_in
+    from geofield.cli.many_tracks import (
+        Wanted,
+        file_name,
+        line_of,
+        obstacles_for,
+        of_many,
+        parcels_in,
+        tell_spacing,
+    )
     from geofield.farm.work import Job
 
     (claim_file if output.suffix else claim_folder)(output)
     plan = _own_plan(file)
     if plan is not None and not defaults:
         settings = continued(settings, plan.settings, "tracks")
-    job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     places = None if plan is not None else parcels_in(file, settings, crs)
     several = places is not None and len(places) > 1
+    obstacle_file = obstacles_for(places, obstacle_file)
+    tell_spacing(places, settings)
+    job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     if places is None or not places.settings.num_columns:
         tell_idle(settings)  # a column could choose another way for its field
     if name and several:
@@ -141,7 +151,13 @@ def _own_plan(file: Path) -> Plan | None:
         return None
     if pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"] != 1:
         return None
-    return read_plan(file)
+    plan = read_plan(file)
+    if plan.tracks is None and schema.TRACKS.name in layer_names(file):
+        say_note(
+            f"{file.name} has lost the record of what was written (as copies made by other "
+            "programs do): its tracks are planned anew, whatever was changed of them."
+        )
+    return plan
 
 
 def _one(

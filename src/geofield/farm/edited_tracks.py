@@ -100,9 +100,9 @@ def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
     return replace(plan, tracks=replace(plan.tracks, lines=lines, segments=segments))
 
 
-def layers_in(overview: Path) -> bool:
-    """Whether an overview holds tracks: those of very large farms do not."""
+def layers_in(overview: Path) -> set[schema.Layer]:
+    """The layers `EDITED` that an overview holds: those of very large farms have none."""
     import pyogrio
 
     found = {str(name) for name in pyogrio.list_layers(overview)[:, 0]}
-    return {of.name for of in EDITED} <= found
+    return {of for of in EDITED if of.name in found}

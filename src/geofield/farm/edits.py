@@ -25,6 +25,7 @@ import shapely
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning, GeofieldError
 from geofield.farm import edited_tracks
+from geofield.farm.as_left import record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
 from geofield.farm.folder import REVIEWED
 from geofield.farm.layers import EPSG, FIELD_ID
@@ -32,7 +33,6 @@ from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.reviewed import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
-from geofield.formats.gpkg_read import opened
 from geofield.model import Field
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
@@ -68,8 +68,9 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
         """Layers of which one has such columns; none where none has: tracks are many."""
         some = [of for of in layers if of.name in written]
         has_own = any(own_names(of, written[of.name]) for of in some)
-        return {of: _table(overview, of) for of in some} if has_own else {}
+        return {of: table_in(overview, of, crs) for of in some} if has_own else {}
 
+    crs = record_in(overview).crs
     standing, driven = as_read((schema.FIELD, schema.OBSTACLES)), as_read(edited_tracks.EDITED)
     names = {
         of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
@@ -116,16 +117,17 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         When an edit cannot be understood, or, unless it is to hold `anyway`, its field was changed
         elsewhere since the overview was written; says which field and why.
     """
-    record = _record(overview)
-    written = record[DIGESTS]
-    fields, obstacles = (_table(overview, of) for of in (schema.FIELD, schema.OBSTACLES))
+    origin_of = record_in(overview)
+    record = {DIGESTS: {}, DETAILS: False, **origin_of.provenance.evidence}
+    written, crs = record[DIGESTS], origin_of.crs
+    fields, obstacles = (table_in(overview, of, crs) for of in (schema.FIELD, schema.OBSTACLES))
     _refuse_strange(overview, fields, written)
     obstacles = obstacles_with_owners(obstacles, fields, written)
     tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}
     now = digests_of(fields, obstacles)
     gone = sorted(written.keys() - set(fields[FIELD_ID]))
     if gone:
-        _tell(
+        tell(
             f"{overview.name}: {len(gone)} fields are deleted there ({', '.join(gone[:5])}), and a "
             "farm holds every place. Take their rows out of the places file, then --fresh."
         )
@@ -137,7 +139,8 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     marks = {
         one: f"{written[one]} {now[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
         for one in fields[FIELD_ID]
-        if now[one] != written[one]
+        if one in taken  # perhaps to take back what was said
+        or now[one] != written[one]
         or one in driven
         or (own_before is not None and own.get(one) != own_before.get(one))
     }
@@ -154,16 +157,29 @@ def _tracks(
 ) -> edited_tracks.Tables:
     """Tracks and segments of an overview; none where it does not remember how they were.
 
-    A layer that was deleted or emptied is no word on any one track.
+    A layer that was deleted or emptied is no word on any one track, nor is a field of which no
+    row is left.
     """
-    if TRACKS not in record or not edited_tracks.layers_in(overview):
+    written = record.get(TRACKS)
+    if not written:
         return {}
-    tables = {of: lines_with_owners(_table(overview, of), fields) for of in edited_tracks.EDITED}
-    return tables if all(len(table) for table in tables.values()) else {}
-
-
-def _tell(words: str) -> None:
-    warnings.warn(words, FormatWarning, stacklevel=4)
+    there = edited_tracks.layers_in(overview)
+    tables = {
+        of: lines_with_owners(table_in(overview, of, fields.crs), fields)
+        for of in edited_tracks.EDITED
+        if of in there
+    }
+    for of in edited_tracks.EDITED:
+        left = set(tables[of][FIELD_ID]) if of in there else set()
+        bare = sorted(set(fields[FIELD_ID]) & set(written) - left)
+        if bare:
+            more = f" and {len(bare) - 5} more" if len(bare) > 5 else ""
+            tell(
+                f"{overview.name}: no {of.name} are left of field {', '.join(bare[:5])}{more}. No "
+                "field is left without any: they come back."
+            )
+    whole = len(tables) == len(edited_tracks.EDITED)
+    return tables if whole and all(len(table) for table in tables.values()) else {}
 
 
 def _own_before(
@@ -176,7 +192,7 @@ def _own_before(
     for of, table in tables.items():
         gone = [name for name in before["columns"].get(of.name, ()) if name not in table]
         if gone:
-            _tell(
+            tell(
                 f"{overview.name}: columns {', '.join(gone)} of layer {of.name!r} are gone and "
                 "come back; what else was written into columns of your own is not taken in."
             )
@@ -239,34 +255,9 @@ def _refuse_double(
 def is_overview(path: Path) -> bool:
     """Whether a file is the overview of a farm."""
     try:
-        return bool(_record(path)[DIGESTS])
-    except (FormatError, sqlite3.Error):
+        return bool(record_in(path).provenance.evidence.get(DIGESTS))
+    except FormatError:
         return False
-
-
-def _record(overview: Path) -> dict[str, Any]:
-    with opened(overview) as file:
-        row = file.execute(
-            "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (origin.URI,)
-        ).fetchone()
-    if row is None:
-        raise FormatError(f"{overview} was not written by geofield.", hint="Remove it.")
-    return {DIGESTS: {}, DETAILS: False, **origin.from_json(row[0]).provenance.evidence}
-
-
-def _table(overview: Path, of: schema.Layer) -> gpd.GeoDataFrame:
-    import pyogrio
-
-    table = pyogrio.read_dataframe(overview, layer=of.name)
-    for name in of.column_names:
-        if name not in table:
-            raise FormatError(
-                f"{overview.name}: the column {name!r} of layer {of.name!r} is gone.",
-                hint="Undo that in QGIS, or put the edited fields back one by one.",
-            )
-    owner = table.get(FIELD_ID)
-    table = schema.conform(of, table.assign(**{"_owner": owner}), extras=True)
-    return table.assign(**{FIELD_ID: table.pop("_owner")})
 
 
 def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
@@ -297,7 +288,9 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     try:
         return run_tracks(replace(plan, field=field, obstacles=standing), settings=settings)
     except GeofieldError as error:
-        raise FormatError(f"Field {field_id}, as edited: {error}", hint=error.hint) from error
+        raise FormatError(
+            f"Field {field_id}, as edited: {error.message}", hint=error.hint
+        ) from error
 
 
 def _own_of(
@@ -339,7 +332,7 @@ def is_edited(folder: Path, overview: Path) -> bool:
         warnings.simplefilter("ignore", FormatWarning)
         try:
             return bool(_edits(read_farm(folder), overview, taken, anyway=True).marks)
-        except (FormatError, sqlite3.Error):
+        except FormatError:
             return True
 
 

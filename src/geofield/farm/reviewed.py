@@ -83,7 +83,8 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
     Raises
     ------
     FormatError
-        When there is no such field in the farm.
+        When there is no such field in the farm, or the plan of it that was put back before was
+        edited since.
     TrackError
         When its tracks cannot be planned again.
 
@@ -113,15 +114,18 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         edited = plan.track_edits != plan.evidence.track_edits
         if settings is not None and (edited or not _has_its_tracks(plan, before)):
             if not edited:
+                why = (
+                    "there is no record of how its tracks were written, so they"
+                    if plan.tracks is None
+                    else "its tracks were not those of its outline and obstacles, and"
+                )
                 warnings.warn(
-                    f"{plan.field.name}: its tracks were not those of its outline and obstacles, "
-                    "and are planned again.",
-                    FieldWarning,
-                    stacklevel=2,
+                    f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2
                 )
             plan, whole = run_tracks(plan, settings=settings), False
         if not whole:
             save_plan(plan, file, overwrite=True)
+        _refuse_unseen(store, {field_id}, but=plan_file)
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
     _replace(store, [plan])
@@ -156,6 +160,18 @@ def _put(store: Store, field_id: str, file: Path) -> None:
     if there is not None and there.is_file():
         refuse_locked(there)
     store.put(file_of(field_id), file.read_bytes())
+
+
+def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> None:
+    """Refuse to write over plans in `reviewed/` whose edits the farm has not taken in."""
+    for one in edited_in_place(store):
+        file = Path(store.place) / file_of(one)
+        if one in ids and (but is None or not file.samefile(but)):
+            raise FormatError(
+                f"{file_of(one)} has edits that the farm does not hold yet.",
+                hint=f"Take them in first: geofield farm put {file} {store.place}; or move that "
+                "file out of the farm.",
+            )
 
 
 def _has_its_tracks(plan: Plan, before: Plan | None) -> bool:
@@ -216,16 +232,24 @@ def edited_in_place(store: Store) -> Iterator[str]:
 
 def _is_edited(plan: Plan, before: Plan) -> bool:
     """Whether a reviewed plan says something else than the one that the farm made of it."""
-    known = dict(before.field.own)
+    known, said = plan.evidence.track_edits, before.evidence.track_edits
     return (
         not _same_ground(plan, before)
         or plan.field.name != before.field.name
-        or any(known.get(name) != value for name, value in plan.field.own)
+        or _own_of(plan) != _own_of(before)
+        or plan.track_edits != known
+        or known != said
     )
+
+
+def _own_of(plan: Plan) -> dict[str, Any]:
+    """What stands in the field's columns of a person's own."""
+    return {name: value for name, value in plan.field.own if value is not None}
 
 
 def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | None = None) -> None:
     """Put plans of fields of the farm back; `note` is called when none of them can be lost."""
+    _refuse_unseen(store, {plan.field.field_id for plan in plans})
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         for plan in plans:

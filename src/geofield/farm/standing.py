@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from geofield import schema
 from geofield.errors import CRSError, TrackError
 from geofield.plan import Plan
 
@@ -26,13 +27,14 @@ _NEAR_M = 100.0
 def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
     """What to avoid, from any file: its rows, numbered as in the file; longitude and latitude.
 
-    Read once per process, however many fields there are.
+    Of a plan, or several in one GeoPackage, their obstacles as they stand. Read once per process,
+    however many fields there are.
     """
     from geofield.crs import parse_crs
     from geofield.formats.foreign import read_vector
     from geofield.formats.foreign_tables import NUMBER_COLUMNS, column_like
 
-    frame = read_vector(path)
+    frame = read_vector(path, schema.OBSTACLES.name if _holds_obstacles(path) else None)
     if frame.crs is None:
         if crs is None:
             raise CRSError(
@@ -43,6 +45,31 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
         frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
     frame = frame[~(frame.geometry.isna() | frame.geometry.is_empty)]
     return frame.explode(ignore_index=True)
+
+
+def own_obstacles(places: Path) -> Path | None:
+    """The file of the places itself, where geofield wrote it with obstacles of theirs."""
+    mine = _holds_obstacles(places) and is_of_geofield(places)
+    return places.absolute() if mine else None
+
+
+def is_of_geofield(path: Path) -> bool:
+    """Whether geofield wrote a file, and it is a GeoPackage."""
+    from geofield.formats.gpkg_read import record_of
+
+    return path.suffix.lower() == ".gpkg" and path.is_file() and record_of(path) is not None
+
+
+def _holds_obstacles(path: Path) -> bool:
+    """Whether it is a GeoPackage with a layer of obstacles in which something stands."""
+    import pyogrio
+
+    from geofield.formats.foreign import layer_names
+
+    layer = schema.OBSTACLES.name
+    if path.suffix.lower() != ".gpkg" or not path.is_file() or layer not in layer_names(path):
+        return False
+    return bool(pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"])
 
 
 def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -37,7 +37,8 @@ def field_from_boundary(
     lat, lon : float, optional
         A point in the field, degrees, WGS 84; not needed for one parcel, or with its name.
     name : str, optional
-        Take the parcel with this value in any column instead.
+        Take the parcel of this name or id instead; with this value in any other column, where
+        none has it there. A point, too, tells those of one name apart.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def field_from_boundary(
     if rows.empty:
         raise FieldError("The boundary file holds no polygon.")
     if name is not None:
-        chosen = _of_name(rows, name)
+        chosen = _of_name(rows, own, name, lat, lon)
     elif lat is not None and lon is not None:
         chosen = _around(rows, own, lat, lon)
     else:
@@ -73,13 +74,25 @@ def field_from_boundary(
     return _field(chosen, own, lat, lon)
 
 
-def _of_name(rows: gpd.GeoDataFrame, name: str) -> gpd.GeoDataFrame:
-    """The parcel with a value in any of its columns."""
+def _of_name(
+    rows: gpd.GeoDataFrame, own: CRS, name: str, lat: float | None, lon: float | None
+) -> gpd.GeoDataFrame:
+    """The parcel of a name, or with that value in another of its columns."""
     chosen = rows[_named(rows, name)]
     if chosen.empty:
         raise _none_of(rows, f"is named {name!r}")
-    if len(chosen) > 1 and len(chosen.index.unique()) == 1:
+    if len(chosen) == 1:
+        return chosen
+    if len(chosen.index.unique()) == 1:
         raise FieldError(f"The parcel {name!r} has {len(chosen)} parts; a field is one.")
+    if lat is not None and lon is not None:
+        return _around(chosen, own, lat, lon)
+    common = shapely.intersection_all(chosen.geometry.to_numpy())
+    if not common.area > 0.0:
+        raise FieldError(
+            f"{len(chosen)} parcels of the boundary file are named {name!r}.",
+            hint="Say which: --lat and --lon of a point in it, or another of its values.",
+        )
     return _smallest(chosen)
 
 
@@ -139,15 +152,23 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
     label = ""
     for column in _NAME_COLUMNS:
         if column in row.columns and row[column].notna().iloc[0]:
-            label = str(row[column].iloc[0])
+            label = _text(row[column].iloc[0])
             break
     quality = FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons)
     return Field(polygon, target, name=label, method="boundary", quality=quality)
 
 
 def _named(rows: gpd.GeoDataFrame, name: str) -> np.ndarray:
-    columns = [column for column in rows.columns if column != rows.geometry.name]
+    """Rows of a name: by the first column that has it, those that name parcels before others."""
+    others = [c for c in rows.columns if c != rows.geometry.name and c not in _NAME_COLUMNS]
     hit = np.zeros(len(rows), bool)
-    for column in columns:
-        hit |= (rows[column].astype(str) == name).to_numpy()
+    for column in [c for c in _NAME_COLUMNS if c in rows.columns] + others:
+        hit = np.array([_text(value) == name for value in rows[column]], dtype=bool)
+        if hit.any():
+            break
     return hit
+
+
+def _text(value: Any) -> str:
+    """A value as a person writes it; a whole number where missing ones beside it made it 7.0."""
+    return f"{value:.0f}" if isinstance(value, float) and value.is_integer() else str(value)

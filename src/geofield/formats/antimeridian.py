@@ -14,6 +14,8 @@ import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from geofield.errors import FormatError
+
 #: No field is wider: what seems to be, jumps from one side of the map to the other.
 _WIDEST_DEG = 180.0
 _EAST = shapely.box(0.0, -90.0, 180.0, 90.0)
@@ -39,6 +41,12 @@ def split(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     if len(jumps):
         shapes = shapes.copy()
         whole = unwrapped(shapes[jumps])
+        if not shapely.is_valid(whole).all():
+            raise FormatError(
+                "A shape that reaches longitude 180 is not valid in degrees; one that goes round "
+                "a pole never is.",
+                hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
+            )
         west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
         for row, parts in zip(
             jumps, zip(shapely.intersection(whole, _EAST), west, strict=True), strict=True

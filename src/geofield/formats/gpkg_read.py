@@ -39,7 +39,7 @@ def read(path: Path) -> Dataset:
     FormatError
         When the file is damaged, or an edited layer is in another CRS.
     """
-    record = _origin(path)
+    record = record_of(path)
     layers = [name for name in layer_names(path) if name not in _NOT_LAYERS]
     if record is None:
         return read_foreign([RawLayer(name, read_vector(path, name)) for name in layers], path)
@@ -103,7 +103,7 @@ class PointsInFile:
 
 def scene_beside(path: Path) -> Path | None:
     """The picture beside a GeoPackage of geofield that belongs to it, where it is there."""
-    return _scene(_origin(path), path)
+    return _scene(record_of(path), path)
 
 
 def _scene(record: origin.Origin | None, path: Path) -> Path | None:
@@ -120,13 +120,26 @@ def opened(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
 
 
-def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
+def in_own_terms(
+    of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path
+) -> gpd.GeoDataFrame:
+    """A layer as a person left it, in the file's CRS and with columns as geofield spells them.
+
+    Raises
+    ------
+    FormatError
+        When it is in another CRS.
+    """
     if frame.crs is None or not CRS(frame.crs).equals(crs, ignore_axis_order=True):
         raise FormatError(
             f"{path.name}: layer {of.name!r} is no longer in {crs.name}.",
             hint="Export the layer in the CRS of the other layers, then repeat.",
         )
-    frame = _as_spelled(of, frame.set_crs(crs, allow_override=True))
+    return _as_spelled(of, frame.set_crs(crs, allow_override=True))
+
+
+def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
+    frame = in_own_terms(of, frame, crs, path)
     absent = frame.geometry.isna() | frame.geometry.is_empty
     if absent.any():
         warnings.warn(
@@ -161,7 +174,14 @@ def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     return frame.explode(index_parts=False, ignore_index=True)
 
 
-def _origin(path: Path) -> origin.Origin | None:
+def record_of(path: Path) -> origin.Origin | None:
+    """What geofield noted in a GeoPackage that it wrote; None in any other.
+
+    Raises
+    ------
+    FormatError
+        When the file is damaged.
+    """
     try:
         with opened(path) as connection:
             row = connection.execute(

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
 import shapely
 from pyproj import CRS
 
@@ -19,7 +18,14 @@ from geofield import schema
 from geofield.crs import reproject, transformer
 from geofield.model.own_values import own_values
 from geofield.model.segment_values import SegmentValues, values_in
-from geofield.model.tracks_written import Place, TracksWritten, Vertices, among, as_text
+from geofield.model.tracks_written import (
+    Place,
+    TracksWritten,
+    Vertices,
+    among,
+    as_text,
+    track_numbers,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -232,7 +238,7 @@ def _rows_by_number(
     number, that which is as written has it, or else the first.
     """
     parts = {row: one for row, one in enumerate(map(_parts, lines.geometry)) if one}
-    numbers = _numbered(lines)
+    numbers = track_numbers(lines)
     row_of: dict[int, int] = {}
     loose: list[int] = []
     for row, one in parts.items():
@@ -255,15 +261,9 @@ def _segments_by_number(
     """Vertices of segments by track number, and of those without one."""
     found: dict[int, list[Vertices]] = {}
     loose: list[Vertices] = []
-    for no, shape in zip(_numbered(segments), segments.geometry, strict=True):
+    for no, shape in zip(track_numbers(segments), segments.geometry, strict=True):
         (loose if no < 1 else found.setdefault(no, [])).extend(_parts(shape))
     return {no: parts for no, parts in found.items() if parts}, loose
-
-
-def _numbered(rows: gpd.GeoDataFrame) -> list[int]:
-    """The track numbers of rows, 0 where there is none."""
-    numbers = rows["track_no"].to_numpy("float64", na_value=np.nan)
-    return [int(no) for no in np.nan_to_num(numbers)]
 
 
 def _parts(shape: Any) -> list[Vertices]:

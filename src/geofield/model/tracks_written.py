@@ -95,9 +95,9 @@ class TracksWritten:
         if schema.own_columns(schema.TRACKS, lines):
             return False
         numbers = [row[0] for row in self.rows]
-        if numbers != segments["track_no"].tolist():
+        if numbers != track_numbers(segments):
             return False
-        if list(dict.fromkeys(numbers)) != lines["track_no"].tolist():
+        if list(dict.fromkeys(numbers)) != track_numbers(lines):
             return False
         flat = np.array([value for row in self.rows for value in row[1:]], dtype=np.float64)
         written = flat.reshape(-1, 2) / 1000.0 + self.middle
@@ -134,6 +134,12 @@ class TracksWritten:
         x, y = value["middle"]
         layout = float(value["heading_deg"]), float(value["spacing_m"])
         return cls(*layout, (int(x), int(y)), value["segments_mm"])
+
+
+def track_numbers(rows: gpd.GeoDataFrame) -> list[int]:
+    """The track numbers of rows, 0 where there is none."""
+    numbers = rows["track_no"].to_numpy("float64", na_value=np.nan)
+    return [int(no) for no in np.nan_to_num(numbers)]
 
 
 def among(one: Vertices, others: Sequence[Vertices]) -> bool:

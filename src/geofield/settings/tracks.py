@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, Field, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ModelWrapValidatorHandler,
+    PositiveFloat,
+    model_validator,
+)
 
 from geofield.settings.section import NonNegative, Section
 
@@ -15,6 +22,12 @@ DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_t
 
 #: Two ways to say where the first track lies.
 _PLACED = ("offset_m", "through_lonlat"), ("through_lonlat", "offset_m")
+
+
+def _as_text(value: Any) -> Any:
+    """A heading that was given as a number, as text."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return str(value) if number else value
 
 
 def _direction(value: str) -> str:
@@ -49,7 +62,7 @@ class TrackSettings(Section):
     )
     spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
     step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
-    direction: Annotated[str, AfterValidator(_direction)] = Field(
+    direction: Annotated[str, BeforeValidator(_as_text), AfterValidator(_direction)] = Field(
         "dominant",
         description="Of the tracks: dominant (the way most of the border runs), longest_edge, "
         "hough, fewest, fewest_turns, or a heading in "
@@ -102,12 +115,22 @@ class TrackSettings(Section):
         None, description="Longitude and latitude of the place where the route begins."
     )
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _follow(cls, given: Any) -> Any:
-        """Fill in what follows from the working width and the passes of the headland."""
+    def _follow(cls, given: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Fill in what follows from the working width and the passes of the headland.
+
+        What follows does not count as set: said with another spacing, it is another.
+        """
         if not isinstance(given, Mapping):
-            return given
+            return handler(given)
+        filled = cls._filled(given)
+        settings = handler(filled)
+        settings.model_fields_set.difference_update(filled.keys() - given.keys())
+        return settings
+
+    @classmethod
+    def _filled(cls, given: Mapping[str, Any]) -> dict[str, Any]:
         said = dict(given)
         width_m, overlap_m = _number(said.get("width_m")), _number(said.get("overlap_m"))
         if width_m is not None:

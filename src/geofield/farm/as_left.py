@@ -1,0 +1,77 @@
+"""What a person left of a farm's overview: its layers as they are now, and geofield's record."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pyproj import CRS
+
+from geofield import schema
+from geofield.errors import FormatError, FormatWarning
+from geofield.farm.layers import FIELD_ID
+from geofield.formats import origin
+from geofield.formats.gpkg_read import in_own_terms, record_of
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: What to do where nobody can tell edits any more.
+_ANEW = "the next `geofield batch` writes one to edit anew."
+
+
+def record_in(overview: Path) -> origin.Origin:
+    """What geofield noted when it wrote the overview.
+
+    Raises
+    ------
+    FormatError
+        When that is gone.
+    """
+    record = record_of(overview)
+    if record is None:
+        raise FormatError(
+            f"{overview.name} has no record of what geofield wrote (copies made by other programs "
+            "have none), so nobody can tell what was edited there.",
+            hint=f"Move it out of the farm: {_ANEW}",
+        )
+    return record
+
+
+def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
+    """A layer as it was edited, a column of its rows' fields in it.
+
+    Raises
+    ------
+    FormatError
+        When it is gone, lacks a column, or is in another CRS than the overview was written in.
+    """
+    import pyogrio
+
+    try:
+        table = pyogrio.read_dataframe(overview, layer=of.name)
+    except pyogrio.errors.DataLayerError as error:
+        raise FormatError(
+            f"{overview.name}: the layer {of.name!r} is gone.",
+            hint=f"Give it its name back, or move the file out of the farm: {_ANEW}",
+        ) from error
+    table = in_own_terms(of, table, crs, overview)
+    absent = int((table.geometry.isna() | table.geometry.is_empty).sum())
+    if absent and of is not schema.FIELD:
+        words = f"{absent} row(s) of layer {of.name!r} have no geometry, and count as deleted"
+        tell(f"{overview.name}: {words}.")
+    for name in of.column_names:
+        if name not in table:
+            raise FormatError(
+                f"{overview.name}: the column {name!r} of layer {of.name!r} is gone.",
+                hint="Undo that in QGIS, or put the edited fields back one by one.",
+            )
+    owner = table.get(FIELD_ID)
+    table = schema.conform(of, table.assign(**{"_owner": owner}), extras=True)
+    return table.assign(**{FIELD_ID: table.pop("_owner")})
+
+
+def tell(words: str) -> None:
+    """Warn of what was left and cannot be taken in."""
+    warnings.warn(words, FormatWarning, stacklevel=4)
