@@ -55,6 +55,10 @@ def test_the_terminal_and_the_report_tell(out: tuple[Path, str]) -> None:
     unfit = int((turns["fits"] == "no").sum())
     assert unfit > 0
     assert report["tracks"]["turns_that_do_not_fit"] == unfit
+    unworked_m = turns["skipped_m"].sum()
+    assert unworked_m > 1
+    assert report["tracks"]["unworked_at_turns_m"] == pytest.approx(unworked_m, abs=0.1)
+    assert f"{unworked_m:.0f} m of track left unworked at them" in told
     assert f"{unfit} of them do not fit" in told
 
 

@@ -178,12 +178,16 @@ def make_report(
     }
 
 
-def _turns(dataset: Dataset) -> dict[str, int]:
-    """How many turns there are, and how many of them the machine cannot drive."""
+def _turns(dataset: Dataset) -> dict[str, float]:
+    """How many turns there are, how many the machine cannot drive, what they leave unworked."""
     if "turns" not in dataset.tables:
         return {}
     turns = dataset.table("turns")
-    return {"turns": len(turns), "turns_that_do_not_fit": int((turns["fits"] == "no").sum())}
+    return {
+        "turns": len(turns),
+        "turns_that_do_not_fit": int((turns["fits"] == "no").sum()),
+        "unworked_at_turns_m": round(float(turns["skipped_m"].sum()), 1),
+    }
 
 
 def _parts(doubts: Any) -> list[str]:

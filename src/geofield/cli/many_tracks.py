@@ -208,6 +208,7 @@ def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
             "turn_count": len(turns),
             "turn_length_m": float(turns["length_m"].sum()),
             "turns_that_do_not_fit": int((turns["fits"] == "no").sum()),
+            "unworked_at_turns_m": float(turns["skipped_m"].sum()),
         }
     return {
         "field_id": plan.field.field_id,
@@ -230,6 +231,8 @@ def line_of(row: dict[str, Any]) -> str:
     )
     if "turn_count" in row:
         text += f", {row['turn_count']} turns ({row['turns_that_do_not_fit']} do not fit)"
+        if row["unworked_at_turns_m"] >= 0.5:
+            text += f", {row['unworked_at_turns_m']:.0f} m of track left unworked at them"
     if row["direction_why"]:
         text += f" ({row['direction_why']})"
     return f"{text}; in {row['file']}"

@@ -174,8 +174,9 @@ def _say_tracks(tracks: Tracks) -> None:
 
 
 def _say_turns(turns: Any) -> None:
-    unfit = int((turns["fits"] == "no").sum())
-    say(f"Turns      {len(turns)}")
+    unfit, unworked_m = int((turns["fits"] == "no").sum()), float(turns["skipped_m"].sum())
+    left = f", {unworked_m:.0f} m of track left unworked at them" if unworked_m >= 0.5 else ""
+    say(f"Turns      {len(turns)}{left}")
     if unfit:
         say(
             f"           {unfit} of them do not fit: the machine cannot drive them there (red on "

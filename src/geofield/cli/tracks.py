@@ -144,6 +144,7 @@ def _own_plan(file: Path) -> Plan | None:
 
     from geofield import schema
     from geofield.formats.foreign import layer_names
+    from geofield.formats.gpkg_read import record_of
     from geofield.plan import read_plan
 
     layer = schema.FIELD.name
@@ -152,7 +153,7 @@ def _own_plan(file: Path) -> Plan | None:
     if pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"] != 1:
         return None
     plan = read_plan(file)
-    if plan.tracks is None and schema.TRACKS.name in layer_names(file):
+    if schema.TRACKS.name in layer_names(file) and record_of(file) is None:
         say_note(
             f"{file.name} has lost the record of what was written (as copies made by other "
             "programs do): its tracks are planned anew, whatever was changed of them."

@@ -87,13 +87,13 @@ def _of_name(
         raise FieldError(f"The parcel {name!r} has {len(chosen)} parts; a field is one.")
     if lat is not None and lon is not None:
         return _around(chosen, own, lat, lon)
-    common = shapely.intersection_all(chosen.geometry.to_numpy())
-    if not common.area > 0.0:
+    smallest = _smallest(chosen)
+    if not chosen.intersects(smallest.geometry.iloc[0].representative_point()).all():
         raise FieldError(
             f"{len(chosen)} parcels of the boundary file are named {name!r}.",
             hint="Say which: --lat and --lon of a point in it, or another of its values.",
         )
-    return _smallest(chosen)
+    return smallest
 
 
 def _around(rows: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> gpd.GeoDataFrame:
