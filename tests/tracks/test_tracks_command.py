@@ -247,3 +247,9 @@ def test_a_plan_that_lost_its_record_is_told(tmp_path: Path) -> None:
         )
         assert done.exception is None, done.output
         assert ("has lost the record" in " ".join(done.output.split())) == lost
+
+
+def test_a_blank_name_is_none(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    (row,) = run(tmp_path / "parcel.gpkg", "--name", "  ", "-o", tmp_path / "plan.gpkg")["fields"]
+    assert row["name"] == "Field 1"

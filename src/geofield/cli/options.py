@@ -43,7 +43,16 @@ defaults_option = click.option(
     is_flag=True,
     help="Begin with the default settings, not with those that the plan was made with.",
 )
-name_option = click.option("--name", help="The field's name; its place when not given.")
+
+
+def _said(_context: click.Context, _option: click.Parameter, text: str | None) -> str | None:
+    """A text without blanks around it; None where there is no other."""
+    return (text or "").strip() or None
+
+
+name_option = click.option(
+    "--name", callback=_said, help="The field's name; its place when not given."
+)
 
 
 class Degrees(click.FloatRange):

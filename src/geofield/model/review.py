@@ -145,7 +145,8 @@ class _Rows:
         return len(self.shapes)
 
     def name_of(self, row: int) -> str:
-        return f"Obstacle {self.frame['obstacle_no'].iloc[row]}"
+        number = self.frame["obstacle_no"].iloc[row]
+        return "An obstacle without a number" if pd.isna(number) else f"Obstacle {number}"
 
     def table(self, rows: NDArray[np.int64]) -> gpd.GeoDataFrame:
         """Some rows, which all have a number, as a table."""
