@@ -131,6 +131,19 @@ def test_validate_goes_on_behind_what_it_cannot_read(plan_file, tmp_path):
     assert "is not known" in only["message"]
 
 
+def test_validate_knows_products_that_nothing_checks(plan_file, tmp_path):
+    """The report of a run was called a GeoJSON file without features."""
+    run(export, plan_file, "-f", "report,csv", "--out", tmp_path)
+    for file in (tmp_path / "report.json", tmp_path / "csv" / "obstacles.csv"):
+        done = CliRunner().invoke(validate, [str(file), "--json"])
+        assert done.exit_code == 0
+        ((only,),) = json.loads(done.stdout).values()
+        assert only["level"] == "warning"
+        assert "there is no check for" in only["message"]
+        with pytest.raises(FormatError, match="can be written, not read"):
+            run(info, file)
+
+
 def test_validate_finds_a_track_through_a_tree(tmp_path):
     dataset = make_dataset()
     dataset.tables["obstacles"].loc[2, "status"] = "confirmed"

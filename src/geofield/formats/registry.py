@@ -54,6 +54,10 @@ def detect(path: Path | str) -> Format:
         raise FormatError(f"There is no file {place}.", hint="Check the path.")
     if place.is_dir():
         return _detect_folder(place)
+    for each in FORMATS.values():
+        # Known by their names alone: a report is no GeoJSON.
+        if each.reader is None and place.name in {Path(file).name for file in each.files}:
+            return each
     suffix = place.suffix.lower()
     if suffix == ".xml" and _TASK_DATA in _head(place):
         return _isoxml_of(_head(place))
