@@ -173,7 +173,7 @@ def test_odd_requests_get_an_answer_in_words(visitor: Visitor) -> None:
         {"do": "direction", "a": [1e300, 1e300], "b": [0, 0]},
         {"do": "tracks", "settings": {"spacing_m": "wide"}},
         {"do": "tracks", "settings": {"spacing_m": 1e-9}},
-        {"do": "tracks", "settings": {"direction": 5}},
+        {"do": "tracks", "settings": {"direction": [5]}},
         {"do": "ground", "place": "ab"},
         {"do": "ground", "place": [1e300, 0]},
     ):
