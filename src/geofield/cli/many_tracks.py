@@ -78,9 +78,9 @@ def obstacles_for(
 
 def tell_spacing(places: Places | None, settings: Settings) -> None:
     """Tell by which spacing several plans in one GeoPackage are planned: it keeps no settings."""
-    from geofield.farm.standing import is_of_geofield
+    from geofield.formats.gpkg_read import is_own
 
-    if places is None or not is_of_geofield(Path(places.path)):
+    if places is None or not is_own(Path(places.path)):
         return
     said = {*settings.tracks.model_fields_set, *places.settings.column_names}
     if said.isdisjoint(("spacing_m", "width_m", "machine")):

@@ -45,13 +45,15 @@ defaults_option = click.option(
 )
 
 
-def _said(_context: click.Context, _option: click.Parameter, text: str | None) -> str | None:
+def without_blanks(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> str | None:
     """A text without blanks around it; None where there is no other."""
     return (text or "").strip() or None
 
 
 name_option = click.option(
-    "--name", callback=_said, help="The field's name; its place when not given."
+    "--name", callback=without_blanks, help="The field's name; its place when not given."
 )
 
 

@@ -74,9 +74,10 @@ def tracks(
     """Plan the tracks of one or many fields.
 
     FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with
-    all that a person changed, and whose settings hold where you say nothing else; or any file of
-    polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field. Their columns come
-    along, and those named like settings (spacing_m, heading_deg, ...) hold for their field.
+    all that a person changed, and whose settings hold where you say nothing else (one of several
+    fields keeps none); or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...), each of
+    which is a field. Their columns come along, and those named like settings (spacing_m,
+    heading_deg, ...) hold for their field.
     """
     from geofield.cli.many_tracks import (
         Wanted,
@@ -144,7 +145,7 @@ def _own_plan(file: Path) -> Plan | None:
 
     from geofield import schema
     from geofield.formats.foreign import layer_names
-    from geofield.formats.gpkg_read import record_of
+    from geofield.formats.gpkg_read import is_own
     from geofield.plan import read_plan
 
     layer = schema.FIELD.name
@@ -153,7 +154,7 @@ def _own_plan(file: Path) -> Plan | None:
     if pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"] != 1:
         return None
     plan = read_plan(file)
-    if schema.TRACKS.name in layer_names(file) and record_of(file) is None:
+    if schema.TRACKS.name in layer_names(file) and not is_own(file):
         say_note(
             f"{file.name} has lost the record of what was written (as copies made by other "
             "programs do): its tracks are planned anew, whatever was changed of them."

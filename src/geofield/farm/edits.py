@@ -68,9 +68,10 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
         """Layers of which one has such columns; none where none has: tracks are many."""
         some = [of for of in layers if of.name in written]
         has_own = any(own_names(of, written[of.name]) for of in some)
-        return {of: table_in(overview, of, crs) for of in some} if has_own else {}
+        if not has_own:
+            return {}
+        return {of: table_in(overview, of, written[of.name].crs) for of in some}
 
-    crs = record_in(overview).crs
     standing, driven = as_read((schema.FIELD, schema.OBSTACLES)), as_read(edited_tracks.EDITED)
     names = {
         of.name: dict(zip(own_names(of, table), own_names(of, written[of.name]), strict=True))
@@ -117,10 +118,12 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         When an edit cannot be understood, or, unless it is to hold `anyway`, its field was changed
         elsewhere since the overview was written; says which field and why.
     """
-    origin_of = record_in(overview)
-    record = {DIGESTS: {}, DETAILS: False, **origin_of.provenance.evidence}
-    written, crs = record[DIGESTS], origin_of.crs
-    fields, obstacles = (table_in(overview, of, crs) for of in (schema.FIELD, schema.OBSTACLES))
+    noted = record_in(overview)
+    record = {DIGESTS: {}, DETAILS: False, **noted.provenance.evidence}
+    written = record[DIGESTS]
+    fields, obstacles = (
+        table_in(overview, of, noted.crs) for of in (schema.FIELD, schema.OBSTACLES)
+    )
     _refuse_strange(overview, fields, written)
     obstacles = obstacles_with_owners(obstacles, fields, written)
     tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}

@@ -103,6 +103,7 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
             f"{folder} has no field {field_id!r}.",
             hint="The field's id must be that of the farm: see its status table.",
         )
+    _refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
     settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
@@ -125,7 +126,6 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
             plan, whole = run_tracks(plan, settings=settings), False
         if not whole:
             save_plan(plan, file, overwrite=True)
-        _refuse_unseen(store, {field_id}, but=plan_file)
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
     _replace(store, [plan])
@@ -164,9 +164,9 @@ def _put(store: Store, field_id: str, file: Path) -> None:
 
 def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> None:
     """Refuse to write over plans in `reviewed/` whose edits the farm has not taken in."""
-    for one in edited_in_place(store):
+    for one in edited_in_place(store, ids):
         file = Path(store.place) / file_of(one)
-        if one in ids and (but is None or not file.samefile(but)):
+        if but is None or not file.samefile(but):
             raise FormatError(
                 f"{file_of(one)} has edits that the farm does not hold yet.",
                 hint=f"Take them in first: geofield farm put {file} {store.place}; or move that "
@@ -195,10 +195,11 @@ def _same_ground(plan: Plan, other: Plan) -> bool:
     return mine is theirs if mine is None or theirs is None else bool(mine.equals(theirs))
 
 
-def edited_in_place(store: Store) -> Iterator[str]:
+def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]:
     """Fields whose plan in `reviewed/` was edited there since the farm took it in.
 
-    Only those that the farm has a plan of; a file that is newer, and says the same, is none.
+    Only those that the farm has a plan of, and `only` some where that is given; a file that is
+    newer, and says the same, is none.
 
     Warns
     -----
@@ -206,6 +207,8 @@ def edited_in_place(store: Store) -> Iterator[str]:
         When such a file cannot be read, or names another field.
     """
     names = reviewed_files(store)
+    if only is not None:
+        names &= {file_of(one) for one in only}
     if store.folder is None or not names:
         return
     farm = read_farm(store.place)

@@ -49,15 +49,10 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
 
 def own_obstacles(places: Path) -> Path | None:
     """The file of the places itself, where geofield wrote it with obstacles of theirs."""
-    mine = _holds_obstacles(places) and is_of_geofield(places)
+    from geofield.formats.gpkg_read import is_own
+
+    mine = _holds_obstacles(places) and is_own(places)
     return places.absolute() if mine else None
-
-
-def is_of_geofield(path: Path) -> bool:
-    """Whether geofield wrote a file, and it is a GeoPackage."""
-    from geofield.formats.gpkg_read import record_of
-
-    return path.suffix.lower() == ".gpkg" and path.is_file() and record_of(path) is not None
 
 
 def _holds_obstacles(path: Path) -> bool:

@@ -174,6 +174,11 @@ def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     return frame.explode(index_parts=False, ignore_index=True)
 
 
+def is_own(path: Path) -> bool:
+    """Whether a file is a GeoPackage that geofield wrote."""
+    return path.suffix.lower() == ".gpkg" and path.is_file() and record_of(path) is not None
+
+
 def record_of(path: Path) -> origin.Origin | None:
     """What geofield noted in a GeoPackage that it wrote; None in any other.
 

@@ -131,6 +131,7 @@ class TrackSettings(Section):
 
     @classmethod
     def _filled(cls, given: Mapping[str, Any]) -> dict[str, Any]:
+        """What was given with what follows from it; what contradicts a later word is left out."""
         said = dict(given)
         width_m, overlap_m = _number(said.get("width_m")), _number(said.get("overlap_m"))
         if width_m is not None:
