@@ -221,16 +221,22 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
             file = store.folder / file_of(one)
             if written_ns(file) <= taken_in_ns:
                 continue
-            try:
-                plan = read_plan(file)
-                if plan.field.field_id != one:
-                    raise FormatError(f"It is named {plan.field.field_id!r}, and not {one!r}.")
-                differs = _is_edited(plan, farm[one])
-            except GeofieldError as error:
-                warnings.warn(f"{file_of(one)} is not taken in: {error}", FieldWarning, 2)
-            else:
-                if differs:
-                    yield one
+            if _differs(file, farm[one]):
+                yield one
+
+
+def _differs(file: Path, before: Plan) -> bool:
+    """Whether a reviewed plan was edited since the farm took it in; no, where it cannot be read."""
+    field_id = before.field.field_id
+    try:
+        plan = read_plan(file)
+        if plan.field.field_id != field_id:
+            raise FormatError(f"It is named {plan.field.field_id!r}, and not {field_id!r}.")
+        return _is_edited(plan, before)
+    except GeofieldError as error:
+        words = f"{file_of(field_id)} is not taken in: {error}"
+        warnings.warn(words, FieldWarning, stacklevel=3)
+        return False
 
 
 def _is_edited(plan: Plan, before: Plan) -> bool:
