@@ -8,6 +8,7 @@ from qgis.core import QgsDataProvider, QgsProject, QgsVectorLayer, QgsWkbTypes
 
 from .algorithm import path_of
 from .results import settled
+from .sources import table_of
 
 
 def layers_of(path: str) -> dict[str, QgsVectorLayer]:
@@ -15,7 +16,7 @@ def layers_of(path: str) -> dict[str, QgsVectorLayer]:
     found, path = {}, str(settled(path))
     for layer in QgsProject.instance().mapLayers().values():
         if isinstance(layer, QgsVectorLayer) and path_of(layer) == path:
-            found[layer.source().rpartition("layername=")[2].split("|")[0]] = layer
+            found[table_of(layer)] = layer
     return found
 
 

@@ -71,13 +71,23 @@ def plan_file(layer: QgsMapLayer | None) -> str | None:
     """The plan whose outlines a layer has; None for any other layer."""
     if not isinstance(layer, QgsVectorLayer) or layer.providerType() != "ogr":
         return None
-    decoded = QgsProviderRegistry.instance().decodeUri("ogr", layer.source())
-    path = str(decoded.get("path") or "")
-    if not path.lower().endswith(".gpkg") or decoded.get("layerName") != "field":
+    path = str(QgsProviderRegistry.instance().decodeUri("ogr", layer.source()).get("path") or "")
+    if not path.lower().endswith(".gpkg") or table_of(layer) != "field":
         return None
     details = QgsProviderRegistry.instance().querySublayers(path)
     own = {"field", "obstacles"} <= {each.name() for each in details}
     return path if own and layer.fields().indexOf("field_id") >= 0 else None
+
+
+def table_of(layer: QgsVectorLayer) -> str:
+    """The table of its file that a layer shows, also where its source has no name or a number."""
+    registry = QgsProviderRegistry.instance()
+    decoded = registry.decodeUri("ogr", layer.source())
+    if decoded.get("layerName"):
+        return str(decoded["layerName"])
+    number = int(decoded.get("layerId") or 0)
+    tables = registry.querySublayers(str(decoded.get("path") or ""))
+    return next((each.name() for each in tables if each.layerNumber() == number), "")
 
 
 def is_whole(source: QgsProcessingFeatureSource, layer: QgsVectorLayer) -> bool:

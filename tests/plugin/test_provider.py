@@ -240,7 +240,7 @@ def test_the_outlines_of_a_plan_stand_for_the_plan(qgis, sample_plan, tmp_path):
     """Its obstacles count, whatever row is selected; they are refused while they are edited."""
     field = {"vector": f"{sample_plan}|layername=field", "select": "TRUE"}
     obstacles = {"vector": f"{sample_plan}|layername=obstacles"}
-    whole, selected, part, edited, nowhere = qgis(
+    whole, selected, part, edited, nowhere, unnamed, numbered = qgis(
         "several",
         requests=[
             {"do": "run", "algorithm": "geofield:tracks", "values": {
@@ -257,6 +257,12 @@ def test_the_outlines_of_a_plan_stand_for_the_plan(qgis, sample_plan, tmp_path):
             {"do": "run", "algorithm": "geofield:export", "values": {
                 "PLAN": {"memory": "drawn", "kind": "Polygon", "crs": "EPSG:32633", "rows": []},
                 "FORMATS": ["kml"], "OUTPUT": str(tmp_path / "nowhere")}},
+            # Beside the obstacles that are being edited still.
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": str(sample_plan), "SPACING_M": 8, "OUTPUT": str(tmp_path / "unnamed")}},
+            {"do": "run", "algorithm": "geofield:tracks", "values": {
+                "INPUT": {"vector": f"{sample_plan}|layerid=0"}, "SPACING_M": 8,
+                "OUTPUT": str(tmp_path / "numbered")}},
         ],
     )  # fmt: skip
     known = len(read_dataset(Path(sample_plan)).table("obstacles"))
@@ -264,7 +270,8 @@ def test_the_outlines_of_a_plan_stand_for_the_plan(qgis, sample_plan, tmp_path):
         assert "Only some fields" not in answer["log"], answer["log"]
         assert len(read_dataset(tmp_path / name / "sample.gpkg").table("obstacles")) == known
     assert "Only some fields" in part["log"]
-    assert "not saved" in edited["error"]
+    for answer in (edited, unnamed, numbered):
+        assert "not saved" in answer["error"]
     assert "Choose a layer of a plan" in nowhere["error"]
 
 
