@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +25,25 @@ def refuse_other_names(output: Path) -> None:
         )
 
 
+@contextmanager
+def staged_plan(
+    output: Path, *, overwrite: bool = False, inputs: Iterable[Path | str] = ()
+) -> Iterator[Path]:
+    """A folder to write a plan's GeoPackage into, which then takes the place of the one before.
+
+    The one before stays as the earlier one, and what a person keeps in it beside its plan comes
+    along. `inputs`, files read for this work, are never replaced.
+    """
+    from geofield.formats.gpkg_guests import bring_guests
+
+    refuse_other_names(output)
+    with staged_folder(output.parent, overwrite=overwrite, inputs=inputs) as staging:
+        earlier = keep_earlier(output, staging)
+        yield staging
+        if earlier is not None:
+            bring_guests(earlier, staging / output.name)
+
+
 def save_plan(
     plan: Plan,
     output: Path,
@@ -30,19 +51,18 @@ def save_plan(
     read_from: Path | None = None,
     picture: Path | None = None,
     overwrite: bool = False,
+    inputs: Iterable[Path | str] = (),
 ) -> None:
     """Write a plan as one GeoPackage.
 
     `output` may be `read_from`, the GeoPackage that the plan was read from: a stage that adds to a
-    file replaces it in one step. `overwrite` allows to replace another. What a person keeps in the
-    replaced file beside its plan comes along. The project shows the `picture`, by default that
-    which belongs to `read_from`.
+    file replaces it in one step. `overwrite` allows to replace another, but none of the `inputs`:
+    all other files that were read. The project shows the `picture`, by default that which belongs
+    to `read_from`.
     """
     from geofield.formats import write_dataset
-    from geofield.formats.gpkg_guests import bring_guests
     from geofield.formats.gpkg_read import scene_beside
 
-    refuse_other_names(output)
     same = read_from is not None and output.resolve() == read_from.resolve()
     dataset = plan.to_dataset()
     if picture is None and read_from is not None:
@@ -50,8 +70,5 @@ def save_plan(
     if picture is not None and output.resolve().parent == picture.resolve().parent:
         # The project goes on showing the picture that lies there.
         dataset = replace(dataset, scene_path=picture)
-    with staged_folder(output.parent, overwrite=overwrite or same) as staging:
-        earlier = keep_earlier(output, staging)
+    with staged_plan(output, overwrite=overwrite or same, inputs=inputs) as staging:
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
-        if earlier is not None:
-            bring_guests(earlier, staging / output.name)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -253,3 +255,29 @@ def test_a_blank_name_is_none(tmp_path: Path) -> None:
     outlines(1).to_file(tmp_path / "parcel.gpkg")
     (row,) = run(tmp_path / "parcel.gpkg", "--name", "  ", "-o", tmp_path / "plan.gpkg")["fields"]
     assert row["name"] == "Field 1"
+
+
+def test_a_file_that_is_read_is_never_replaced(tmp_path: Path) -> None:
+    one, many, trees = (tmp_path / f"{name}.gpkg" for name in ("one", "many", "Field_1"))
+    outlines(1).to_file(one)
+    outlines(2).to_file(many)
+    gpd.GeoDataFrame(
+        {"radius_m": [3.0]}, geometry=gpd.points_from_xy([500050], [5600030]), crs=CRS
+    ).to_file(trees)
+    owned = {file: file.read_bytes() for file in (one, many, trees)}
+    for words in (
+        [one, "-o", one],
+        [one, "--obstacles", trees, "-o", trees],
+        [many, "--obstacles", trees, "-o", trees],
+        [many, "--obstacles", trees, "--each", "-o", tmp_path],
+    ):
+        done = CliRunner().invoke(cli, ["tracks", *map(str, words), "--overwrite"])
+        assert "is an input of this work" in str(done.exception)
+        assert {file: file.read_bytes() for file in owned} == owned
+    # Another one with several fields in it is replaced, and kept as the earlier one.
+    made = tmp_path / "all.gpkg"
+    run(many, "--spacing", "6", "-o", made)
+    before = pyogrio.read_info(made, layer="tracks", force_feature_count=True)["features"]
+    run(many, "--spacing", "8", "-o", made, "--overwrite")
+    with closing(sqlite3.connect(tmp_path / "all.gpkg.bak")) as earlier:
+        assert earlier.execute("SELECT count(*) FROM tracks").fetchone() == (before,)

@@ -148,7 +148,9 @@ def field(
             picture.path, lat=lat, lon=lon, settings=settings, previous=previous,
             regions=regions, boundary=parcel, choose=choose, name=name, fetch_wider=picture.wider,
         )  # fmt: skip
-    save_plan(plan, output, read_from=output if previous else None, overwrite=overwrite)
+    inputs = [each for each in (imagery, boundary) if each is not None]
+    read_from = output if previous else None
+    save_plan(plan, output, read_from=read_from, overwrite=overwrite, inputs=inputs)
     if as_json:
         echo_json(_figures(plan, output))
     else:

@@ -94,22 +94,17 @@ def of_many(places: Places, job: Job, wanted: Wanted) -> Told:
     """Plan all parcels and write them; the figures of each, and why some failed, by name."""
     if wanted.each:
         return _each(places, job, wanted)
-    from geofield.errors import FormatError
     from geofield.farm.overview import dataset_of
     from geofield.formats.gpkg import write as write_gpkg
-    from geofield.staging import staged_folder
+    from geofield.plan_files import staged_plan
 
     output = wanted.output
     if not output.suffix:
         farm = _farm(places, job, output, wanted, fresh=wanted.overwrite)
         return _figures(farm, output, wanted)
-    if output.suffix.lower() != ".gpkg":
-        raise FormatError(
-            f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg, or name a folder."
-        )
     with (
         tempfile.TemporaryDirectory(prefix="geofield-") as folder,
-        staged_folder(output.parent, overwrite=wanted.overwrite, inputs=[places.path]) as staging,
+        staged_plan(output, overwrite=wanted.overwrite, inputs=_inputs(places, job)) as staging,
     ):
         farm = _farm(places, job, Path(folder) / "farm", wanted, fresh=False)
         write_gpkg(dataset_of(farm, output.stem), staging, stem=output.stem, options={})
@@ -181,9 +176,14 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
                 failed[stem] = f"{error.message} {error.hint or ''}".strip()
                 continue
             target = wanted.output / f"{stem}.gpkg"
-            save_plan(plan, target, overwrite=wanted.overwrite)
+            save_plan(plan, target, overwrite=wanted.overwrite, inputs=_inputs(places, job))
             rows.append(figures_of(plan, target))
     return rows, failed
+
+
+def _inputs(places: Places, job: Job) -> list[Path | str]:
+    """The files that are read, which are a person's own."""
+    return [places.path, *([] if job.obstacles is None else [job.obstacles])]
 
 
 def file_name(name: str) -> str:

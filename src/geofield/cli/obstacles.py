@@ -67,7 +67,7 @@ def obstacles(
         settings = continued(settings, plan.settings, "obstacles")
     tell_idle(settings)
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
-    save_plan(plan, output, read_from=plan_file, overwrite=overwrite)
+    save_plan(plan, output, read_from=plan_file, overwrite=overwrite, inputs=[imagery])
     table = plan.obstacles
     if table is None:
         return

@@ -174,8 +174,10 @@ def _one(
     from geofield.plan import Plan
     from geofield.plan_files import save_plan
 
+    inputs = [] if job.obstacles is None else [job.obstacles]
     if not isinstance(plan, Plan):
         done, read_from = plan_place(plan, job), None
+        inputs.append(file)
     else:
         if job.obstacles is not None:
             plan = with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
@@ -185,5 +187,5 @@ def _one(
         done, read_from = run_tracks(plan, settings=job.settings), file
     for change in done.changes:
         say(f"Changes: {change}")
-    save_plan(done, target, read_from=read_from, overwrite=overwrite)
+    save_plan(done, target, read_from=read_from, overwrite=overwrite, inputs=inputs)
     return figures_of(done, target)

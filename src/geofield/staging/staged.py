@@ -148,7 +148,7 @@ def _refuse(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
     if place.resolve() in {Path(path).resolve() for path in inputs}:
         raise FormatError(
             f"{place} is an input of this work and would be overwritten.",
-            hint="Write to another folder.",
+            hint="Write to another file or folder.",
         )
     if place.is_dir():
         raise FormatError(f"{place} is a folder.", hint="Choose another name.")
