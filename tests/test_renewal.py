@@ -13,8 +13,9 @@ from pathlib import Path
 import geopandas as gpd
 import pytest
 
-from geofield.renewal import outdated, written_ns
+from geofield.renewal import outdated
 from geofield.simulate import SimulatedField
+from geofield.staging import written_ns
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 PRODUCTS = ["field.rdf", "geojson/", "map.png", "obstacles.rdf", "report.json", "shapefile/"]

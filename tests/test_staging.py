@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -142,6 +143,30 @@ def test_an_edit_made_meanwhile_is_kept(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError, match="another program"):
         overwrite()
     assert (tmp_path / "a.txt").read_text() == "a person's"
+
+
+def test_an_edit_in_the_log_of_a_program_that_died_is_kept(tmp_path: Path) -> None:
+    plan = tmp_path / "field.gpkg"
+    code = (
+        "import os, sqlite3, sys; db = sqlite3.connect(sys.argv[1], isolation_level=None); "
+        "db.execute('PRAGMA journal_mode = WAL'); db.execute('CREATE TABLE field (name)'); "
+        "db.execute('PRAGMA wal_checkpoint(TRUNCATE)'); print('open', flush=True); "
+        "sys.stdin.readline(); db.execute('INSERT INTO field VALUES (1)'); os._exit(0)"
+    )
+    line = [sys.executable, "-c", code, str(plan)]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+
+        def overwrite() -> None:
+            with staged_folder(tmp_path, overwrite=True) as folder:
+                (folder / plan.name).write_text("ours")
+                other.communicate("edit\n")
+
+        with pytest.raises(OutputExistsError, match="another program"):
+            overwrite()
+    with closing(sqlite3.connect(plan)) as file:
+        assert file.execute("SELECT * FROM field").fetchall() == [(1,)]
 
 
 def test_links_in_the_output_folder_lead_nowhere(tmp_path: Path) -> None:

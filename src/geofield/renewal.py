@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from geofield.formats import FORMATS, Format, read_dataset, write_dataset
 from geofield.formats.gpkg_read import scene_beside
 from geofield.products import PLAN_FILE, write_report
-from geofield.staging import log_of, staged_folder
+from geofield.staging import staged_folder, written_ns
 
 #: What is no product of the plan, but the plan itself and what it was made from.
 _NOT_RENEWED = ("gpkg", "scene")
@@ -32,16 +31,6 @@ def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     if "rdf" in found and "rdf-study" in found:
         del found["rdf" if _is_study(found["rdf"][0]) else "rdf-study"]
     return found
-
-
-def written_ns(file: Path) -> int:
-    """When a GeoPackage was written last, also where that still lies in the log beside it."""
-    written = file.stat().st_mtime_ns
-    with suppress(FileNotFoundError):
-        log = log_of(file).stat()
-        if log.st_size:
-            written = max(written, log.st_mtime_ns)
-    return written
 
 
 def outdated(plan_file: Path) -> list[str]:

@@ -21,9 +21,8 @@ from geofield.farm.value import read_farm
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
-from geofield.renewal import written_ns
 from geofield.settings import Settings
-from geofield.staging import refuse_locked
+from geofield.staging import refuse_locked, written_ns
 from geofield.staging.generations import copy_whole
 
 if TYPE_CHECKING:

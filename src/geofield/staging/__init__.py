@@ -8,7 +8,7 @@ made, why it cannot be written, and what belongs to a file in it.
 """
 
 from geofield.staging.claims import claimed
-from geofield.staging.folders import cannot_write, log_of
+from geofield.staging.folders import cannot_write, log_of, written_ns
 from geofield.staging.leftovers import PREFIX, unstopped
 from geofield.staging.staged import refuse_locked, staged_file, staged_folder
 
@@ -21,4 +21,5 @@ __all__ = [
     "staged_file",
     "staged_folder",
     "unstopped",
+    "written_ns",
 ]

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from geofield.errors import OutputExistsError
-from geofield.staging.folders import cannot_write, log_of, made_folder
+from geofield.staging.folders import cannot_write, log_of, made_folder, written_ns
 from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_folder
 
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
 _LEVELS = 2
-#: Inode and time of change of files, by path from the folder.
+#: Inode and time of the last writing of files, by path from the folder.
 Seen = dict[Path, tuple[int, int]]
 
 
@@ -126,7 +126,7 @@ def seen(target: Path, places: Iterable[Path] | None = None) -> Seen:
         except OSError:
             continue
         if stat.S_ISREG(facts.st_mode):
-            found[place.relative_to(target)] = (facts.st_ino, facts.st_mtime_ns)
+            found[place.relative_to(target)] = (facts.st_ino, written_ns(place, facts))
     return found
 
 

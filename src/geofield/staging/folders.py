@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import FormatError
@@ -41,6 +42,16 @@ def made_folder(target: Path) -> Iterator[None]:
 def log_of(file: Path) -> Path:
     """The write-ahead log of SQLite, where QGIS puts what it saves while the file is open there."""
     return file.with_name(file.name + "-wal")
+
+
+def written_ns(file: Path, facts: os.stat_result | None = None) -> int:
+    """When a file was written last, also where that still lies in the log beside it."""
+    written = (facts or file.stat()).st_mtime_ns
+    with suppress(FileNotFoundError):
+        log = log_of(file).stat()
+        if log.st_size:
+            written = max(written, log.st_mtime_ns)
+    return written
 
 
 def cannot_write(target: Path, error: OSError) -> FormatError:
