@@ -177,6 +177,24 @@ def test_obstacles_of_a_file_are_avoided(tmp_path: Path) -> None:
     assert set(whole.gaps["cause"].str.startswith("obstacle")) == {True}
 
 
+def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> None:
+    places = parcels(tmp_path / "p.gpkg", 2)
+    middle = gpd.read_file(places).to_crs(32632).centroid
+    trees = gpd.GeoDataFrame(geometry=middle, crs=32632)
+    trees.to_crs(32633).set_crs(32632, allow_override=True).to_file(tmp_path / "away.gpkg")
+    said = batch(places, "--obstacles", tmp_path / "away.gpkg", "--buffer", 5, "--strategy",
+                 "single", "--spacing", 4, "--out", tmp_path / "farm")  # fmt: skip
+    said = " ".join(said.split())
+    assert "--buffer changes nothing without IMAGERY" in said
+    assert "--strategy changes nothing without IMAGERY" in said
+    assert "none of its 2 obstacles stands at a field that was planned" in said
+    assert "2 points have no radius_m; they are circles of 2 m" in said
+    trees.assign(radius_m="6.5 m").to_file(tmp_path / "text.gpkg")
+    said = batch(places, "--obstacles", tmp_path / "text.gpkg", "--out", tmp_path / "no", code=1)
+    assert "text.gpkg, row 1: radius_m '6.5 m' is no length" in said
+    assert not (tmp_path / "no").exists()
+
+
 def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_path: Path) -> None:
     line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
             str(tmp_path / "farm"), "--workers", "1"]  # fmt: skip

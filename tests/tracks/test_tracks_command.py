@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 from geofield import schema
 from geofield.cli.main import cli
-from geofield.errors import TrackError, TrackWarning
+from geofield.errors import GeofieldError, TrackError, TrackWarning
 from geofield.farm import read_farm
 from geofield.tracks import plan_tracks
 from geofield.tracks.fewest import candidate_angles
@@ -281,3 +281,59 @@ def test_a_file_that_is_read_is_never_replaced(tmp_path: Path) -> None:
     run(many, "--spacing", "8", "-o", made, "--overwrite")
     with closing(sqlite3.connect(tmp_path / "all.gpkg.bak")) as earlier:
         assert earlier.execute("SELECT count(*) FROM tracks").fetchone() == (before,)
+
+
+def standing(path: Path, places: list[Any], crs: object = CRS, **columns: Any) -> Path:
+    gpd.GeoDataFrame(columns or {"n": range(len(places))}, geometry=places, crs=crs).to_file(path)
+    return path
+
+
+def planned_around(parcels: Path, trees: Path, out: Path, code: int = 0) -> str:
+    """What the command says, on one line."""
+    done = CliRunner().invoke(
+        cli, ["tracks", str(parcels), "--obstacles", str(trees), "--spacing", "5", "-o", str(out)]
+    )
+    assert done.exit_code == code or isinstance(done.exception, GeofieldError), done.output
+    return " ".join(f"{done.output} {done.exception if code else ''}".split())
+
+
+@pytest.mark.parametrize("size", ["4 m", -3.0, float("inf")])
+def test_a_radius_that_is_no_length_is_refused_with_its_row(tmp_path: Path, size: object) -> None:
+    """The points became circles of 2 m: 16.8 m of track in a crown of 6.5 m."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    trees = standing(
+        tmp_path / "trees.gpkg", [shapely.Point(500050, 5600030)] * 2,
+        radius_m=["3", size] if isinstance(size, str) else [3.0, size],
+    )  # fmt: skip
+    out = tmp_path / "plan.gpkg"
+    assert "trees.gpkg, row 2: radius_m" in planned_around(tmp_path / "parcel.gpkg", trees, out, 1)
+    assert not out.exists()
+
+
+def test_sizes_of_points_are_taken_as_they_are_meant(tmp_path: Path) -> None:
+    """A decimal comma is one, and a wood far off reaches in by its radius."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    east, south = outlines(1).total_bounds[2], 5600030
+    trees = standing(
+        tmp_path / "trees.gpkg", [shapely.Point(500050, south), shapely.Point(east + 120, south)],
+        radius_m=["6,5", "150"],
+    )  # fmt: skip
+    planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "plan.gpkg")
+    found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
+    assert found["radius_m"].tolist() == [6.5, 150.0]
+
+
+@pytest.mark.parametrize("several", [1, 2])
+def test_obstacles_that_are_not_avoided_are_told(tmp_path: Path, several: int) -> None:
+    outlines(several).to_file(tmp_path / "parcels.gpkg")
+    here = shapely.Point(500050, 5600030)
+    for name, places, crs, told in (
+        ("elsewhere", [here], 32632, "none of its 1 obstacles stands at a field"),
+        ("empty", [], CRS, "holds no shape: NOTHING of it is avoided"),
+        ("half", [here, None], CRS, "1 rows have no shape and are not avoided: row 2"),
+        ("right", [here], CRS, ""),
+    ):
+        trees = standing(tmp_path / f"{name}.gpkg", places, crs, radius_m=[3.0] * len(places))
+        said = planned_around(tmp_path / "parcels.gpkg", trees, tmp_path / f"{name}_plan.gpkg")
+        assert told in said
+        assert ("avoided" in said) == bool(told)

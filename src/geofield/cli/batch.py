@@ -14,8 +14,9 @@ from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
 from geofield.cli.many_tracks import obstacles_for
-from geofield.cli.options import acknowledge_option, stage_options
+from geofield.cli.options import acknowledge_option, stage_options, tell_idle
 from geofield.cli.place_options import place_options, places_of
+from geofield.cli.standing import tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from geofield.farm.run import Count
     from geofield.farm.store import Store
     from geofield.farm.work import Imagery
-    from geofield.settings import Settings
+    from geofield.settings import Settings, Stage
 
 
 @click.command(
@@ -120,6 +121,7 @@ def batch(
     from geofield.farm.limits import Limits
     from geofield.farm.reviewed import without_place
     from geofield.farm.run import run_farm
+    from geofield.farm.standing import outlines_in
     from geofield.farm.store import Store
     from geofield.farm.work import Job
 
@@ -135,6 +137,8 @@ def batch(
     pictures, about = _imagery(imagery, settings, found, acknowledged=acknowledge_terms)
     job = Job(settings, pictures, None if obstacle_file is None else obstacle_file.absolute(),
               options.get("places_crs"))  # fmt: skip
+    _tell_unused(settings, found, pictures=imagery is not None)
+    tell_obstacles(job, several=True)
     store = Store.of(out)
     if scheduler is not None and workers is not None:
         raise click.UsageError("Name --workers or --scheduler, not both.")
@@ -162,6 +166,7 @@ def batch(
         echo_json({"farm": store.shown, "places": count.total, **count.statuses, "files": files})
     else:
         _summarise(count, store.shown, files)
+    tell_unreached(job, outlines_in(store))
     if count.done < count.total:
         raise GeofieldError(
             f"Stopped: {count.done} of {count.total} places are done.",
@@ -169,6 +174,20 @@ def batch(
         )
     if count.failed == count.total:
         raise GeofieldError("No place could be planned.", hint="The reasons are in failed.csv.")
+
+
+def _tell_unused(settings: Settings, places: Places, *, pictures: bool) -> None:
+    """Tell which options change nothing where outlines are given, and no picture is."""
+    unused: dict[Stage, str] = {}
+    if places.parcels:
+        unused["field"] = "beside parcels, which are taken as they are"
+    if not pictures:
+        unused["imagery"] = "without IMAGERY"
+        unused["obstacles"] = (
+            "without IMAGERY: what --obstacles names keeps the margin of its column buffer_m"
+        )
+    if not places.settings.num_columns:  # a column could choose another way for its field
+        tell_idle(settings, unused=unused)
 
 
 @contextmanager

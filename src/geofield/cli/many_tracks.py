@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import progress_bar, say, say_note
+from geofield.cli.standing import tell_unreached
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -117,6 +118,7 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     from geofield.farm.finish import finish
     from geofield.farm.pool import Pool, cores
     from geofield.farm.run import run_farm
+    from geofield.farm.standing import outlines_in
     from geofield.farm.store import Store
     from geofield.farm.value import read_farm
 
@@ -134,6 +136,7 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     waiting = waiting and take_in(store, waiting)
     if stays:
         finish(store, places, anew=count.done > count.before, overview=not waiting)
+    tell_unreached(job, outlines_in(store))
     return read_farm(folder)
 
 
@@ -165,7 +168,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
             f"{wanted.output} is one file, and --each writes one for each of {len(places)} fields.",
             hint="Give a folder: --each -o plans/",
         )
-    rows, failed, taken = [], {}, set[str]()
+    rows, failed, taken, outlines = [], {}, set[str](), []
     with progress_bar(quiet=wanted.quiet) as progress:
         for done, place in enumerate(places):
             stem = unlike(file_name(place.name), taken, "_")
@@ -178,6 +181,8 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
             target = wanted.output / f"{stem}.gpkg"
             save_plan(plan, target, overwrite=wanted.overwrite, inputs=_inputs(places, job))
             rows.append(figures_of(plan, target))
+            outlines.append([plan.field.polygon_lonlat])
+    tell_unreached(job, outlines)
     return rows, failed
 
 

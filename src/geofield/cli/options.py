@@ -18,7 +18,6 @@ from pydantic.fields import FieldInfo
 
 from geofield.cli.console import say, say_note
 from geofield.settings import (
-    FieldSettings,
     LonLat,
     Settings,
     Stage,
@@ -161,15 +160,22 @@ def continued(settings: Settings, earlier: Settings | None, section: Stage) -> S
     return settings
 
 
-def tell_idle(settings: Settings, *, parcel: bool = False) -> None:
+def tell_idle(
+    settings: Settings, *, parcel: bool = False, unused: Mapping[Stage, str] | None = None
+) -> None:
     """Tell which options that were given change nothing, as the way they belong to is not taken.
 
-    With a `parcel` of the user's own those are all options of the outline.
+    With a `parcel` of the user's own those are all options of the outline; so are those of stages
+    that are `unused`, for the reason that stands there.
     """
     said = section_values(click.get_current_context().params)
-    for name in said.pop("field", {}) if parcel else ():
-        option = option_named(name, FieldSettings.model_fields[name])
-        say_note(f"{option} changes nothing beside --boundary, whose parcel is taken as it is.")
+    reasons: dict[Stage, str] = {**(unused or {})}
+    if parcel:
+        reasons["field"] = "beside --boundary, whose parcel is taken as it is"
+    for section, why in reasons.items():
+        fields = type(getattr(settings, section)).model_fields
+        for name in said.pop(section, {}):
+            say_note(f"{option_named(name, fields[name])} changes nothing {why}.")
     for sentence in idle(settings, said):
         say_note(sentence)
 

@@ -19,6 +19,7 @@ from geofield.cli.options import (
     tell_idle,
 )
 from geofield.cli.refresh import say_outdated
+from geofield.cli.standing import tell_obstacles, tell_unreached
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
@@ -101,6 +102,7 @@ def tracks(
     job = Job(settings, None, obstacle_file and obstacle_file.absolute(), crs)
     if places is None or not places.settings.num_columns:
         tell_idle(settings)  # a column could choose another way for its field
+    tell_obstacles(job, several=several)
     if name and several:
         raise click.UsageError("--name is one field's name: the file has several.")
     rows: list[dict[str, Any]]
@@ -185,6 +187,7 @@ def _one(
             evidence = replace(plan.evidence, track_edits=TrackEdits())
             plan = replace(plan, tracks=None, evidence=evidence)
         done, read_from = run_tracks(plan, settings=job.settings), file
+    tell_unreached(job, [[done.field.polygon_lonlat]])
     for change in done.changes:
         say(f"Changes: {change}")
     save_plan(done, target, read_from=read_from, overwrite=overwrite, inputs=inputs)

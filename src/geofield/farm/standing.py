@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,16 +12,25 @@ import numpy as np
 import shapely
 
 from geofield import schema
-from geofield.errors import CRSError, TrackError
+from geofield.crs import LONLAT
+from geofield.errors import CRSError, FormatError, TrackError
+from geofield.farm.folder import committed, read_part
+from geofield.farm.layers import GEOMETRY
+from geofield.farm.store import Store
 from geofield.plan import Plan
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
+#: Outlines, in an array or a list.
+Shapes = Sequence[shapely.Geometry] | np.ndarray
 LINE_HALF_WIDTH_M = 0.05
 """A fence or wire drawn as a line becomes a strip of this half width."""
-#: Points are wider than they look: their radius is only known further on.
+#: Points are wider than they look; the least that is looked at around a field.
 _NEAR_M = 100.0
+#: Rows of a file that have no shape, by their numbers from 1.
+WITHOUT_SHAPE = "without_shape"
+_DEGREE_M = 111_000.0
 
 
 @lru_cache(maxsize=2)
@@ -28,7 +38,12 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
     """What to avoid, from any file: its rows, numbered as in the file; longitude and latitude.
 
     Of a plan, or several in one GeoPackage, their obstacles as they stand. Read once per process,
-    however many fields there are.
+    however many fields there are. Rows without a shape are left out, and named in its attributes.
+
+    Raises
+    ------
+    FormatError
+        For a point whose radius or margin is there and cannot be understood.
     """
     from geofield.crs import parse_crs
     from geofield.formats.foreign import read_vector
@@ -43,8 +58,37 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
         frame = frame.set_crs(parse_crs(crs))
     if column_like(frame, NUMBER_COLUMNS) is None:
         frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
-    frame = frame[~(frame.geometry.isna() | frame.geometry.is_empty)]
-    return frame.explode(ignore_index=True)
+    empty = np.asarray(frame.geometry.isna() | frame.geometry.is_empty)
+    rows = frame[~empty].explode()
+    _understand_lengths(rows, path)
+    rows = rows.reset_index(drop=True)
+    rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in frame.index[empty]]
+    return rows
+
+
+def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
+    """Make radius and margin of points numbers; refuse what would become a smaller thing."""
+    from geofield.formats.foreign_tables import (
+        BUFFER_COLUMNS,
+        RADIUS_COLUMNS,
+        column_like,
+        numbers_like,
+    )
+
+    for names in (RADIUS_COLUMNS, BUFFER_COLUMNS):
+        said = column_like(rows, names)
+        if said is None:
+            continue
+        lengths_m = numbers_like(rows, names)
+        blank = said.isna() | (said.astype(str).str.strip() == "")
+        wrong = ~blank & (rows.geom_type == "Point") & ~((lengths_m >= 0) & np.isfinite(lengths_m))
+        if wrong.any():
+            row, text = rows.index[wrong][0] + 1, str(said[wrong].iloc[0])
+            raise FormatError(
+                f"{path.name}, row {row}: {said.name} {text!r} is no length.",
+                hint="Write metres as a number, such as 6.5, or leave it empty.",
+            )
+        rows[said.name] = lengths_m
 
 
 def own_obstacles(places: Path) -> Path | None:
@@ -88,7 +132,7 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     if line.any():
         strips = mine.geometry.where(~line, mine.geometry.buffer(LINE_HALF_WIDTH_M))
         mine = mine.set_geometry(strips)
-    near = mine.geometry.intersects(plan.field.polygon.buffer(_NEAR_M))
+    near = mine.geometry.intersects(plan.field.polygon.buffer(_near_m(standing)))
     if not near.any() and _swapped_here(standing, plan):
         raise TrackError(
             f"The obstacles lie at {plan.field.name} only with latitude and longitude swapped.",
@@ -99,11 +143,63 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     return replace(plan, obstacles=table[reach].reset_index(drop=True))
 
 
+def any_reached(standing: gpd.GeoDataFrame, outlines_lonlat: Iterable[Shapes]) -> bool:
+    """Whether something of a file, as wide as it is, stands in or at one of the outlines (degrees).
+
+    They come in parts, of which no more are looked at than it takes.
+    """
+    west, south, east, north = standing.to_crs(LONLAT).bounds.to_numpy().T
+    wide = _reach_m(standing) / _DEGREE_M
+    along = wide / np.maximum(np.cos(np.radians(south)), 0.01)
+    boxes = shapely.box(west - along, south - wide, east + along, north + wide)
+    tree = shapely.STRtree(boxes)
+    return any(tree.query(part, predicate="intersects").size for part in outlines_lonlat)
+
+
+def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
+    """How far each row reaches beyond its own shape."""
+    from geofield.formats.foreign_tables import (
+        BUFFER_COLUMNS,
+        POINT_RADIUS_M,
+        RADIUS_COLUMNS,
+        numbers_like,
+    )
+
+    radius_m = np.nan_to_num(numbers_like(standing, RADIUS_COLUMNS), nan=POINT_RADIUS_M)
+    return np.where(
+        standing.geom_type == "Point",
+        radius_m + np.nan_to_num(numbers_like(standing, BUFFER_COLUMNS)),
+        LINE_HALF_WIDTH_M,
+    )
+
+
+def unsized_points(standing: gpd.GeoDataFrame) -> int:
+    """How many points say no radius."""
+    from geofield.formats.foreign_tables import RADIUS_COLUMNS, numbers_like
+
+    sized = numbers_like(standing, RADIUS_COLUMNS) > 0
+    return int(np.count_nonzero((standing.geom_type == "Point") & ~sized))
+
+
+def outlines_in(store: Store) -> Iterator[np.ndarray]:
+    """The outlines of a farm in degrees, chunk by chunk."""
+    for chunk in committed(store):
+        table = read_part(store, schema.FIELD.name, chunk, [GEOMETRY])
+        if table is not None:
+            yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))
+
+
+def _near_m(standing: gpd.GeoDataFrame) -> float:
+    """How far from a field something may stand that reaches into it, metres of its CRS."""
+    return max(_NEAR_M, 1.1 * float(_reach_m(standing).max(initial=0.0)))
+
+
 def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
     """Rows of the file around a field, by its index, in the file's order."""
     import geopandas as gpd
 
-    around = gpd.GeoSeries([plan.field.polygon.buffer(2.0 * _NEAR_M)], crs=plan.field.crs)
+    near = plan.field.polygon.buffer(2.0 * _near_m(standing))
+    around = gpd.GeoSeries([near], crs=plan.field.crs)
     box = shapely.box(*around.to_crs(standing.crs).total_bounds)
     return np.sort(standing.sindex.query(box))
 

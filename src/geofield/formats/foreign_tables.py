@@ -36,11 +36,12 @@ NAME_COLUMNS = (
     "schlag",
 )
 ID_COLUMNS = ("field_id", "id", "fid", "guid", "uuid", "parcel_id", "ref")
-_RADIUS = ("radius_m", "radius")
-_BUFFER = ("buffer_m", "buffer")
+RADIUS_COLUMNS = ("radius_m", "radius")
+BUFFER_COLUMNS = ("buffer_m", "buffer")
 NUMBER_COLUMNS = ("obstacle_no", "obst_no", "number", "no")
 _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
+_DECIMAL_COMMA = r"^\s*([+-]?\d+),(\d+)\s*$"
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
 _LARGEST = 2**53
 
@@ -55,10 +56,12 @@ def column_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> Any:
 
 
 def numbers_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> np.ndarray:
-    """A column's numbers as floats; NaN where there are none."""
+    """A column's numbers as floats, texts with a decimal comma, too; NaN where there are none."""
     series = column_like(frame, names)
     if series is None:
         return np.full(len(frame), np.nan)
+    if not pd.api.types.is_numeric_dtype(series):
+        series = series.astype(str).str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     numeric = pd.to_numeric(series, errors="coerce")
     # A copy: what pandas hands out may be read-only.
     return np.array(numeric.to_numpy(dtype="float64", na_value=np.nan))
@@ -112,7 +115,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     """
     geometry = np.asarray(shapely.force_2d(frame.geometry.to_numpy()), dtype=object)
     count = len(geometry)
-    radius, margin = numbers_like(frame, _RADIUS), numbers_like(frame, _BUFFER)
+    radius, margin = numbers_like(frame, RADIUS_COLUMNS), numbers_like(frame, BUFFER_COLUMNS)
     is_point = shapely.get_type_id(geometry) == shapely.GeometryType.POINT.value
     radius[~(np.isfinite(radius) & (radius > 0))] = np.nan
     unsized = is_point & np.isnan(radius)

@@ -1,0 +1,54 @@
+"""What there is to tell of a file of obstacles: what of it is not avoided, or not as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from geofield.cli.console import say_note
+
+if TYPE_CHECKING:
+    from geofield.farm.standing import Shapes
+    from geofield.farm.work import Job
+
+
+def tell_obstacles(job: Job, *, several: bool) -> None:
+    """Read the file of obstacles before the work, and tell what of it is not as it should be.
+
+    Of one field the stage itself tells of points without a radius.
+    """
+    from geofield.farm.standing import WITHOUT_SHAPE, obstacles_of, unsized_points
+    from geofield.formats.foreign_tables import POINT_RADIUS_M
+
+    if job.obstacles is None:
+        return
+    standing = obstacles_of(job.obstacles, job.obstacles_crs)
+    lost = standing.attrs[WITHOUT_SHAPE]
+    if lost:
+        rows = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
+        say_note(
+            f"{job.obstacles.name}: {len(lost)} rows have no shape and are not avoided: row "
+            f"{rows}. Draw or delete them."
+        )
+    unsized = unsized_points(standing) if several else 0
+    if unsized:
+        say_note(
+            f"{job.obstacles.name}: {unsized} points have no radius_m; they are circles of "
+            f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger."
+        )
+
+
+def tell_unreached(job: Job, outlines_lonlat: Iterable[Shapes]) -> None:
+    """Tell when nothing of the file of obstacles stands at any field that was planned."""
+    from geofield.farm.standing import any_reached, obstacles_of
+
+    if job.obstacles is None:
+        return
+    standing = obstacles_of(job.obstacles, job.obstacles_crs)
+    if not len(standing):
+        say_note(f"{job.obstacles.name} holds no shape: NOTHING of it is avoided.")
+    elif not any_reached(standing, outlines_lonlat):
+        say_note(
+            f"{job.obstacles.name}: none of its {len(standing)} obstacles stands at a field that "
+            f"was planned, NOTHING of it is avoided. Is its CRS {standing.crs.name}, as it says?"
+        )
