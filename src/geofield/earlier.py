@@ -12,7 +12,7 @@ from geofield.model.evidence import outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
 from geofield.plan import Plan
-from geofield.settings import Settings
+from geofield.settings import Settings, TrackSettings, as_before, option_named
 
 #: Methods of outlines that a person gave as they are, or chose.
 _GIVEN = ("boundary", "chosen")
@@ -28,6 +28,43 @@ def with_points(settings: Settings, previous: Plan | None) -> Settings:
     exclude = [one for one in old.exclude if one not in (*new.include, *new.exclude)]
     points = {"include": (*include, *new.include), "exclude": (*exclude, *new.exclude)}
     return settings.model_copy(update={"field": new.model_copy(update=points)})
+
+
+def with_said_tracks(settings: Settings, previous: Plan | None) -> tuple[Settings, tuple[str, ...]]:
+    """Settings with those of the tracks that a person set on an earlier plan's page.
+
+    What is said now, by a caller, a file or the environment, holds. Both are told in words.
+    """
+    if previous is None or previous.settings is None:
+        return settings, ()
+    then, asked = previous.settings.tracks, settings.tracks
+    names = still_said(previous, previous.settings)
+    settings = as_before(settings, previous.settings, "tracks", only=names)
+    now, known = settings.tracks, still_said(previous, settings)
+    kept = [_said(then, name) for name in known if getattr(asked, name) != getattr(then, name)]
+    told = [f"as set on the review page: {', '.join(kept)}"] if kept else []
+    told += [
+        f"{_said(now, name)} as said now, no longer {_said(then, name)} as set on the review page"
+        for name in names
+        if name not in known
+    ]
+    return settings, tuple(told)
+
+
+def still_said(plan: Plan, settings: Settings) -> tuple[str, ...]:
+    """The settings of the tracks that a person set on a plan's page, and that are so in others."""
+    if plan.settings is None:
+        return ()
+    then, now = dict(plan.settings.tracks), dict(settings.tracks)
+    names = plan.evidence.said_tracks  # of another version, perhaps
+    return tuple(name for name in names if name in then and then[name] == now[name])
+
+
+def _said(tracks: TrackSettings, name: str) -> str:
+    """A setting as an option of the command line."""
+    value = getattr(tracks, name)
+    shown = f"{value:g}" if isinstance(value, float) else str(value).lower()
+    return f"{option_named(name, TrackSettings.model_fields[name])} {shown}"
 
 
 def points_said(settings: Settings | None) -> set[tuple[bool, tuple[float, float]]]:

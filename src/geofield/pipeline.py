@@ -28,7 +28,9 @@ from geofield.earlier import (
     points_said,
     refuse_lost_obstacles,
     renamed,
+    still_said,
     with_points,
+    with_said_tracks,
 )
 from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarning, TrackError
 from geofield.model.evidence import Evidence, outline_digest
@@ -81,7 +83,7 @@ def plan_field(
     settings : Settings, optional
     previous : Plan, optional
         An earlier plan of the same field: its outline, where a person drew it, and its
-        reviewed obstacles are kept.
+        reviewed obstacles are kept, and what they set on the review page where nothing is said.
     boundary : Field, optional
         The user's own outline; nothing is extracted then. One that a person drew in `previous`
         stands above it.
@@ -124,7 +126,7 @@ def plan_field(
     with _timed("obstacles", timings, tell):
         plan = run_obstacles(plan, picture, settings=settings)
     with _timed("tracks", timings, tell):
-        return run_tracks(plan, settings=settings)
+        return run_tracks(plan, settings=plan.settings or settings)
 
 
 def run_field(
@@ -154,7 +156,7 @@ def run_field(
     scene = _seen(picture, lat, lon, settings, known) if window is None else window
     told = set() if previous is None else points_said(previous.settings)
     said = bool(points_said(settings) - told or regions)
-    settings = with_points(settings, previous)
+    settings, told_tracks = with_said_tracks(with_points(settings, previous), previous)
     choosing = bool(previous is not None and choose and previous.field.alternatives)
     kept = previous is not None and not choosing and _keeps(previous, boundary, said=said)
     if previous is not None and choose and choosing:
@@ -205,10 +207,16 @@ def run_field(
         source=scene.source,
         grid=scene.grid,
         evidence=Evidence(
-            (lat, lon), outline_digest(field.polygon), written=written, track_edits=edits
+            (lat, lon),
+            outline_digest(field.polygon),
+            written=written,
+            track_edits=edits,
+            said_tracks=() if previous is None else still_said(previous, settings),
         ),
         scene=scene,
-        changes=() if previous is None else (outline_changed(previous, field, kept=kept),),
+        changes=()
+        if previous is None
+        else (outline_changed(previous, field, kept=kept), *told_tracks),
     )
 
 
@@ -303,7 +311,8 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan)
-    obstacles, evidence = None, replace(plan.evidence, track_edits=plan.track_edits)
+    obstacles, said = None, still_said(plan, settings)
+    evidence = replace(plan.evidence, track_edits=plan.track_edits, said_tracks=said)
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
         evidence = replace(evidence, written=written)

@@ -19,6 +19,8 @@ import shapely.affinity
 from pyproj import CRS
 
 import geofield as gf
+from geofield.farm.reviewed import put_back
+from geofield.review import Session
 from geofield.settings import Settings
 
 SIDE_M = 120.0
@@ -710,3 +712,21 @@ def test_an_edit_taken_back_before_the_overview_is_written_is_no_silence(folder:
     after = gf.read_farm(folder / "farm").obstacles
     assert after.geometry.area.to_list() == pytest.approx(before.geometry.area.to_list())
     assert "as edited" not in _batch(folder)
+
+
+def test_settings_of_the_page_stand_when_the_farm_is_planned_again(folder: Path) -> None:
+    """A reviewed field turned back from 0 degrees to 88 with the next --fresh, without a word."""
+    session = Session(gf.read_farm(folder / "farm")["b"])
+    said = {"direction": "30", "headland_m": 10, "spacing_m": 9}
+    session.do({"do": "tracks", "settings": said})
+    session.plan.write(folder / "reviewed", formats=["gpkg"])
+    put_back(folder / "reviewed" / "field.gpkg", folder / "farm")
+    _batch(folder, "--fresh")
+    farm = gf.read_farm(folder / "farm")
+    tracks, settings = farm["b"].tracks, farm["b"].settings.tracks
+    assert tracks.heading_deg == pytest.approx(30.0, abs=0.01)
+    assert (settings.headland_m, settings.spacing_m) == (10.0, 6.0)
+    notes = farm.status.set_index("field_id")["notes"]
+    assert "as set on the review page: --direction 30, --headland 10" in notes["b"]
+    assert "--spacing 6 as said now, no longer --spacing 9" in notes["b"]
+    assert not notes["a"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -13,11 +15,15 @@ import shapely
 
 from geofield.errors import ChangedError, GeofieldError
 from geofield.formats import read_dataset
+from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.review import Session, apply_command
 from geofield.review.desk import Desk
 from geofield.review.journal import journal_path
 from geofield.review.session import planned
+from geofield.settings import with_values
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
@@ -233,6 +239,33 @@ def test_ground_that_was_clicked_is_obeyed_undone_and_remembered(plan_path: Path
     assert not saved.outline_edited
     assert saved.settings is not None
     assert saved.settings.field.include == wider.settings.field.include
+
+
+def test_settings_of_the_page_stand_in_later_runs(plan_path: Path) -> None:
+    """Tracks turned by hand turned back from 90.3 to 8.7 degrees with the next run."""
+    desk = Desk(plan_path)
+    said = {"direction": "30", "headland_m": 8, "spacing_m": 6}
+    desk.edit({"do": "tracks", "settings": said})
+    desk.edit({"do": "tracks", "settings": {"direction": "90.3"}})
+    desk.save()
+    sample = ROOT / "sample_data" / "field_1.tif"
+    done = subprocess.run(
+        [sys.executable, "-m", "geofield", "run", sample, "--lat", "35.075373",
+         "--lon", "33.531142", "--spacing", "4", "--format",
+         "gpkg", "--overwrite", "--out", plan_path.parent],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    again = read_plan(plan_path)
+    assert again.tracks is not None
+    assert again.settings is not None
+    assert again.tracks.heading_deg == pytest.approx(90.3)
+    assert (again.settings.tracks.headland_m, again.settings.tracks.spacing_m) == (8.0, 4.0)
+    assert "as set on the review page: --direction 90.3, --headland 8" in done.stderr
+    assert "--spacing 4 as said now, no longer --spacing 6" in done.stderr
+    # A word that a later command took back is none any more.
+    assert set(again.evidence.said_tracks) == {"direction", "headland_m"}
+    turned = run_tracks(again, settings=with_values(again.settings, direction="10"))
+    assert turned.evidence.said_tracks == ("headland_m",)
 
 
 def test_another_outline_is_chosen(plan_path: Path) -> None:

@@ -89,7 +89,7 @@ def run(
     Shapefiles, RDF, a map picture and report.json.
     """
     from geofield.cli.imagery_tools import as_picture, say_wider
-    from geofield.earlier import known_outline
+    from geofield.earlier import known_outline, with_said_tracks
     from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
@@ -98,7 +98,6 @@ def run(
 
     parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
     claim_folder(out)
-    tell_idle(settings, parcel=parcel is not None)
     if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
         # Said at once, not after the work.
         raise OutputExistsError(
@@ -107,6 +106,7 @@ def run(
         )
     earlier = out / "field.gpkg"
     previous = read_plan(earlier) if earlier.is_file() and not fresh else None
+    tell_idle(with_said_tracks(settings, previous)[0], parcel=parcel is not None)
     timings: dict[str, float] = {}
     with (
         progress_bar(quiet=as_json) as progress,

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
-from geofield.earlier import drew_outline
+from geofield.earlier import drew_outline, with_said_tracks
 from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
@@ -89,6 +89,9 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
         raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
     if previous is not None:
         place = _as_reviewed(place, previous)
+        settings, said = with_said_tracks(settings, previous)
+        for words in said:
+            warnings.warn(words, FieldWarning, stacklevel=2)
         if _same_stages(previous.settings, settings):
             return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)

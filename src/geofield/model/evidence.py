@@ -34,6 +34,8 @@ class Evidence:
     written: Written | None = None
     #: What a person changed of the tracks, as far as a stage has read it.
     track_edits: TrackEdits = field(default_factory=TrackEdits)
+    #: Names of the tracks' settings that a person set on the review page.
+    said_tracks: tuple[str, ...] = ()
 
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
@@ -64,6 +66,8 @@ class Evidence:
             result["written"] = self.written.to_json()
         if self.track_edits:
             result["track_edits"] = self.track_edits.to_json()
+        if self.said_tracks:
+            result["said"] = {"tracks": list(self.said_tracks)}
         if tracks is not None:
             result["tracks"] = dict(tracks)
         return result
@@ -78,6 +82,7 @@ class Evidence:
             dict(value.get("obstacles", {})),
             None if written is None else Written.from_json(written),
             TrackEdits.from_json(value.get("track_edits", {})),
+            tuple(value.get("said", {}).get("tracks", ())),
         )
 
 

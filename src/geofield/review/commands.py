@@ -150,7 +150,14 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
         problem = error.errors()[0]
         name = ".".join(str(part) for part in problem["loc"])
         raise SettingsError(f"{name}: {problem['msg']}.") from None
-    return replace(plan, settings=settings.model_copy(update={"tracks": tracks}))
+    # Known as a person's word in every later run.
+    before, names = settings.tracks, set(plan.evidence.said_tracks)
+    names |= {name for name, value in tracks if value != getattr(before, name)}
+    return replace(
+        plan,
+        settings=settings.model_copy(update={"tracks": tracks}),
+        evidence=replace(plan.evidence, said_tracks=tuple(sorted(names))),
+    )
 
 
 def set_direction(plan: Plan, command: Command) -> Plan:

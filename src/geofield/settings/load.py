@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from pydantic import ValidationError, create_model
 from geofield.errors import SettingsError
 from geofield.settings.explain import explained
 from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
-from geofield.settings.section import nearest
+from geofield.settings.section import Section, nearest
 from geofield.settings.tracks import said_over
 from geofield.settings.whole import SECTIONS, Settings, Stage, names_of
 
@@ -128,7 +128,8 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
         for section, given in changed.items():
             old = getattr(settings, section)
             said = (
-                _tracks_said(dict(old), given, settings.machines)
+                # What nobody said stays unsaid: an earlier plan's may stand there.
+                _tracks_said(_said_in(old), given, settings.machines)
                 if section == "tracks"
                 else {**dict(old), **given}
             )
@@ -138,7 +139,12 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
     return settings.model_copy(update=sections)
 
 
-def as_before(settings: Settings, earlier: Settings | None, section: Stage) -> Settings:
+def as_before(
+    settings: Settings,
+    earlier: Settings | None,
+    section: Stage,
+    only: Collection[str] | None = None,
+) -> Settings:
     """Settings of a stage that runs again on a plan: what nobody says now is as it was then.
 
     Parameters
@@ -149,12 +155,15 @@ def as_before(settings: Settings, earlier: Settings | None, section: Stage) -> S
         Of the plan.
     section : str
         Of the stage.
+    only : collection of str, optional
+        Names of the earlier settings that count; all when not given.
     """
     if earlier is None:
         return settings
     now = getattr(settings, section)
-    said = {name: getattr(now, name) for name in now.model_fields_set}
-    known = dict(getattr(earlier, section))
+    said, known = _said_in(now), dict(getattr(earlier, section))
+    if only is not None:
+        known = {name: known[name] for name in known if name in only}
     if section != "tracks":
         values = known | said
     else:
@@ -165,6 +174,11 @@ def as_before(settings: Settings, earlier: Settings | None, section: Stage) -> S
         return settings.model_copy(update={section: type(now)(**values)})
     except ValidationError as error:
         raise SettingsError(explained(error)) from None
+
+
+def _said_in(section: Section) -> dict[str, Any]:
+    """What was said of a section, and does not follow from anything else."""
+    return {name: getattr(section, name) for name in section.model_fields_set}
 
 
 def from_mapping(values: Mapping[str, Any]) -> Settings:
