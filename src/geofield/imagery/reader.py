@@ -26,6 +26,7 @@ from geofield.errors import ImageryError
 from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of
+from geofield.imagery.fill import undeclared_fill
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading, to_rasterio
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
@@ -37,6 +38,7 @@ from geofield.model.scene import ImagerySource, Scene, outside
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
 _NOTHING = OpenOptions()
+_FILLED = "The value {:g}, alike in all bands, is taken as no data: the file names none."
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +117,15 @@ class SceneReader:
             with reading(path):
                 palette = palette_of(dataset)
                 roles = roles_of(dataset, options.bands) if not palette else BandRoles(("red",))
+                flags, tags = dataset.mask_flag_enums[0], dataset.tags()
+                has_mask = MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags
+                fill = None
+                if not palette and not has_mask:
+                    fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha)
             own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
-            flags, tags = dataset.mask_flag_enums[0], dataset.tags()
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
+            taken = () if fill is None else (_FILLED.format(fill),)
             return cls(
                 path=path,
                 grid=place.grid,
@@ -126,11 +133,11 @@ class SceneReader:
                 dtype=dtype,
                 source=options.source or source_from_tags(tags, path),
                 scaling=options.scaling,
-                notes=(*notes_from_tags(tags), *roles.notes, *place.notes),
-                nodata=dataset.nodata,
+                notes=(*notes_from_tags(tags), *roles.notes, *taken, *place.notes),
+                nodata=dataset.nodata if fill is None else fill,
                 palette=palette,
                 reach=reach,
-                has_mask=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
+                has_mask=has_mask,
                 scaled_before=scaling_from_tags(tags) if dtype == "uint8" else None,
                 warped_from=place.warped_from,
             )
@@ -279,7 +286,8 @@ class SceneReader:
             gdal_env(self.path),
             open_picture(self.path, self.reach) as dataset,
             reading(self.path),
-            self._through_warp(dataset) as raster,
+            _as_it_is_taken(dataset, self) as plain,
+            self._through_warp(plain) as raster,
         ):
             full = shape == (window.height, window.width)
             resampling = Resampling.nearest if full or self.palette else Resampling.average
@@ -324,36 +332,40 @@ class SceneReader:
         options["add_alpha"] = alpha is None
         if alpha is not None:
             options["src_alpha"] = alpha + 1
-        with (
-            _as_it_is_taken(dataset, alpha) as plain,
-            WarpedVRT(
-                plain,
-                crs=to_rasterio(self.grid.crs),
-                resampling=Resampling.nearest if self.palette else Resampling.bilinear,
-                src_nodata=self.nodata,
-                **options,
-            ) as warped,
-        ):
+        with WarpedVRT(
+            dataset,
+            crs=to_rasterio(self.grid.crs),
+            resampling=Resampling.nearest if self.palette else Resampling.bilinear,
+            src_nodata=self.nodata,
+            **options,
+        ) as warped:
             yield warped
 
 
 @contextmanager
-def _as_it_is_taken(dataset: Any, alpha: int | None) -> Iterator[Any]:
-    """The dataset; where a band that is no mask is tagged as one, a view without the tag.
+def _as_it_is_taken(dataset: Any, reader: SceneReader) -> Iterator[Any]:
+    """The dataset; where it says other than what it is taken for, a view that says that.
 
-    GDAL's warper takes every band that is tagged as alpha for a mask, near infrared too.
+    GDAL's warper takes every band that is tagged as alpha for a mask, near infrared too; and
+    what is read coarser would mix the ground with a fill that no tag names.
     """
-    if alpha is not None or ColorInterp.alpha not in dataset.colorinterp:
+    fill, tagged = reader.nodata, ColorInterp.alpha in dataset.colorinterp
+    tagged = tagged and reader.roles.alpha is None
+    filled = fill is not None and not np.isnan(fill) and dataset.nodata != fill
+    if not (tagged or filled):
         yield dataset
         return
     view = f"/vsimem/{uuid.uuid4().hex}.vrt"
     rasterio.shutil.copy(dataset, view, driver="VRT")
     try:
         with rasterio.open(view, "r+") as plain:
-            plain.colorinterp = [
-                ColorInterp.undefined if each is ColorInterp.alpha else each
-                for each in plain.colorinterp
-            ]
+            if tagged:
+                plain.colorinterp = [
+                    ColorInterp.undefined if each is ColorInterp.alpha else each
+                    for each in plain.colorinterp
+                ]
+            if filled:
+                plain.nodata = fill
         with rasterio.open(view) as plain:
             yield plain
     finally:

@@ -38,7 +38,8 @@ def read_scene(
 
     Any CRS and rotation is kept; only a picture whose pixels are not square on the ground is
     reprojected. 16 bit and floating point values are scaled to 0..255 by percentiles of the
-    window. All of this is told in the scene's `notes`.
+    window; a value that such a picture is filled with and does not name is no data. All of this is
+    told in the scene's `notes`.
 
     Parameters
     ----------
