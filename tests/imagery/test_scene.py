@@ -120,6 +120,33 @@ def test_a_fourth_band_is_a_mask_only_if_it_looks_like_one(
     assert not scene.bands[:, ~scene.valid].any()
 
 
+@pytest.mark.parametrize("opaque", [1, 255, 65535])
+@pytest.mark.parametrize("hidden", [0, 10])
+@pytest.mark.parametrize("interpretation", [ALPHA, UNDEFINED])
+def test_a_mask_beside_floats_is_no_near_infrared(
+    tmp_path: Path, opaque: float, hidden: int, interpretation: ColorInterp
+) -> None:
+    """As `gdalwarp -dstalpha` writes it."""
+    values = ground(bands=4).astype(np.float32) / 255
+    values[3], values[3, :, :hidden] = opaque, 0
+    named = [R, G, B, interpretation]
+    scene = read_scene(write(tmp_path / "x.tif", values, interpretation=named, photometric="RGB"))
+    assert scene.roles == ("red", "green", "blue")
+    if interpretation is ALPHA:
+        assert (~scene.valid).sum() == hidden * 96
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int16, np.float32])
+@pytest.mark.parametrize("named", [True, False])
+def test_a_band_of_one_value_is_no_near_infrared(tmp_path: Path, kind: Any, named: bool) -> None:
+    values = ground(bands=4).astype(kind)
+    values[3] = 7
+    path = write(tmp_path / "x.tif", values, photometric="RGB" if named else "MINISBLACK")
+    scene = read_scene(path)
+    assert scene.roles == ("red", "green", "blue")
+    assert scene.valid.all()
+
+
 @pytest.mark.real
 def test_real_chips_keep_their_near_infrared(shared: Path) -> None:
     chips = sorted((shared / "data" / "trees").glob("*.tif"))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from geofield.wording import nearest
 
 #: A mask is opaque or transparent nearly everywhere; feathered edges are thin.
 _MASK_SHARE = 0.9
+#: What an opaque pixel of a mask holds, whatever the type of the bands beside it.
+OPAQUE = (1, 255, 32767, 65535)
 
 _WORDS = {
     "red": "red",
@@ -42,6 +44,8 @@ _WORDS = {
     "pan": "grey",
     "panchromatic": "grey",
 }
+#: What the values of a band without a name look like; flat is one value everywhere, as of no mask.
+Look = Literal["picture", "mask", "flat"]
 _ROLES = ("red", "green", "blue", "nir", "grey", "alpha", "other")
 _SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
 
@@ -70,10 +74,10 @@ class BandRoles:
 def find_roles(
     descriptions: Sequence[str | None],
     interpretation: Sequence[str],
-    looks_like_mask: Sequence[bool],
+    looks: Sequence[Look],
     given: Sequence[str] | None = None,
 ) -> BandRoles:
-    """Decide what each band shows, from the file's own words and GDAL's interpretation of each.
+    """Decide what each band shows, by the file's words, GDAL's interpretation and its looks.
 
     `given` are roles from the user, in the order of the bands; further bands are ``other``.
 
@@ -94,32 +98,35 @@ def find_roles(
         described = [""] * count
     roles = [_WORDS.get(name, "") for name in interpretation]
     for i, role in enumerate(roles):
-        if role == "alpha" and not looks_like_mask[i]:
+        if role == "alpha" and looks[i] != "mask":
             roles[i] = ""
             notes.append(
-                f"Band {i + 1} is marked as alpha, but its values are a picture: not used as mask."
+                f"Band {i + 1} is marked as alpha, but its values are no mask's: not used as mask."
             )
         if not roles[i] and described[i] not in roles:
             roles[i] = described[i]
     colours = [role for role in roles if role in ("red", "green", "blue")]
     named = len(set(colours)) == len(colours) == 3
-    roles, more = (_complete_colour if named else _from_count)(roles, looks_like_mask)
+    roles, more = (_complete_colour if named else _from_count)(roles, looks)
     return BandRoles(tuple(roles), (*notes, *more))
 
 
-def looks_like_mask(values: NDArray[Any]) -> bool:
-    """Whether a band's values are those of a mask: nearly all 0 or one opaque value.
+def look_of(values: NDArray[Any]) -> Look:
+    """What a band's values look like: a mask is 0 or one opaque value nearly everywhere.
 
     A band that is 0 everywhere hides the whole picture; it counts as a mask only when the
     file says so, hence is reported as one.
     """
-    if values.size == 0 or values.dtype.kind not in "uib":
-        return False
+    if values.dtype.kind == "f":
+        values = values[np.isfinite(values)]
+    if values.size == 0:
+        return "picture"
     top = values.max()
-    if top != 0 and values.dtype.kind == "u" and top not in (1, 255, np.iinfo(values.dtype).max):
-        return False
-    binary = np.count_nonzero((values == 0) | (values == top))
-    return bool(binary >= _MASK_SHARE * values.size)
+    if top in (0, *OPAQUE) or (values.dtype.kind in "ui" and top == np.iinfo(values.dtype).max):
+        binary = np.count_nonzero((values == 0) | (values == top))
+        if binary >= _MASK_SHARE * values.size:
+            return "mask"
+    return "flat" if values.min() == top else "picture"
 
 
 def _checked(given: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
@@ -181,25 +188,23 @@ def _is_consistent(roles: Sequence[str]) -> bool:
     )
 
 
-def _complete_colour(
-    roles: list[str], mask_like: Sequence[bool]
-) -> tuple[list[str], tuple[str, ...]]:
+def _complete_colour(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tuple[str, ...]]:
     """Bands beside red, green and blue: the first that is a picture is near infrared."""
     notes: tuple[str, ...] = ()
     for i in [i for i, role in enumerate(roles) if not role]:
         roles[i] = "other"
-        if not mask_like[i] and "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
+        if looks[i] == "picture" and "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
             roles[i] = "nir"
             notes = (f"Band {i + 1} is taken as near infrared.",)
     return roles, notes
 
 
-def _from_count(roles: list[str], mask_like: Sequence[bool]) -> tuple[list[str], tuple[str, ...]]:
+def _from_count(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tuple[str, ...]]:
     """No colours are named: red, green, blue, near infrared is the common order."""
     pictures = [i for i, role in enumerate(roles) if role != "alpha"]
     # The last of two or four bands without a name is a mask when it looks like one.
     last = pictures[-1] if pictures else 0
-    if "alpha" not in roles and len(pictures) in (2, 4) and mask_like[last]:
+    if "alpha" not in roles and len(pictures) in (2, 4) and looks[last] == "mask":
         roles[last] = "alpha"
         pictures = pictures[:-1]
     if len(pictures) < 3:
@@ -216,6 +221,8 @@ def _from_count(roles: list[str], mask_like: Sequence[bool]) -> tuple[list[str],
             f"The first three of {len(pictures)} unnamed bands are taken as red, green, blue; "
             "name them with `bands` where this is wrong.",
         )
-    if len(pictures) == 4:
+    if len(pictures) == 4 and looks[pictures[3]] == "flat":
+        roles[pictures[3]] = "other"
+    elif len(pictures) == 4:
         return roles, ("Four unnamed bands are taken as red, green, blue, near infrared.",)
     return roles, ()

@@ -12,7 +12,7 @@ from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from geofield.errors import CRSError
-from geofield.imagery.bands import BandRoles, find_roles, looks_like_mask
+from geofield.imagery.bands import BandRoles, Look, find_roles, look_of
 from geofield.imagery.gdal import display_name, to_pyproj
 from geofield.imagery.tags import roles_from_tags
 
@@ -34,14 +34,14 @@ def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
     if not given and remembered and len(remembered) == dataset.count:
         given = remembered
     marked = [interpretation.name for interpretation in dataset.colorinterp]
-    asked = [False] * dataset.count
+    looks: list[Look] = ["picture"] * dataset.count
     if not given:
         unnamed = {"alpha", "undefined"}
-        asked = [
-            name in unnamed and looks_like_mask(_sample(dataset, i + 1))
+        looks = [
+            look_of(_sample(dataset, i + 1)) if name in unnamed else "picture"
             for i, name in enumerate(marked)
         ]
-    return find_roles(dataset.descriptions, marked, asked, given)
+    return find_roles(dataset.descriptions, marked, looks, given)
 
 
 def _sample(dataset: Any, band: int) -> NDArray[Any]:

@@ -163,7 +163,7 @@ def _band_names(asset: Mapping[str, Any]) -> list[str]:
 
 def _roles(names: Sequence[str]) -> tuple[str, ...] | None:
     """Roles from band names, where they name the colours."""
-    roles = find_roles(names, ["undefined"] * len(names), [False] * len(names))
+    roles = find_roles(names, ["undefined"] * len(names), ["picture"] * len(names))
     named = {"red", "green", "blue"} <= {name.lower() for name in names} and not roles.notes
     return tuple(roles.roles) if named else None
 
