@@ -147,6 +147,25 @@ def test_a_band_of_one_value_is_no_near_infrared(tmp_path: Path, kind: Any, name
     assert scene.valid.all()
 
 
+@pytest.mark.parametrize("named", [None, ("red", "green", "blue", "alpha", "nir")])
+def test_the_mask_of_a_reprojected_picture_is_its_alpha_band(
+    tmp_path: Path, named: tuple[str, ...] | None
+) -> None:
+    values = ground(bands=5)
+    values[3], values[3, :, :20] = 255, 0
+    values[4, 40:60, 60:80] = 0  # dark in near infrared, and shown
+    path = write(
+        tmp_path / "x.tif",
+        values,
+        transform=Affine(0.5, 0, EAST, 0, -1, NORTH),
+        interpretation=[R, G, B, UNDEFINED if named else ALPHA, ColorInterp.nir],
+    )
+    scene = read_scene(path, bands=named)
+    assert scene.roles == ("red", "green", "blue", "nir")
+    assert scene.valid[2:-2, 22:-2].all()
+    assert not scene.valid[:, :18].any()
+
+
 @pytest.mark.real
 def test_real_chips_keep_their_near_infrared(shared: Path) -> None:
     chips = sorted((shared / "data" / "trees").glob("*.tif"))

@@ -296,11 +296,11 @@ class SceneReader:
             )
             valid = np.ones(shape, bool)
             nearest = {"window": window, "out_shape": shape, "resampling": Resampling.nearest}
-            if self.warped_from is not None:
-                valid &= raster.read(raster.count, **nearest) > 0
-            elif self.roles.alpha is not None:
+            if self.roles.alpha is not None:
                 alpha = raster.read(self.roles.alpha + 1, **nearest)
                 valid &= opaque(alpha)
+            elif self.warped_from is not None:  # the mask that the warp added
+                valid &= raster.read(raster.count, **nearest) > 0
             elif self.has_mask:
                 valid &= raster.read_masks(1, **nearest) > 0
         if self.warped_from is None and self.nodata is not None and not np.isnan(self.nodata):
@@ -315,7 +315,7 @@ class SceneReader:
 
     @contextmanager
     def _through_warp(self, dataset: Any) -> Iterator[Any]:
-        """The dataset itself, or its reprojection with a mask as the last band."""
+        """The dataset itself, or its reprojection: without an alpha band, a mask is its last."""
         if self.warped_from is None:
             yield dataset
             return
