@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import shapely
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError, ObstacleError
-from geofield.model.evidence import outline_digest
+from geofield.errors import FieldError, ObstacleError, ObstacleWarning
+from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
 from geofield.plan import Plan
@@ -188,4 +189,14 @@ def refuse_lost_obstacles(plan: Plan) -> None:
             f"The layer `obstacles` of {plan.field.name} is gone, with {said} that a person "
             "reviewed, drew or took away.",
             hint="Give it back its name, or `geofield undo`; to have none, delete its rows alone.",
+        )
+
+
+def warn_of_unsearched(evidence: Evidence) -> None:
+    """Tell of ground that an outline gained after obstacles were searched."""
+    for doubt in evidence.unsearched:
+        warnings.warn(
+            f"{doubt} `geofield obstacles PICTURE PLAN` searches it; then plan the tracks again.",
+            ObstacleWarning,
+            stacklevel=3,
         )

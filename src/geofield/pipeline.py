@@ -29,6 +29,7 @@ from geofield.earlier import (
     refuse_lost_obstacles,
     renamed,
     still_said,
+    warn_of_unsearched,
     with_points,
     with_said_tracks,
 )
@@ -38,6 +39,7 @@ from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
+from geofield.model.searched import searched_in
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.written import Written
@@ -212,6 +214,7 @@ def run_field(
             written=written,
             track_edits=edits,
             said_tracks=() if previous is None else still_said(previous, settings),
+            searched=None if previous is None else previous.evidence.searched,
         ),
         scene=scene,
         changes=()
@@ -300,7 +303,11 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
         source=scene.source,
         grid=scene.grid,
         evidence=replace(
-            plan.evidence, detection=found, written=written, track_edits=plan.track_edits
+            plan.evidence,
+            detection=found,
+            written=written,
+            track_edits=plan.track_edits,
+            searched=searched_in(plan.field),
         ),
         scene=scene,
         changes=changes,
@@ -318,7 +325,8 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         evidence = replace(evidence, written=written)
     read = replace(plan, field=field, obstacles=obstacles, tracks=None, evidence=evidence)
     tracks = tracks_of_plan(read, settings)
-    evidence = replace(evidence, track_edits=tracks.edits)
+    evidence = replace(evidence, track_edits=tracks.edits).with_unsearched(field)
+    warn_of_unsearched(evidence)
     told = tracks.edits.in_words()
     if field is not plan.field:
         evidence = replace(evidence, outline=outline_digest(field.polygon))

@@ -15,6 +15,7 @@ import pandas as pd
 from changed_plans import Frame, geofield, plan_in, rewritten, run, shrunk
 from shapely.affinity import translate
 
+from geofield.formats import validate_file
 from geofield.simulate import SimulatedField
 
 
@@ -103,3 +104,28 @@ def test_an_empty_column_stays(folder: Path, made: SimulatedField) -> None:
     assert (table["dose"].dtype.kind, table["sown"].dtype.kind) == ("f", "M")
     once, again = plan_in(folder), plan_in(folder)
     assert once == again  # nothing in a cell is nothing in the other
+
+
+def test_ground_that_an_outline_gained_was_searched_by_nobody(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    plan = plan_in(folder)
+    assert not plan.evidence.unsearched
+    larger = plan.field.polygon.buffer(9)
+    rewritten(file, "field", lambda table: table.set_geometry([larger], crs=table.crs))
+    (finding,) = validate_file(file)
+    assert finding.level == "warning"
+    told = geofield("tracks", file, "-o", file)
+    gained_ha = (larger.area - plan.field.polygon.area) / 10_000
+    assert f"Nobody searched {gained_ha:.2f} ha" in told
+    assert "`geofield obstacles PICTURE PLAN`" in told
+    assert [each.message for each in validate_file(file)] == [finding.message]
+    geofield("export", file, "-f", "report", "--out", folder / "x")
+    assert "Nobody searched" in (folder / "x/report.json").read_text()
+    # A border drawn a bit better is no further ground, and what was gained may be searched.
+    better = plan.field.polygon.buffer(0.3)
+    rewritten(file, "field", lambda table: table.set_geometry([better], crs=table.crs))
+    assert "Nobody searched" not in geofield("tracks", file, "-o", file)
+    rewritten(file, "field", lambda table: table.set_geometry([larger], crs=table.crs))
+    geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert "Nobody searched" not in geofield("tracks", file, "-o", file)
+    assert not validate_file(file)

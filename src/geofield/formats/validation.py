@@ -19,7 +19,9 @@ from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
+from geofield.model.evidence import Evidence
 from geofield.model.obstacles import active
+from geofield.model.searched import unsearched
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -106,6 +108,7 @@ def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[F
         yield Finding("error", schema.FIELD.name, "no row has an outline")
     if with_segments:
         yield from _check_obstacles(dataset)
+        yield from _check_searched(dataset)
         yield from _check_tracks(dataset)
 
 
@@ -161,6 +164,16 @@ def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
             f"runs through {_obstacle(kept['obstacle_no'].iloc[int(obstacle)])}: plan the tracks "
             "again (geofield tracks)",
         )
+
+
+def _check_searched(dataset: Dataset) -> Iterator[Finding]:
+    """Whether obstacles were searched in all of the outline."""
+    field = dataset.table(schema.FIELD.name)
+    searched = Evidence.from_json(dataset.provenance.evidence).searched
+    if len(field) == 1 and field.geometry.is_valid.all():
+        gained = unsearched(searched, field.geometry.iloc[0], dataset.crs)
+        if gained:
+            yield Finding("warning", schema.FIELD.name, f"{gained} Search it (geofield obstacles)")
 
 
 def _obstacle(number: Any) -> str:

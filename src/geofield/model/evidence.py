@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import shapely
 
 from geofield.model.field import Field, FieldQuality
+from geofield.model.searched import UNSEARCHED, unsearched
 from geofield.model.track_edits import TrackEdits
 from geofield.model.written import Written
 
@@ -36,6 +37,8 @@ class Evidence:
     track_edits: TrackEdits = field(default_factory=TrackEdits)
     #: Names of the tracks' settings that a person set on the review page.
     said_tracks: tuple[str, ...] = ()
+    #: The outline that obstacles were searched in: WKT of longitude and latitude.
+    searched: str | None = None
 
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
@@ -44,12 +47,27 @@ class Evidence:
 
     @property
     def unseen(self) -> tuple[str, ...]:
-        """Those of ground in the field that the picture did not show."""
-        return tuple(each for each in self.obstacle_doubts if each.startswith(UNSEEN))
+        """Those of ground in the field that the picture did not show, or that nobody searched."""
+        seen_not = tuple(each for each in self.obstacle_doubts if each.startswith(UNSEEN))
+        return seen_not + self.unsearched
+
+    @property
+    def unsearched(self) -> tuple[str, ...]:
+        """Those of ground that the outline gained after obstacles were searched."""
+        return tuple(each for each in self.obstacle_doubts if each.startswith(UNSEARCHED))
 
     def moved(self, outline: shapely.Polygon) -> bool:
         """Whether a person moved an outline since a stage wrote it; not, where nobody knows."""
         return self.outline is not None and self.outline != outline_digest(outline)
+
+    def with_unsearched(self, outline: Field) -> Evidence:
+        """The same with the doubt about ground that the outline gained, or without it."""
+        gained = unsearched(self.searched, outline.polygon, outline.crs)
+        doubts = [each for each in self.obstacle_doubts if not each.startswith(UNSEARCHED)]
+        doubts += [gained] if gained else []
+        if tuple(doubts) == self.obstacle_doubts:
+            return self
+        return replace(self, detection={**self.detection, "doubts": doubts})
 
     def to_json(self, of: Field, tracks: Mapping[str, Any] | None) -> dict[str, Any]:
         """Plain JSON values, with those of the field's quality and of the tracks."""
@@ -68,6 +86,8 @@ class Evidence:
             result["track_edits"] = self.track_edits.to_json()
         if self.said_tracks:
             result["said"] = {"tracks": list(self.said_tracks)}
+        if self.searched is not None:
+            result["searched"] = self.searched
         if tracks is not None:
             result["tracks"] = dict(tracks)
         return result
@@ -83,6 +103,7 @@ class Evidence:
             None if written is None else Written.from_json(written),
             TrackEdits.from_json(value.get("track_edits", {})),
             tuple(value.get("said", {}).get("tracks", ())),
+            value.get("searched"),
         )
 
 
