@@ -13,7 +13,7 @@ import geopandas as gpd
 import pandas as pd
 import pyogrio
 import pytest
-from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
+from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run, shrunk
 
 from geofield.simulate import SimulatedField
 
@@ -222,3 +222,32 @@ def test_what_a_crash_left_in_the_log_is_no_other_program(folder: Path) -> None:
     tracks = plan_in(folder).tracks
     assert tracks is not None
     assert tracks.spacing_m == 12
+
+
+def test_no_machine_is_steered_through_an_obstacle_drawn_since(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    drawn = plan_in(folder).field.polygon.representative_point().buffer(8.0)
+    rock = gpd.GeoDataFrame(geometry=[drawn], crs=plan_in(folder).field.crs)
+    rewritten(file, "obstacles", lambda table: pd.concat([table, rock]))
+    command = [sys.executable, "-m", "geofield", "export", str(file), "--out", str(folder / "x")]
+    done = subprocess.run(
+        [*command, "-f", "geojson,isoxml"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert f"through obstacle {len(rows(plan_in(folder)))}" in done.stderr
+    assert "`geofield tracks PLAN.gpkg -o PLAN.gpkg`" in done.stderr
+    assert not (folder / "x").exists()
+    # Who looks at a map may see it, and is told.
+    assert "plan the tracks again" in geofield(*command[3:], "-f", "geojson")
+    # So are tracks out of an outline that was drawn smaller.
+    rewritten(file, "obstacles", lambda table: table[table["obstacle_no"].notna()])
+    rewritten(file, "field", shrunk)
+    (folder / "out/isoxml/TASKDATA").mkdir(parents=True)
+    (folder / "out/isoxml/TASKDATA/TASKDATA.XML").touch()
+    done = subprocess.run(
+        [*command[:3], "refresh", str(file)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "out of the field" in done.stderr
+    geofield("tracks", file, "-o", file)
+    geofield("refresh", file)

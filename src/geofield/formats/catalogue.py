@@ -57,6 +57,7 @@ _ISOXML = Format(
     precision_m=0.0002,
     options=("customer", "farm", "zip", "headland"),
     validator="geofield.formats.checks.isoxml:check",
+    steers=True,
     reads_folders=True,
     fields="many",
 )
@@ -105,6 +106,7 @@ CATALOGUE: tuple[Format, ...] = (
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
         validator="geofield.formats.checks.shapefile:check",
+        steers=True,
         reads_folders=True,
         fields="many",
     ),
@@ -160,6 +162,7 @@ CATALOGUE: tuple[Format, ...] = (
             _ORIGIN,
         ),
         validator="geofield.formats.checks.gdal:check",
+        steers=True,
     ),
     Format(
         "csv",
@@ -192,6 +195,7 @@ CATALOGUE: tuple[Format, ...] = (
         ),
         crs="metric",
         validator="geofield.formats.checks.gdal:check",
+        steers=True,
     ),
     _ISOXML,
     replace(
@@ -220,6 +224,7 @@ CATALOGUE: tuple[Format, ...] = (
         ),
         precision_m=0.005,
         validator="geofield.formats.checks.agopengps:check",
+        steers=True,
         reads_folders=True,
         fields="apart",
     ),

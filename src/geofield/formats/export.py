@@ -10,6 +10,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning
+from geofield.formats.clear_way import tell_blocked
 from geofield.formats.edited import made_whole
 from geofield.formats.many import distinct, field_ids, joined
 from geofield.formats.names import safe_name
@@ -75,11 +76,16 @@ def write_datasets(
     -----
     FormatWarning
         Once per format that drops something the dataset has.
+    TrackWarning
+        In other formats, of such tracks.
 
     Raises
     ------
     FormatError
         For an unknown format or option, and when a product cannot be written.
+    TrackError
+        When a machine would be steered through an obstacle that was drawn since the tracks were
+        planned, or out of the field.
     """
     chosen = list(dict.fromkeys(format_named(name) for name in formats))
     given = dict(options or {})
@@ -91,6 +97,7 @@ def write_datasets(
         datasets = distinct(datasets)
         field_ids(datasets)
     datasets = [made_whole(each) for each in datasets]
+    tell_blocked(datasets, refuse=any(each.steers for each in chosen))
     target = Path(folder)
     written: list[Path] = []
     with staged_folder(target, overwrite=overwrite, inputs=inputs) as staging:

@@ -83,6 +83,9 @@ class Format:
         (``one``) or writing each under its own (``apart``); all in one by the writer, which
         then takes a sequence of datasets (``many``); all in one as a dataset with ``field_id``
         in every row (``joined``).
+    steers : bool
+        Whether machines are steered along its lines: of tracks that run through an obstacle it is
+        not written.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -104,6 +107,7 @@ class Format:
     reads_folders: bool = False
     automatic: bool = False
     fields: Literal["one", "apart", "many", "joined"] = "one"
+    steers: bool = False
 
     def load_writer(self) -> Writer:
         """The writer, imported."""

@@ -6,21 +6,20 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 import shapely
 
 from geofield import schema
 from geofield.crs import ground_lengths_m
 from geofield.errors import FormatWarning, GeofieldError, SeveralFieldsError
+from geofield.formats.clear_way import driven_through, leaving
 from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
-from geofield.model.obstacles import active
 from geofield.model.searched import unsearched
 
 if TYPE_CHECKING:
@@ -147,22 +146,13 @@ def _check_rows(layer: schema.Layer, table: gpd.GeoDataFrame) -> Iterator[Findin
 
 
 def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
-    obstacles = dataset.table("obstacles")
     segments = dataset.table("segments")
-    if not len(obstacles) or not len(segments):
-        return
-    kept = active(obstacles)
-    # A hair inside: segments end exactly on the border of a buffer.
-    inside = shapely.buffer(np.asarray(kept.geometry.to_numpy(), dtype=object), -0.05)
-    tree = shapely.STRtree(segments.geometry.to_numpy())
-    hit, where = tree.query(inside, predicate="intersects")
-    for obstacle, segment in list(zip(hit, where, strict=True))[:5]:
-        row = segments.iloc[int(segment)]
+    for segment, obstacle in driven_through(dataset)[:5]:
+        row = segments.iloc[segment]
         yield Finding(
             "error",
             f"segments, track {row['track_no']}, segment {row['segment_no']}",
-            f"runs through {_obstacle(kept['obstacle_no'].iloc[int(obstacle)])}: plan the tracks "
-            "again (geofield tracks)",
+            f"runs through {obstacle}: plan the tracks again (geofield tracks)",
         )
 
 
@@ -176,21 +166,15 @@ def _check_searched(dataset: Dataset) -> Iterator[Finding]:
             yield Finding("warning", schema.FIELD.name, f"{gained} Search it (geofield obstacles)")
 
 
-def _obstacle(number: Any) -> str:
-    return "an obstacle that was drawn" if pd.isna(number) else f"obstacle {number}"
-
-
 def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
-    field, segments = dataset.table("field"), dataset.table("segments")
-    if len(field) == 1 and len(segments):
-        outline = shapely.buffer(field.geometry.iloc[0], 0.05)
-        outside = ~shapely.covered_by(segments.geometry.to_numpy(), outline)
-        if outside.any():
-            yield Finding(
-                "error",
-                "segments",
-                f"{int(outside.sum())} leave the field: plan the tracks again (geofield tracks)",
-            )
+    outside = leaving(dataset)
+    if len(outside):
+        yield Finding(
+            "error",
+            "segments",
+            f"{len(outside)} leave the field: plan the tracks again (geofield tracks)",
+        )
+    segments = dataset.table("segments")
     tracks = dataset.table("tracks")
     if not len(tracks) or not len(segments):
         return
