@@ -292,3 +292,35 @@ def test_what_was_confirmed_and_moved_later_is_not_found_where_it_was(
     for _ in range(2):
         run(folder, made, "--overwrite")
         assert len(rows(plan_in(folder))) == count
+
+
+def test_a_size_typed_for_a_copy_or_beside_another_shape_counts(folder: Path) -> None:
+    """As in QGIS: copied, pasted, moved, and typed over; each row's shape is of its columns."""
+    from geofield.model.review import reconcile
+
+    plan = plan_in(folder)
+    table, written = rows(plan).reset_index(drop=True), plan.evidence.written
+    radius, margin = (float(table.loc[at(table, 2), n].iloc[0]) for n in ("radius_m", "buffer_m"))
+    assert margin > 0
+    shape = table.loc[at(table, 2), "geometry"].iloc[0]
+    copies = [table[at(table, 2)].assign(geometry=translate(shape, 15 * n)) for n in (1, 2, 3)]
+    table = pd.concat([table, *copies], ignore_index=True)
+    wide, far, _ = table.index[-3:]
+    table.loc[wide, "radius_m"] = 6.0
+    table.loc[far, "buffer_m"] = 6.0
+    table.loc[at(table, 3), "geometry"] = [shapely.box(0, 0, 5, 4)]
+    table.loc[at(table, 3), "buffer_m"] += 2
+    (file := folder / "edited.gpkg").unlink(missing_ok=True)
+    table.to_file(file)
+    after, _ = reconcile(gpd.read_file(file), written, plan.grid)
+    after = after.set_index("obstacle_no")
+    last = int(after.index.max())
+    sizes = after.loc[[last - 2, last - 1, last], ["radius_m", "buffer_m"]].to_numpy()
+    assert sizes == pytest.approx(np.array([[6, margin], [radius, 6], [radius, margin]]))
+    areas = (
+        after.geometry.area.loc[[last - 2, last - 1, last]] / ground_scale_of(shape, table.crs) ** 2
+    )
+    assert areas.to_numpy() == pytest.approx(np.pi * sizes.sum(axis=1) ** 2, rel=0.01)
+    grown = shapely.box(0, 0, 5, 4).buffer(2 * ground_scale_of(shape, table.crs), quad_segs=8)
+    assert after.geometry.area[3] == pytest.approx(grown.area, rel=0.01)
+    assert np.isnan(after["radius_m"][3])

@@ -24,18 +24,17 @@ from geofield.errors import FormatWarning, ObstacleError
 from geofield.grid import Grid
 from geofield.model.obstacles import (
     FloatArray,
-    circle_polygons,
     floats,
     from_polygons,
     next_number,
     still_round,
 )
+from geofield.model.resized import circles, differ, grown, shape_now
 from geofield.model.written import (
     MOVED_M,
     PlainShape,
     Written,
     WrittenRow,
-    fitted_circles,
     from_earlier_version,
     matches,
     same_shapes,
@@ -44,9 +43,6 @@ from geofield.model.written import (
 
 if TYPE_CHECKING:
     import geopandas as gpd
-
-#: A typed length that differs by more than this from the written one, metres.
-_TYPED_M = 1e-4
 
 
 def reconcile(
@@ -61,9 +57,10 @@ def reconcile(
     such a change, unless the person chose a status, then or before. A status emptied is no word:
     the one that was written stands.
 
-    A row without a number, or with a number that another row has, was drawn: it becomes `added`
-    (unless another status was chosen) and gets the next free number; a safety margin typed for
-    it grows what was drawn, a radius makes it a circle. Rows without a shape are dropped.
+    A row without a number, or with a number that another row has (a copy of that one), was drawn:
+    it becomes `added` (unless another status was chosen) and gets the next free number; a safety
+    margin typed for it grows what was drawn, a radius makes it a circle. Rows without a shape are
+    dropped.
 
     Parameters
     ----------
@@ -110,7 +107,7 @@ def reconcile(
     if drawn.any():
         said = table[drawn].assign(kind=rows.at["kind"][drawn], status=status[drawn])
         said = said.set_geometry(rows.shapes[drawn], crs=table.crs)
-        added = _added(said, next_number(result), grid)
+        added = _added(said, record, next_number(result), grid)
         parts = [part for part in (result, added) if len(part)]
         result = schema.conform(schema.OBSTACLES, pd.concat(parts) if parts else added, extras=True)
         kept = np.append(kept, np.ones(len(added), bool))
@@ -256,16 +253,18 @@ def _bring_up_to_date(
     rows.at["buffer_m"][known] = margin = np.where(np.isnan(margin), was_margin, margin)
     chosen = rows.at["status"][known] != np.array([row.status for row in before], object)
     reshaped = ~same_shapes(rows.shapes[known], shapes)
-    resized = _differ(rows.at["radius_m"][known], was_radius) | _differ(margin, was_margin)
+    new_radius = differ(rows.at["radius_m"][known], was_radius)
+    new_margin = differ(margin, was_margin)
+    resized = new_radius | new_margin
     renamed = rows.at["kind"][known] != np.array([row.kind for row in before], object)
     changed[known] = reshaped | resized | renamed | chosen
     for at in np.flatnonzero(reshaped | resized | renamed):
         row = known[at]
         found = before[at].status in ("detected", "possible")
         if reshaped[at] or resized[at]:
-            rows.shapes[row], rows.at["radius_m"][row] = _shape_now(
+            rows.shapes[row], rows.at["radius_m"][row] = shape_now(
                 rows.shapes[row], rows.at["radius_m"][row], margin[at], shapes[at], was_margin[at],
-                rows.crs, reshaped=bool(reshaped[at]), resized=bool(resized[at]),
+                rows.crs, new_radius=bool(new_radius[at]), new_margin=bool(new_margin[at]),
             )  # fmt: skip
             anew.append(row)
         if reshaped[at] and before[at].status != "added":
@@ -282,52 +281,6 @@ def _bring_up_to_date(
     return changed, former
 
 
-def _differ(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
-    """Whether lengths differ; two missing ones do not."""
-    same = (np.abs(one - other) <= _TYPED_M) | (np.isnan(one) & np.isnan(other))
-    return np.asarray(~same, dtype=bool)
-
-
-def _shape_now(
-    shape: shapely.Polygon,
-    radius_m: float,
-    buffer_m: float,
-    was: shapely.Polygon,
-    was_buffer_m: float,
-    crs: CRS,
-    *,
-    reshaped: bool,
-    resized: bool,
-) -> tuple[shapely.Polygon, float]:
-    """Shape and radius of a row that a person changed."""
-    centre = shapely.centroid(shape)
-    scale = float(ground_scale_of(shape, crs))
-    if reshaped:
-        start = shapely.centroid(was)
-        step = np.array([centre.x - start.x, centre.y - start.y])
-        only_moved = bool(same_shapes([shapely.transform(was, lambda xy: xy + step)], [shape])[0])
-        if not (only_moved and resized):
-            typed = np.array([(radius_m + buffer_m) * scale])
-            if only_moved or still_round(np.array([shape]), typed)[0]:
-                return shape, radius_m
-            drawn = fitted_circles([shape])[:, 2]
-            now_round = bool(still_round(np.array([shape]), drawn)[0])
-            left_m = float(drawn[0]) / scale - buffer_m
-            return shape, left_m if now_round and left_m > 0 else np.nan
-    if np.isfinite(radius_m):
-        if not radius_m + buffer_m > 0:
-            raise ObstacleError("An obstacle has no size.", hint="Give it a radius_m above 0.")
-        return circle_polygons(centre.x, centre.y, radius_m + buffer_m, crs)[0], radius_m
-    grown = shapely.buffer(shape, (buffer_m - was_buffer_m) * scale, quad_segs=8)
-    if not isinstance(grown, shapely.Polygon) or grown.is_empty:
-        raise ObstacleError(
-            f"A safety margin of {buffer_m:g} m leaves nothing whole of an obstacle drawn with one "
-            f"of {was_buffer_m:g} m.",
-            hint="Draw the obstacle anew, or choose another buffer_m.",
-        )
-    return grown, radius_m
-
-
 def _drawn(rows: _Rows, known: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which rows have no number of their own, or no status."""
     drawn = np.isnan(rows.at["obstacle_no"]) | np.array(
@@ -340,19 +293,24 @@ def _drawn(rows: _Rows, known: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.asarray(drawn | second, dtype=bool)
 
 
-def _added(rows: gpd.GeoDataFrame, first_no: int, grid: Grid | None) -> gpd.GeoDataFrame:
+def _added(
+    rows: gpd.GeoDataFrame, record: dict[int, WrittenRow], first_no: int, grid: Grid | None
+) -> gpd.GeoDataFrame:
     """Drawn rows as obstacles, one of each part."""
     radius, margin = floats(rows, "radius_m"), np.nan_to_num(floats(rows, "buffer_m"))
     shapes = shapely.make_valid(rows.geometry.to_numpy())
     scale = np.asarray(ground_scale_of(shapes, CRS(rows.crs)))
     is_circle = still_round(shapes, (radius + margin) * scale)
-    fresh = rows["obstacle_no"].isna().to_numpy(bool) & ~is_circle
-    sized = fresh & np.isfinite(radius)
+    was_radius, was_margin = _copied(rows, record, radius, margin)
+    new_margin = differ(margin, was_margin)
+    new_size = differ(radius, was_radius)
+    new_size |= new_margin & still_round(shapes, (was_radius + was_margin) * scale)
+    sized = new_size & np.isfinite(radius) & ~is_circle
     if sized.any():
         x, y = shapely.get_coordinates(shapely.centroid(shapes[sized])).T
-        shapes[sized] = circle_polygons(x, y, radius[sized] + margin[sized], CRS(rows.crs))
-    grown = fresh & ~sized & (margin > 0)
-    shapes[grown] = shapely.buffer(shapes[grown], (margin * scale)[grown], quad_segs=8)
+        shapes[sized] = circles(x, y, radius[sized] + margin[sized], CRS(rows.crs))
+    for row in np.flatnonzero(new_margin & ~sized & ~is_circle):
+        shapes[row] = grown(shapes[row], margin[row], was_margin[row], scale[row])
     parts, source = shapely.get_parts(shapes, return_index=True)
     areal = shapely.get_dimensions(parts) == 2
     parts, source = parts[areal], source[areal]
@@ -368,6 +326,23 @@ def _added(rows: gpd.GeoDataFrame, first_no: int, grid: Grid | None) -> gpd.GeoD
         buffer_m=margin[source],
         **{name: rows[name] for name in schema.own_columns(schema.OBSTACLES, rows)},
     )
+
+
+def _copied(
+    rows: gpd.GeoDataFrame, record: dict[int, WrittenRow], radius: FloatArray, margin: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Radius and margin that drawn rows were copied with; of others what stands in them.
+
+    A row without a number is no copy: all that stands in it was typed for it.
+    """
+    numbers = floats(rows, "obstacle_no")
+    was_radius, was_margin = np.where(np.isnan(numbers), [[np.nan], [0.0]], [radius, margin])
+    for row, number in enumerate(numbers.tolist()):
+        if number in record:
+            one = record[int(number)]
+            was_radius[row] = np.nan if one.radius_m is None else one.radius_m
+            was_margin[row] = one.buffer_m or 0.0
+    return was_radius, was_margin
 
 
 def _place(rows: _Rows, grid: Grid | None) -> None:
