@@ -112,8 +112,12 @@ def renamed(field: Field, previous: Plan) -> Field:
     return replace(field, field_id=known.field_id, name=known.name, own=known.own)
 
 
-def outline_changed(previous: Plan, field: Field, *, kept: bool) -> str:
-    """What became of an earlier plan's outline, in words."""
+def field_changes(previous: Plan, field: Field, *, kept: bool) -> tuple[str, ...]:
+    """What became of an earlier plan's outline, and what does of its tracks, in words."""
+    return (_outline_changed(previous, field, kept=kept), *tracks_come_back(previous))
+
+
+def _outline_changed(previous: Plan, field: Field, *, kept: bool) -> str:
     if kept and not _drawn(previous) and _without_record(previous):
         return (
             "outline kept, for the file has lost the record of what was written (as copies made "
@@ -190,6 +194,17 @@ def refuse_lost_obstacles(plan: Plan) -> None:
             "reviewed, drew or took away.",
             hint="Give it back its name, or `geofield undo`; to have none, delete its rows alone.",
         )
+
+
+def tracks_come_back(plan: Plan) -> tuple[str, ...]:
+    """What an emptied layer of tracks means for those that are planned next, in words."""
+    if plan.tracks is None or not plan.tracks.emptied:
+        return ()
+    names = " and ".join(f"`{name}`" for name in plan.tracks.emptied)
+    return (
+        f"no planned track was left in {names}: that is no word on any one of them, and they come "
+        "back (to drive only what you draw: draw it, plan, then delete the others)",
+    )
 
 
 def warn_of_unsearched(evidence: Evidence) -> None:

@@ -20,15 +20,16 @@ import shapely
 from geofield import schema
 from geofield.earlier import (
     drew_outline,
+    field_changes,
     keeps_outline,
     kept_outline,
     known_outline,
     of_the_same_field,
-    outline_changed,
     points_said,
     refuse_lost_obstacles,
     renamed,
     still_said,
+    tracks_come_back,
     warn_of_unsearched,
     with_points,
     with_said_tracks,
@@ -219,7 +220,7 @@ def run_field(
         scene=scene,
         changes=()
         if previous is None
-        else (outline_changed(previous, field, kept=kept), *told_tracks),
+        else (*field_changes(previous, field, kept=kept), *told_tracks),
     )
 
 
@@ -288,7 +289,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     detected = detect_obstacles(scene, plan.field, **settings.obstacles.model_dump())
     found = dict(detected.attrs.get("detection", {}))
     detected.attrs.clear()
-    changes = plan.changes
+    changes = (*plan.changes, *tracks_come_back(plan))
     if plan.obstacles is None:
         written = Written.of(detected, np.zeros(len(detected), bool))
     else:
@@ -327,7 +328,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     tracks = tracks_of_plan(read, settings)
     evidence = replace(evidence, track_edits=tracks.edits).with_unsearched(field)
     warn_of_unsearched(evidence)
-    told = tracks.edits.in_words()
+    told = [*tracks_come_back(plan), tracks.edits.in_words()]
     if field is not plan.field:
         evidence = replace(evidence, outline=outline_digest(field.polygon))
     return replace(
@@ -337,7 +338,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         tracks=tracks,
         settings=_with_section(plan.settings, settings, "tracks"),
         evidence=evidence,
-        changes=tuple(dict.fromkeys([*plan.changes, told])) if told else plan.changes,
+        changes=tuple(dict.fromkeys(each for each in (*plan.changes, *told) if each)),
     )
 
 

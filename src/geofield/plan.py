@@ -217,11 +217,17 @@ class Plan:
         )
         field = field_from_row(rows, dataset, evidence)
         obstacles = dataset.tables.get(schema.OBSTACLES.name)
-        tracks = None
+        tracks, recorded = None, Evidence.from_json(evidence)
         if Tracks.lie_in(dataset.tables, evidence):
             tracks = Tracks.from_tables(
                 dataset.tables, evidence["tracks"], grid=dataset.grid, outline=field.polygon
             )
+        elif "tracks" in evidence:
+            # A layer that is gone takes no edit of another one along.
+            names = (schema.TRACKS.name, schema.SEGMENTS.name, schema.GAPS.name)
+            left = {name: dataset.table(name) for name in names}
+            edits = Tracks.from_tables(left, evidence["tracks"]).edits_since(recorded.track_edits)
+            recorded = dataclasses.replace(recorded, track_edits=edits)
         return cls(
             field=field,
             obstacles=obstacles,
@@ -229,7 +235,7 @@ class Plan:
             settings=settings,
             source=dataset.provenance.source,
             grid=dataset.grid,
-            evidence=Evidence.from_json(evidence),
+            evidence=recorded,
         )
 
     def write(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,8 @@ from geofield.plan import Plan, read_plan
 from geofield.review.session import Session
 from geofield.simulate import SimulatedField
 from geofield.tracks import plan_route, plan_tracks
+
+KEPT = "tracks of yours kept: "
 
 
 def tracks_in(folder: Path) -> Tracks:
@@ -287,8 +291,40 @@ def test_emptied_layers_are_no_word_on_any_track(folder: Path) -> None:
     file = folder / "out/field.gpkg"
     before = len(tracks_in(folder).lines)
     rewritten(file, "tracks", lambda table: table.iloc[:0])
-    assert "of yours" not in geofield("tracks", file, "-o", file)
+    told = geofield("tracks", file, "-o", file)
+    assert "of yours" not in told
+    assert "no planned track was left in `tracks`" in told
     assert len(tracks_in(folder).lines) == before
+
+
+def test_what_is_drawn_in_an_emptied_layer_or_changed_beside_it_counts(folder: Path) -> None:
+    plan, before = plan_in(folder), tracks_in(folder)
+    middle = plan.field.polygon.centroid
+    way = translate(LineString([(-30, -15), (30, 20)]), middle.x, middle.y)
+    shape = MultiLineString([way])
+    drawn = gpd.GeoDataFrame(geometry=[shape], crs=plan.field.crs)
+    own = pd.concat([before.lines.iloc[:0], drawn])
+    without_5 = before.segments[before.segments["track_no"] != 5]
+    nothing = before.segments.iloc[:0]
+    number = max(before.written.segments) + 1
+    for lines, segments, words in (
+        (own, before.segments, f"{number} drawn"),
+        (pd.concat([before.lines, drawn]), nothing, f"{number} drawn"),
+        (before.lines, pd.concat([nothing, drawn.explode()]), f"{number} drawn"),
+        (own, nothing, f"{number} drawn"),
+        (own, without_5, f"5 taken away, {number} drawn"),
+        (before.lines.iloc[:0], nothing, ""),
+    ):
+        edited = replace(before, lines=lines, segments=segments)
+        assert edited.edits_since(TrackEdits()).in_words().removeprefix(KEPT) == words
+    # So does what was changed beside a layer that is gone.
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", without(5))
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("DROP TABLE segments")
+        for table in ("gpkg_contents", "gpkg_geometry_columns"):
+            connection.execute(f"DELETE FROM {table} WHERE table_name = 'segments'")
+    assert "5 taken away" in geofield("tracks", file, "-o", file)
 
 
 def test_the_review_page_goes_on_with_what_was_changed_elsewhere(folder: Path) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geofield.errors import TrackError, TrackWarning
 from geofield.model import Dataset
 from geofield.model.obstacles import active
+from geofield.model.tracks import Tracks
 
 #: Segments end exactly on a border: so far beyond it is no fault, metres.
 _HAIR_M = 0.05
@@ -55,9 +56,9 @@ def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
         blocked = _blocked(each) if "tracks" in each.provenance.evidence else ""
         if blocked and refuse:
             raise TrackError(
-                f"{each.name}: {blocked}, and a machine would follow them.",
-                hint="Plan the tracks again (`geofield tracks PLAN.gpkg -o PLAN.gpkg`), then "
-                "write this anew.",
+                f"{each.name}: {blocked}.",
+                hint="Machines follow these lines. Plan the tracks again (`geofield tracks "
+                "PLAN.gpkg -o PLAN.gpkg`), then write this anew.",
             )
         if blocked:
             warnings.warn(
@@ -69,11 +70,15 @@ def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
 
 def _blocked(dataset: Dataset) -> str:
     """What is wrong with the tracks of a plan, in words; empty where nothing is."""
-    through, outside = driven_through(dataset), leaving(dataset)
+    evidence = dataset.provenance.evidence
     words = []
+    if Tracks.lie_in(dataset.tables, evidence):
+        emptied = Tracks.from_tables(dataset.tables, evidence["tracks"]).emptied
+        words = [f"its layer `{name}` was emptied" for name in emptied]
+    through, outside = driven_through(dataset), leaving(dataset)
     if through:
         named = _listed(name for _, name in through)
-        words = [f"{_tracks(dataset, [row for row, _ in through])} through {named}"]
+        words += [f"{_tracks(dataset, [row for row, _ in through])} through {named}"]
     if len(outside):
         words += [f"{_tracks(dataset, outside.tolist())} out of the field"]
     return " and ".join(words)

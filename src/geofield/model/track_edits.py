@@ -131,7 +131,8 @@ def edits_in(
 ) -> TrackEdits:
     """Read what a person changed since the tracks were written, after what was known before.
 
-    Layers without any row left are no word on any one track: all tracks are planned anew then.
+    A layer without any row of a planned track is no word on any one of them, as if it were as it
+    was written; what was drawn in it counts, and so does all that was changed in the other.
 
     Parameters
     ----------
@@ -147,8 +148,13 @@ def edits_in(
     parts, row_of, loose_rows = _rows_by_number(lines, written)
     as_lines = {no: parts[row] for no, row in row_of.items()}
     as_segments, loose = _segments_by_number(segments)
-    if not as_lines or not as_segments:
-        return known
+    own = own_values(schema.TRACKS, lines)
+    said: dict[int, Mapping[str, Any]] = {no: own[row] for no, row in row_of.items() if row in own}
+    if not as_lines:
+        as_lines = dict(written.segments)
+        said |= {one.track_no: one.own for one in known.edits if one.own}
+    if not as_segments:
+        as_segments = dict(written.segments)
     # Columns of a track that has a row are read anew: they may say something else.
     edits = {
         no: one._replace(own=None) if no in written.segments else one
@@ -168,11 +174,10 @@ def edits_in(
         edits[no] = TrackEdit(no, as_text(_multi(shape)), place=place)
     free = max([*edits, *written.segments, 0]) + 1
     # A piece drawn without a number is a track of its own, in whichever layer.
-    row_of |= dict(enumerate(loose_rows, start=free))
+    said |= {no: own[row] for no, row in enumerate(loose_rows, start=free) if row in own}
     drawn = [*(parts[row] for row in loose_rows), *([each] for each in loose)]
     edits |= {no: TrackEdit(no, as_text(_multi(one))) for no, one in enumerate(drawn, start=free)}
-    own = own_values(schema.TRACKS, lines)
-    _write_own(edits, {no: own[row] for no, row in row_of.items() if row in own}, written)
+    _write_own(edits, said, written)
     # What stands beside segments of a track that was taken away goes with it.
     left = segments[~segments["track_no"].isin([no for no, one in edits.items() if one.away])]
     beside = values_in(left, known.beside, written.spacing_m)

@@ -20,7 +20,7 @@ from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
 from geofield.model.track_edits import TrackEdits, edits_in
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
-from geofield.model.tracks_written import TracksWritten
+from geofield.model.tracks_written import TracksWritten, track_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -144,6 +144,14 @@ class Tracks:
         if self.written is None:
             return known
         return edits_in(self.lines, self.segments, self.written, known)
+
+    @property
+    def emptied(self) -> tuple[str, ...]:
+        """The layers in which a person left no row of any track that was planned."""
+        if self.written is None or not self.written.rows:
+            return ()
+        layers = {schema.TRACKS.name: self.lines, schema.SEGMENTS.name: self.segments}
+        return tuple(name for name, rows in layers.items() if not any(track_numbers(rows)))
 
     def _written(self) -> TracksWritten:
         if self.written is not None:

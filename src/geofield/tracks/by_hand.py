@@ -167,14 +167,14 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
     Parameters
     ----------
     tracks : Tracks
-        As read from a file, edited or not.
+        As read from a file, edited or not; with an emptied layer they stay as they are.
     known : TrackEdits
         Edits that its tracks were planned with.
     """
     edits = tracks.edits_since(known)
     before, now = known.by_number, edits.by_number
     changed = {no for no in {*before, *now} if _shape(before.get(no)) != _shape(now.get(no))}
-    if not changed or tracks.written is None:
+    if not changed or tracks.written is None or tracks.emptied:
         return tracks
     written = tracks.written.segments
     told = []
