@@ -17,12 +17,15 @@ from PIL import Image
 
 import geofield as gf
 from geofield import theme
+from geofield.formats.qgis.project import frame_strip
 from geofield.imagery import write_scene
 from geofield.model.field import FieldQuality
-from geofield.model.frame import along_frame
+from geofield.model.frame import along_frame, shown_ground
+from geofield.model.map_words import frame_lines
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.review.live import LivePlans
+from geofield.review.shown import field_of
 from geofield.settings import load_settings
 from geofield.simulate import SimulatedField
 
@@ -110,6 +113,43 @@ def test_a_drawn_outline_at_the_frame_is_told_too(simulated: SimulatedField) -> 
     assert OUTSIDE in doubt
     parcel = replace(plan, field=replace(field, method="boundary"))
     assert parcel.doubts == ()
+
+
+def test_where_the_data_end_in_a_picture_is_its_edge_too(
+    simulated: SimulatedField, tmp_path: Path
+) -> None:
+    # As in every orthomosaic that was flown askew.
+    scene = simulated.scene
+    x, y = scene.pixel_of(lat=simulated.lat, lon=simulated.lon)
+    rows, columns = np.indices(scene.grid.shape)
+    valid = columns - x + 0.6 * (rows - y) < 30
+    write_scene(replace(scene, valid=valid), tmp_path / "half.tif")
+    command = ["field", tmp_path / "half.tif", "--lat", simulated.lat, "--lon", simulated.lon]
+    assert OUTSIDE in _called(*command, "-o", tmp_path / "field.gpkg").stderr
+    plan = read_plan(tmp_path / "field.gpkg")
+    assert sum(OUTSIDE in doubt for doubt in plan.doubts) == 1
+    dashed_m = sum(line.length for line in plan.frame_lines)
+    assert dashed_m > 0.15 * plan.field.perimeter_m
+    # On the review page, on maps and in QGIS.
+    assert len(field_of(plan)["frame"]) == len(plan.frame_lines)
+    assert frame_lines(plan.to_dataset()) == plan.frame_lines
+    strip = shapely.from_wkt(frame_strip(plan.to_dataset()))
+    assert plan.field.polygon.exterior.intersection(strip).length > 0.9 * dashed_m
+    # What a person draws there goes on outside, too.
+    drawn = replace(plan, field=replace(plan.field, method="drawn", quality=None))
+    assert OUTSIDE in drawn.doubts[0]
+
+
+def test_specks_of_missing_data_are_no_edge(simulated: SimulatedField) -> None:
+    field, grid = simulated.field, simulated.scene.grid
+    valid = np.random.default_rng(1).random(grid.shape) > 0.01
+    assert shown_ground(valid, grid.ground_resolution_m) is None
+    assert shown_ground(np.ones(grid.shape, bool), 0.5) is None
+    valid[:, :40] = False
+    shown = shown_ground(valid, grid.ground_resolution_m)
+    assert shown is not None
+    assert shown.bounds == (40, 0, *grid.shape[::-1])
+    assert along_frame(field.polygon, field.crs, grid, shown) == []
 
 
 @pytest.fixture(scope="module")

@@ -216,6 +216,7 @@ def run_field(
             track_edits=edits,
             said_tracks=() if previous is None else still_said(previous, settings),
             searched=None if previous is None else previous.evidence.searched,
+            shown_px=scene.shown_px,
         ),
         scene=scene,
         changes=()
@@ -309,6 +310,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
             written=written,
             track_edits=plan.track_edits,
             searched=searched_in(plan.field),
+            shown_px=scene.shown_px,
         ),
         scene=scene,
         changes=changes,

@@ -154,11 +154,11 @@ class Plan:
 
     @property
     def frame_lines(self) -> list[LineString]:
-        """Where the outline is the picture's frame; a parcel of the user's own is whole."""
+        """Where the outline is the picture's edge; a parcel of the user's own is whole."""
         one = self.field
         if one.method == "boundary" and not self.outline_edited:
             return []
-        return along_frame(one.polygon, one.crs, self.grid)
+        return along_frame(one.polygon, one.crs, self.grid, self.evidence.shown_px)
 
     @property
     def point(self) -> tuple[float, float]:

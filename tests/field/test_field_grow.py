@@ -1,6 +1,7 @@
 """The window grows with the field; diffusion keeps borders."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,17 @@ def test_all_of_a_picture_is_searched_once(monkeypatch):
     with pytest.warns(FieldWarning, match="outside the picture"):
         grow_field(lambda size: part, lat=truth.lat, lon=truth.lon, size_m=60)
     assert len(searched) == 1
+
+
+def test_no_window_is_widened_where_the_data_end():
+    truth = simulate_field(700_021, SimulationSettings(width_px=400, height_px=400))
+    x, y = (int(v) for v in truth.scene.grid.from_lonlat(truth.lon, truth.lat))
+    valid = np.zeros(truth.scene.grid.shape, bool)
+    valid[y - 30 : y + 30, x - 30 : x + 30] = True
+    read, sizes = reader(replace(truth.scene, valid=valid), truth.lat, truth.lon)
+    with pytest.warns(FieldWarning, match="outside the picture"):
+        grow_field(read, lat=truth.lat, lon=truth.lon, size_m=60)
+    assert sizes == [60]
 
 
 def test_impossible_windows_are_refused():

@@ -162,6 +162,10 @@ def say_wider(plan: Plan, picture: PlacePicture) -> None:
     """How to get more of a source's picture, where the outline goes on outside what was fetched."""
     if plan.grid is None or not plan.frame_lines or not picture.offers_more:
         return
+    from geofield.model.frame import along_frame
+
+    if not along_frame(plan.field.polygon, plan.field.crs, plan.grid):
+        return  # the source's own data end there
     side_m = max(plan.grid.shape) * plan.grid.ground_resolution_m
     say(f"           what lies outside may be had with --size-m {2 * side_m:.0f}", fg="yellow")
 

@@ -107,7 +107,7 @@ def extract_field(
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
     _check_places(scene, (lon, lat), include, exclude)
     picture = diffused(scene) if smooth == "diffusion" else scene
-    part, whole = Part.whole(scene), scene.grid
+    part, whole, shown_px = Part.whole(scene), scene.grid, scene.shown_px
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
         search = search or FieldSearch((lon, lat))
@@ -123,7 +123,7 @@ def extract_field(
     found: Segmentation = method_of(FIELD, method)(picture, *seed, **chosen)
     keep = holes == "keep" or (holes is None and method == "study")
     smallest = min_hole_m2 / scene.grid.ground_resolution_m**2 if keep else None
-    seen = look(scene)
+    seen, shown = look(scene), part.from_picture(shown_px)
 
     def outlined(one: Segmentation) -> tuple[Polygon, FieldQuality]:
         """Outline, pixel coordinates, and its quality."""
@@ -142,7 +142,7 @@ def extract_field(
             outline_px = obeying(drawn(draw, tolerances_px, *points), *points)
         else:
             outline_px = draw(tolerance_px=tolerance_px)
-        return outline_px, judge(scene, seen, filled, outline_px, one, seed, part.frame_px)
+        return outline_px, judge(scene, seen, filled, outline_px, one, seed, part.frame_px, shown)
 
     outline_px, quality = outlined(found)
     others = [outlined(one) for one in found.alternatives]

@@ -13,6 +13,7 @@ import shapely
 from shapely import Polygon
 
 from geofield.model import Scene
+from geofield.model.frame import Shown
 from geofield.raster import resample
 
 #: A part should have about so many pixels along its longer side.
@@ -73,6 +74,12 @@ class Part:
     def to_picture(self, polygon: Polygon) -> Polygon:
         """A polygon, pixel coordinates of the part, in those of the whole picture."""
         return shapely.transform(polygon, lambda xy: xy / self.times + self.box[:2])
+
+    def from_picture(self, shown_px: Shown | None) -> Shown | None:
+        """Where the whole picture has data, pixel coordinates of the part."""
+        if shown_px is None:
+            return None
+        return shapely.transform(shown_px, lambda xy: self.times * (xy - self.box[:2]))
 
     @property
     def frame_px(self) -> Polygon:

@@ -9,7 +9,7 @@ from shapely import Polygon
 
 from geofield.field.plausible import Look, doubts
 from geofield.model import FieldQuality, Scene
-from geofield.model.frame import outside_in_words
+from geofield.model.frame import NEAR_PX, Shown, along_edge, outside_in_words
 from geofield.model.segmentation import Segmentation
 
 BoolArray = NDArray[np.bool_]
@@ -31,6 +31,7 @@ def judge(
     found: Segmentation,
     seed_px: tuple[float, float],
     frame_px: Polygon,
+    shown_px: Shown | None = None,
 ) -> FieldQuality:
     """Measure an outline against its picture.
 
@@ -49,11 +50,13 @@ def judge(
         The point, pixel coordinates.
     frame_px : shapely.Polygon
         The frame of the whole picture, of which the scene may be a part.
+    shown_px : Polygon or MultiPolygon, optional
+        Where the whole picture has data; all of it when not given.
     """
     pixel_m = scene.grid.ground_resolution_m
     area_m2 = outline_px.area * pixel_m**2
     strange, seen = doubts(look, mask)
-    touching = edge_share(outline_px, frame_px)
+    touching = edge_share(outline_px, frame_px, shown_px)
     covered = float(mask.sum()) / max(int(scene.valid.sum()), 1)
     reasons = list(found.notes)
     measured = dict(found.figures)
@@ -84,8 +87,11 @@ def judge(
     return FieldQuality(score, tuple(reasons), figures, trusted=score >= TRUSTED)
 
 
-def edge_share(outline_px: Polygon, frame_px: Polygon) -> float:
+def edge_share(outline_px: Polygon, frame_px: Polygon, shown_px: Shown | None) -> float:
     """Share of an outline's length that lies on the picture's edge."""
     border = outline_px.exterior
+    if shown_px is not None:
+        along = along_edge(outline_px, shown_px, NEAR_PX)
+        return sum(line.length for line in along) / border.length
     inside = shapely.length(border.difference(frame_px.exterior.buffer(0.25)))
     return float(1.0 - inside / border.length) if border.length else 0.0

@@ -146,7 +146,7 @@ def _judged(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
     parts = shapely.get_parts(field.geometry.to_numpy())
     if len(parts) != 1 or not Evidence.from_json(dataset.provenance.evidence).moved(parts[0]):
         return field
-    along = along_frame(parts[0], dataset.crs, dataset.grid)
+    along = along_frame(parts[0], dataset.crs, dataset.grid, dataset.provenance.shown_px)
     doubts = "; ".join(with_outside((), parts[0], along))
     return field.assign(method="drawn", certainty=np.nan, doubts=doubts or None)
 

@@ -16,7 +16,8 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import CRSMismatchError
 from geofield.grid import Grid
-from geofield.model.evidence import obstacle_doubts
+from geofield.model.evidence import obstacle_doubts, shown_from_json
+from geofield.model.frame import Shown
 from geofield.model.scene import ImagerySource
 
 if TYPE_CHECKING:
@@ -48,6 +49,11 @@ class Provenance:
     def obstacle_doubts(self) -> tuple[str, ...]:
         """What the picture did not allow when obstacles were looked for, in words."""
         return obstacle_doubts(self.evidence)
+
+    @property
+    def shown_px(self) -> Shown | None:
+        """Where the picture has data, pixel coordinates; None where that is all of it."""
+        return shown_from_json(self.evidence)
 
 
 @dataclass(frozen=True, eq=False)

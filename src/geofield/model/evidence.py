@@ -13,6 +13,7 @@ from typing import Any
 import shapely
 
 from geofield.model.field import Field, FieldQuality
+from geofield.model.frame import Shown
 from geofield.model.searched import UNSEARCHED, unsearched
 from geofield.model.track_edits import TrackEdits
 from geofield.model.written import Written
@@ -39,6 +40,8 @@ class Evidence:
     said_tracks: tuple[str, ...] = ()
     #: The outline that obstacles were searched in: WKT of longitude and latitude.
     searched: str | None = None
+    #: Where the picture has data, pixel coordinates; None where that is all of it.
+    shown_px: Shown | None = None
 
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
@@ -78,6 +81,8 @@ class Evidence:
             result["field"] = {"method": of.method, "outline_sha256": self.outline}
         if of.quality is not None:
             result.setdefault("field", {})["quality"] = _quality_json(of.quality)
+        if self.shown_px is not None:
+            result["shown_px"] = shapely.to_wkt(self.shown_px, rounding_precision=0)
         if self.detection:
             result["obstacles"] = dict(self.detection)
         if self.written is not None:
@@ -104,6 +109,7 @@ class Evidence:
             TrackEdits.from_json(value.get("track_edits", {})),
             tuple(value.get("said", {}).get("tracks", ())),
             value.get("searched"),
+            shown_from_json(value),
         )
 
 
@@ -111,6 +117,12 @@ def outline_digest(outline: shapely.Polygon) -> str:
     """A fingerprint of an outline, to tell whether a person has moved it since."""
     ring = shapely.normalize(outline)
     return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
+
+
+def shown_from_json(value: Mapping[str, Any]) -> Shown | None:
+    """Where the picture has data, in the JSON of :meth:`Evidence.to_json`."""
+    shown: Shown | None = shapely.from_wkt(value.get("shown_px"), on_invalid="ignore")
+    return shown
 
 
 def obstacle_doubts(value: Mapping[str, Any]) -> tuple[str, ...]:

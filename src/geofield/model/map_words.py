@@ -48,12 +48,15 @@ def credit_in_words(dataset: Dataset) -> str:
 
 
 def frame_lines(dataset: Dataset) -> list[shapely.LineString]:
-    """Where the outline is the picture's frame; a parcel of the user's own is whole."""
+    """Where the outline is the picture's edge; a parcel of the user's own is whole."""
     field = dataset.table("field")
     polygons = shapely.get_parts(field.geometry.to_numpy())
     if not len(polygons) or field["method"].iloc[0] == "boundary":
         return []
-    return [line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid)]
+    shown_px = dataset.provenance.shown_px
+    return [
+        line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid, shown_px)
+    ]
 
 
 def round_length_m(longest_m: float) -> float:

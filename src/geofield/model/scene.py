@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from geofield.crs import authority_name
 from geofield.errors import ImageryError, PointOutsideError
 from geofield.grid import Grid
 from geofield.model.card import words
+from geofield.model.frame import Shown, shown_ground
 
 #: What a band can show.
 ROLES = ("red", "green", "blue", "nir", "grey", "other")
@@ -115,6 +117,11 @@ class Scene:
         """Whether all pixels with data have one and the same value, or none has data."""
         row, column = np.unravel_index(np.argmax(self.valid), self.valid.shape)
         return not any(((band != band[row, column]) & self.valid).any() for band in self.bands)
+
+    @cached_property
+    def shown_px(self) -> Shown | None:
+        """Where the picture has data, pixel coordinates; None where that is all of it."""
+        return shown_ground(self.valid, self.grid.ground_resolution_m)
 
     @property
     def is_colour(self) -> bool:

@@ -18,7 +18,7 @@ from geofield.formats.qgis.looks import ORDER
 from geofield.formats.qgis.symbols import QGIS_VERSION, document
 from geofield.formats.xml import node
 from geofield.model import Dataset
-from geofield.model.frame import NEAR_PX, picture_frame
+from geofield.model.frame import NEAR_PX, edge_strip
 
 #: White space around the field in the first view, as a share of its size.
 MARGIN = 0.08
@@ -92,12 +92,12 @@ def qgz_bytes(xml: str, stem: str, timestamp: str) -> bytes:
 
 
 def frame_strip(dataset: Dataset) -> str:
-    """A narrow strip along the picture's frame, WKT; empty where the outline is not of it."""
+    """A narrow strip along the picture's edge, WKT; empty where the outline is not of it."""
     field, grid = dataset.table(schema.FIELD.name), dataset.grid
     if grid is None or not len(field) or field["method"].iloc[0] == "boundary":
         return ""
-    frame = picture_frame(grid, dataset.crs)
-    strip = shapely.buffer(frame.exterior, NEAR_PX * grid.ground_resolution_m, join_style="mitre")
+    near = NEAR_PX * grid.ground_resolution_m
+    strip = edge_strip(grid, dataset.crs, dataset.provenance.shown_px, near)
     return str(shapely.to_wkt(strip, rounding_precision=3))
 
 
