@@ -19,6 +19,7 @@ from pyproj import CRS, Geod
 from geofield.crs import LONLAT, WEB_MERCATOR, grid_north_deg, metric_crs, transformer, utm_crs
 from geofield.errors import CRSError, GridError
 from geofield.grid import TILE_SIZE_PX, Grid, web_mercator_resolution
+from geofield.model.obstacles import from_circles_px
 
 latitudes = st.floats(-85, 85)
 longitudes = st.floats(-180, 180)
@@ -92,6 +93,16 @@ def test_agrees_with_mercantile(lat: float, lon: float, zoom: int) -> None:
     x, y = grid.from_lonlat(lon, lat)
     assert -1e-6 <= x <= 256 + 1e-6
     assert -1e-6 <= y <= 256 + 1e-6
+
+
+def test_longitudes_of_a_picture_across_the_180th_meridian_stay_on_earth() -> None:
+    step = 1e-5
+    grid = Grid(100, 100, Affine(step, 0, 180.0 - 50 * step, 0, -step, -17.5), CRS.from_epsg(4326))
+    lon, lat = grid.to_lonlat(np.array([0.0, 50.0, 100.0]), np.zeros(3))
+    assert lon == pytest.approx([179.9995, 180.0, -179.9995])
+    assert grid.from_lonlat(lon, lat)[0] == pytest.approx([0.0, 50.0, 100.0], abs=1e-6)
+    obstacle = from_circles_px([99.0], [50.0], [2.0], grid, buffer_m=1.0).iloc[0]
+    assert obstacle["lon"] == pytest.approx(-179.99951)
 
 
 def test_agrees_with_gdal_on_a_rotated_transform() -> None:

@@ -177,8 +177,13 @@ class Grid:
         return 0.0
 
     def to_lonlat(self, x_px: ArrayLike, y_px: ArrayLike) -> tuple[Any, Any]:
-        """Pixel coordinates to longitude and latitude, degrees, WGS 84."""
-        return self.to_crs(x_px, y_px, LONLAT)
+        """Pixel coordinates to longitude (-180 to 180) and latitude, degrees, WGS 84."""
+        lon, lat = self.to_crs(x_px, y_px, LONLAT)
+        lon = np.array(lon)
+        # Longitudes of a picture's own CRS run on beyond the 180th meridian.
+        beyond = np.isfinite(lon) & (np.abs(lon) > 180.0)
+        lon[beyond] -= 360.0 * np.round(lon[beyond] / 360.0)
+        return _like(lon), lat
 
     def from_lonlat(self, lon: ArrayLike, lat: ArrayLike) -> tuple[Any, Any]:
         """Longitude and latitude, degrees, WGS 84, to pixel coordinates."""
