@@ -8,7 +8,7 @@ from dataclasses import replace
 import shapely
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError, ObstacleError, ObstacleWarning
+from geofield.errors import FieldError, GeofieldWarning, ObstacleError, ObstacleWarning
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
@@ -180,6 +180,20 @@ def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
             f"{lon} lies outside it) and holds {' and '.join(work)}.",
             hint="Choose another folder, or --fresh to forget that work.",
         )
+
+
+def is_planned(plan: Plan) -> bool:
+    """Whether field, obstacles and tracks are those that the last stage recorded."""
+    obstacles, written = plan.obstacles, plan.evidence.written
+    if plan.outline_edited or plan.track_edits != plan.evidence.track_edits:
+        return False
+    if obstacles is None:
+        return True
+    if written is None:
+        return bool(obstacles["obstacle_no"].notna().all() and obstacles["status"].notna().all())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", GeofieldWarning)
+        return reconcile(obstacles, written, plan.grid)[1] == written
 
 
 def refuse_lost_obstacles(plan: Plan) -> None:

@@ -19,7 +19,11 @@ import shapely.affinity
 from pyproj import CRS
 
 import geofield as gf
+from geofield.errors import FieldWarning
 from geofield.farm.reviewed import put_back
+from geofield.model.evidence import Evidence, outline_digest
+from geofield.pipeline import run_tracks
+from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import Settings
 
@@ -409,11 +413,36 @@ def test_an_overview_that_was_left_out_is_renewed_by_the_next_run(folder: Path) 
     assert len(shown) == len(gf.read_farm(folder / "farm").tracks)
 
 
+@pytest.mark.parametrize("layer", ["obstacles", "field"])
+def test_tracks_of_before_the_edit_do_not_go_back(folder: Path, layer: str) -> None:
+    """They differ from the farm's, for another spacing was planned before the edit."""
+    farm, file = folder / "farm", folder / "a.gpkg"
+    plan = gf.read_farm(farm)["a"]
+    save_plan(run_tracks(plan, settings=Settings(tracks={"spacing_m": 9.0})), file)
+    table = pyogrio.read_dataframe(file, layer=layer)
+    if layer == "field":
+        table = table.set_geometry(table.geometry.buffer(-20, join_style="mitre"))
+    else:
+        tree = shapely.Point(500_060, 5_300_090).buffer(8)
+        table = pd.concat([table, gpd.GeoDataFrame(geometry=[tree], crs=table.crs)])
+    pyogrio.write_dataframe(table, file, layer=layer, geometry_name="geom")
+    with pytest.warns(FieldWarning, match="planned again"):
+        put_back(file, farm)
+    after = gf.read_farm(farm)["a"]
+    assert after.tracks.spacing_m == 9
+    assert after.obstacles["status"].notna().all()
+    assert after.tracks.segments.within(after.field.polygon.buffer(0.01)).all()
+    assert not after.tracks.segments.intersects(after.obstacles.union_all().buffer(-0.01)).any()
+    assert (after.field.method == "drawn") == (layer == "field")
+
+
 def test_a_plan_without_obstacles_goes_back_as_it_is(tmp_path: Path) -> None:
     shape = shapely.box(500_000, 5_000_000, 500_100, 5_000_100)
     field = gf.Field(shape, crs=CRS(32633), field_id="a", name="a")
     tracks = gf.plan_tracks(shape, crs=field.crs, spacing_m=9)
-    gf.Farm([gf.Plan(field, tracks=tracks, settings=Settings())]).write(tmp_path / "farm")
+    known = Evidence(outline=outline_digest(shape))
+    plan = gf.Plan(field, tracks=tracks, settings=Settings(), evidence=known)
+    gf.Farm([plan]).write(tmp_path / "farm")
     geofield("farm", "get", tmp_path / "farm", "a", "-o", tmp_path / "a.gpkg")
     assert "planned again" not in geofield("farm", "put", tmp_path / "a.gpkg", tmp_path / "farm")
 

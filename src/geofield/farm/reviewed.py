@@ -6,10 +6,12 @@ import hashlib
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from geofield.earlier import is_planned
 from geofield.errors import FieldWarning, FormatError, GeofieldError
 from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
 from geofield.farm.folder import file_of as file_in
@@ -77,7 +79,7 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
     """Put a reviewed plan back into a farm, in the place of the one that is there; the field's id.
 
     The plan itself is kept in the farm, so that no later run changes what a person said. Tracks
-    that are still those of the farm, with another outline or other obstacles, are planned again.
+    are planned again unless the plan's own record says that nothing was edited since they were.
 
     Raises
     ------
@@ -104,6 +106,7 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         )
     _refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
+    plan = _with_its_outline(plan, before)
     settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
@@ -112,7 +115,7 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
             # With all that was written to it, also where a program has it open.
             copy_whole(plan_file, file)
         edited = plan.track_edits != plan.evidence.track_edits
-        if settings is not None and (edited or not _has_its_tracks(plan, before)):
+        if settings is not None and (edited or not _has_its_tracks(plan)):
             if not edited:
                 why = (
                     "there is no record of how its tracks were written, so they"
@@ -173,13 +176,25 @@ def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> N
             )
 
 
-def _has_its_tracks(plan: Plan, before: Plan | None) -> bool:
-    """Whether a plan has tracks, and they were planned since its outline or obstacles changed."""
-    if plan.tracks is None or before is None or before.tracks is None:
-        return plan.tracks is not None
-    if not plan.tracks.segments.geometry.equals(before.tracks.segments.geometry):
-        return True
-    return _same_ground(plan, before)
+def _has_its_tracks(plan: Plan) -> bool:
+    """Whether a plan's record says that its tracks are those of its outline and obstacles.
+
+    What the farm has does not tell: tracks may have been planned before the last edit, and the
+    farm may have changed since.
+    """
+    recorded = plan.evidence.outline is not None and (
+        plan.obstacles is None or plan.obstacles.empty or plan.evidence.written is not None
+    )
+    return plan.tracks is not None and recorded and is_planned(plan)
+
+
+def _with_its_outline(plan: Plan, before: Plan | None) -> Plan:
+    """A plan whose outline counts as drawn where only the farm can tell that it was moved."""
+    if plan.evidence.outline is not None or before is None:
+        return plan
+    if plan.field.polygon.equals_exact(before.field.polygon, 1e-6):
+        return plan
+    return replace(plan, field=replace(plan.field, method="drawn", quality=None))
 
 
 def _same_ground(plan: Plan, other: Plan) -> bool:

@@ -18,6 +18,7 @@ from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_obstacles
+from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
@@ -100,7 +101,9 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     elif previous is not None:
         plan = previous
     elif boundary is not None:
-        plan = _around(Plan(boundary), job)
+        # As it was given: what a person moves of it later is known by that.
+        evidence = Evidence(outline=outline_digest(boundary.polygon))
+        plan = _around(Plan(boundary, evidence=evidence), job)
     else:
         raise FieldError(
             "A point alone has no outline, and there is no picture to find it in.",

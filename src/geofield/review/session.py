@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from geofield.earlier import is_planned
 from geofield.errors import GeofieldWarning
-from geofield.model.review import reconcile
 from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
@@ -55,7 +55,7 @@ class Session:
         self._ground = ground
         first = Step(plan)
         #: Whether what lies in the file was edited since its tracks were planned.
-        self.outdated = plan.tracks is not None and not _is_planned(plan)
+        self.outdated = plan.tracks is not None and not is_planned(plan)
         if plan.tracks is None or self.outdated:
             first = planned(plan, None)
         self._steps = [first]
@@ -135,20 +135,6 @@ class Session:
     def forget(self) -> None:
         """Begin anew from the state that is shown: what led to it cannot be undone any more."""
         self._steps, self._at = [self.step], 0
-
-
-def _is_planned(plan: Plan) -> bool:
-    """Whether field, obstacles and tracks are those that the last stage recorded."""
-    obstacles, written = plan.obstacles, plan.evidence.written
-    if plan.outline_edited or plan.track_edits != plan.evidence.track_edits:
-        return False
-    if obstacles is None:
-        return True
-    if written is None:
-        return bool(obstacles["obstacle_no"].notna().all() and obstacles["status"].notna().all())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", GeofieldWarning)
-        return reconcile(obstacles, written, plan.grid)[1] == written
 
 
 def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
