@@ -81,20 +81,18 @@ class Evidence:
             result["field"] = {"method": of.method, "outline_sha256": self.outline}
         if of.quality is not None:
             result.setdefault("field", {})["quality"] = _quality_json(of.quality)
-        if self.shown_px is not None:
-            result["shown_px"] = shapely.to_wkt(self.shown_px, rounding_precision=0)
-        if self.detection:
-            result["obstacles"] = dict(self.detection)
-        if self.written is not None:
-            result["written"] = self.written.to_json()
-        if self.track_edits:
-            result["track_edits"] = self.track_edits.to_json()
-        if self.said_tracks:
-            result["said"] = {"tracks": list(self.said_tracks)}
-        if self.searched is not None:
-            result["searched"] = self.searched
-        if tracks is not None:
-            result["tracks"] = dict(tracks)
+        said = {"tracks": list(self.said_tracks)} if self.said_tracks else None
+        shown = shapely.to_wkt(self.shown_px, rounding_precision=0) if self.shown_px else None
+        further = {
+            "shown_px": shown,
+            "obstacles": dict(self.detection) or None,
+            "written": None if self.written is None else self.written.to_json(),
+            "track_edits": self.track_edits.to_json() if self.track_edits else None,
+            "said": said,
+            "searched": self.searched,
+            "tracks": None if tracks is None else dict(tracks),
+        }
+        result |= {name: value for name, value in further.items() if value is not None}
         return result
 
     @classmethod
