@@ -32,9 +32,10 @@ def staged_plan(
     """A folder to write a plan's GeoPackage into, which then takes the place of the one before.
 
     The one before stays as the earlier one, and what a person keeps in it beside its plan comes
-    along. `inputs`, files read for this work, are never replaced.
+    along; a project beside it that a person saved stays. `inputs`, files read for this work, are
+    never replaced.
     """
-    from geofield.formats.gpkg_guests import bring_guests
+    from geofield.formats.gpkg_guests import bring_guests, keep_project
 
     refuse_other_names(output)
     with staged_folder(output.parent, overwrite=overwrite, inputs=inputs) as staging:
@@ -42,6 +43,8 @@ def staged_plan(
         yield staging
         if earlier is not None:
             bring_guests(earlier, staging / output.name)
+        project = output.with_suffix(".qgz")
+        keep_project(project, staging / project.name)
 
 
 def save_plan(

@@ -19,7 +19,7 @@ from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
-from geofield.formats.gpkg_guests import bring_guests
+from geofield.formats.gpkg_guests import bring_guests, keep_project
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.staging import staged_folder
@@ -29,6 +29,7 @@ PLAN_FILE = "field.gpkg"
 SCENE_FILE = "scene.tif"
 MAP_FILE = "map.png"
 REPORT_FILE = "report.json"
+PROJECT_FILE = "field.qgz"
 
 
 def write_products(
@@ -69,9 +70,11 @@ def write_products(
         )
         if earlier is not None:
             bring_guests(earlier, staging / PLAN_FILE)
+        keep_project(folder / PROJECT_FILE, staging / PROJECT_FILE)
         written += drawn.result()
         facts = {"timings_s": timings_s or {}, "formats": asked, "changes": changes}
         written += write_report(dataset, staging, stem="", options=facts)
+        written = [path for path in written if path.is_file()]
     return [folder / path.relative_to(staging) for path in written]
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
+
 import pytest
 import shapely
 from click.testing import CliRunner
 from formats_plan import ORIGIN, make_dataset
 
 from geofield.cli.tracks import tracks
+from geofield.errors import FormatWarning
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Field, Provenance
 from geofield.model.evidence import outline_digest
@@ -170,3 +174,30 @@ def test_the_styles_are_still_there_after_planning_again(plan_file, qgis):
     opened = qgis("project", uri=str(plan_file.with_suffix(".qgz")))
     assert opened["bad"] == []
     assert opened["layers"]["geofield_tracks"]["renderer"] == "RuleRenderer"
+
+
+def test_a_project_and_a_style_that_were_saved_in_qgis_stay(plan_file, qgis):
+    project = plan_file.with_suffix(".qgz")
+    first = project.read_bytes()
+    plan_again(plan_file)
+    assert project.read_bytes() == first  # nobody's but geofield's: written anew, and the same
+    for uri in (str(project), f"geopackage:{plan_file}?projectName=field"):
+        assert qgis("save_project", uri=uri, title="Mine")
+    own = "UPDATE layer_styles SET styleQML = '<qgis/>' WHERE f_table_name = 'obstacles'"
+    read = (
+        "SELECT content FROM qgis_projects UNION ALL "
+        "SELECT styleQML FROM layer_styles WHERE useAsDefault AND f_table_name = 'obstacles'"
+    )
+    with closing(sqlite3.connect(plan_file)) as file, file:
+        file.execute(own)
+        kept = file.execute(read).fetchall()
+    saved = project.read_bytes()
+    assert saved != first
+    with pytest.warns(FormatWarning, match="as it was saved in QGIS"):
+        plan_again(plan_file)
+    assert project.read_bytes() == saved
+    with closing(sqlite3.connect(plan_file)) as file:
+        assert file.execute(read).fetchall() == kept
+    project.rename(project.with_stem("mine"))
+    plan_again(plan_file)
+    assert project.read_bytes() == first

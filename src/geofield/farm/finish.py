@@ -5,12 +5,12 @@ from __future__ import annotations
 from geofield.farm.edits import TAKEN, is_edited
 from geofield.farm.failed import write_failed
 from geofield.farm.marks import CHANGED, WORK
-from geofield.farm.overview import OVERVIEW, write_overview
+from geofield.farm.overview import OVERVIEW, PROJECT, write_overview
 from geofield.farm.places import Places
 from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
-from geofield.formats.gpkg_guests import bring_guests
+from geofield.formats.gpkg_guests import bring_guests, keep_project
 from geofield.staging import staged_folder
 
 
@@ -72,5 +72,6 @@ def _overview(store: Store) -> list[str]:
         if (store.folder / OVERVIEW).is_file():
             # What a person keeps in it beside the farm comes along.
             bring_guests(store.folder / OVERVIEW, staging / OVERVIEW)
+        keep_project(store.folder / PROJECT, staging / PROJECT)
     store.remove(TAKEN)
     return [file.name for file in files]

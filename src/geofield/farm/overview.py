@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 #: Name of the files, without suffix.
 STEM = "farm"
 OVERVIEW = f"{STEM}.gpkg"
+PROJECT = f"{STEM}.qgz"
 #: Fields up to which the overview holds obstacles and tracks; beyond, outlines and places.
 MOST_FIELDS = 20_000
 

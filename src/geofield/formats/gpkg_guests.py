@@ -14,6 +14,7 @@ from pathlib import Path
 
 from geofield import schema
 from geofield.errors import FormatWarning
+from geofield.formats.qgis import is_as_written, is_project_as_written
 
 _OURS = {layer.name for layer in schema.LAYERS} | {"layer_styles"}
 #: Tables of the standard and of GDAL in which a layer has rows, and the column of its name.
@@ -30,8 +31,9 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
     """Copy what is not geofield's from an earlier plan's file into the new one.
 
     Layers with features or attributes alone come with their reference system, index and triggers;
-    styles and projects where the new file has none of the name. A style that a person made the
-    default of a layer stays so. Files that are no plan bring nothing.
+    styles and projects where the new file has none of the name, or a person saved theirs over
+    geofield's. A style that a person made the default of a layer stays so. Files that are no plan
+    bring nothing.
 
     Warns
     -----
@@ -68,6 +70,25 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
             FormatWarning,
             stacklevel=2,
         )
+
+
+def keep_project(there: Path, new: Path) -> None:
+    """Leave the project beside a plan as a person saved it; its layers are those of the plan.
+
+    Warns
+    -----
+    FormatWarning
+        That `new`, a staged one, does not take its place.
+    """
+    if not (new.is_file() and there.is_file()) or is_project_as_written(there.read_bytes()):
+        return
+    new.unlink()
+    warnings.warn(
+        f"{there.name} is as it was saved in QGIS: it stays, and shows the plan as it is now. To "
+        "have that of geofield anew, rename yours and repeat.",
+        FormatWarning,
+        stacklevel=3,
+    )
 
 
 def _bring_layer(connection: sqlite3.Connection, name: str, kind: str) -> None:
@@ -117,13 +138,18 @@ def _indexes(connection: sqlite3.Connection, name: str) -> Iterator[str]:
 
 
 def _bring_styles(connection: sqlite3.Connection) -> None:
-    """Styles of other names than those here; a default one makes the one here none."""
+    """Styles that geofield did not write; a default one makes the one here none."""
     if not _has(connection, "old", "layer_styles"):
         return
-    new = "(SELECT coalesce(f_table_name, '') || '/' || styleName FROM main.layer_styles)"
-    mine = f"WHERE coalesce(f_table_name, '') || '/' || styleName NOT IN {new}"
+    connection.create_function("as_written", 1, is_as_written, deterministic=True)
+    key = "coalesce(f_table_name, '') || '/' || styleName"
+    mine = f"WHERE {key} NOT IN (SELECT {key} FROM main.layer_styles)"  # noqa: S608
     mine += " AND f_table_name IN (SELECT table_name FROM main.gpkg_contents)"
     connection.execute("BEGIN")
+    connection.execute(
+        f"DELETE FROM main.layer_styles WHERE {key} IN "  # noqa: S608
+        f"(SELECT {key} FROM old.layer_styles WHERE NOT as_written(styleQML))"
+    )
     connection.execute(
         "UPDATE main.layer_styles SET useAsDefault = 0 WHERE f_table_name IN "  # noqa: S608
         f"(SELECT f_table_name FROM old.layer_styles {mine} AND useAsDefault)"
@@ -133,9 +159,22 @@ def _bring_styles(connection: sqlite3.Connection) -> None:
 
 
 def _bring_projects(connection: sqlite3.Connection) -> None:
-    if _has(connection, "old", "qgis_projects"):
-        new = "(SELECT name FROM main.qgis_projects)"
-        _fill(connection, "qgis_projects", f"WHERE name NOT IN {new}")
+    if not _has(connection, "old", "qgis_projects"):
+        return
+    for name, content in connection.execute("SELECT name, content FROM old.qgis_projects"):
+        if not _is_own_project(content):
+            connection.execute("DELETE FROM main.qgis_projects WHERE name = ?", (name,))
+    new = "(SELECT name FROM main.qgis_projects)"
+    _fill(connection, "qgis_projects", f"WHERE name NOT IN {new}")
+
+
+def _is_own_project(content: bytes | str | None) -> bool:
+    """Whether geofield wrote a project in a GeoPackage: the hexadecimal text of a ``.qgz``."""
+    text = content.decode("latin-1") if isinstance(content, bytes) else content or ""
+    try:
+        return is_project_as_written(bytes.fromhex(text))
+    except ValueError:
+        return False
 
 
 def _create(connection: sqlite3.Connection, which: str, name: str) -> None:

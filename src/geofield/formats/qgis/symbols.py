@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
+from geofield.formats.qgis.as_written import marked
 from geofield.formats.xml import node
 
 #: The version that the XML is written for; later ones read it.
@@ -14,7 +15,7 @@ QGIS_VERSION = "3.22.0-Białowieża"
 
 def document(root: ET.Element) -> str:
     """A QML file or project as text."""
-    return (
+    return marked(
         "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
         f"{ET.tostring(root, encoding='unicode')}\n"
     )
