@@ -67,6 +67,9 @@ def save_plan(
     from geofield.formats.gpkg_read import scene_beside
 
     same = read_from is not None and output.resolve() == read_from.resolve()
+    if same and output.is_symlink():
+        # The plan is what the link leads to: replaced by a file of its own it would stay as it was.
+        output = read_from = output.resolve()
     dataset = plan.to_dataset()
     if picture is None and read_from is not None:
         picture = scene_beside(read_from)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from geofield import schema
 from geofield.cli.main import cli
 from geofield.errors import GeofieldError, TrackError, TrackWarning
 from geofield.farm import read_farm
+from geofield.plan import read_plan
+from geofield.plan_files import save_plan
 from geofield.tracks import plan_tracks
 from geofield.tracks.fewest import candidate_angles
 
@@ -337,3 +340,19 @@ def test_obstacles_that_are_not_avoided_are_told(tmp_path: Path, several: int) -
         said = planned_around(tmp_path / "parcels.gpkg", trees, tmp_path / f"{name}_plan.gpkg")
         assert told in said
         assert ("avoided" in said) == bool(told)
+
+
+def test_a_plan_behind_a_link_is_saved_where_it_is(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    plan, link = tmp_path / "real" / "plan.gpkg", tmp_path / "link.gpkg"
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    run(tmp_path / "parcel.gpkg", "--spacing", "5", "-o", plan)
+    link.symlink_to(plan)
+    run(link, "--spacing", "8", "-o", link)
+    assert link.is_symlink()
+    assert read_plan(plan).tracks.spacing_m == 8.0
+    # Whoever saves it, as the review page does.
+    save_plan(replace(read_plan(plan), tracks=None), link, read_from=link)
+    assert link.is_symlink()
+    assert read_plan(plan).tracks is None
+    assert [each.name for each in tmp_path.glob("link*")] == ["link.gpkg"]

@@ -14,13 +14,19 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class NamedPath(click.Path):
-    """A path; no name at all, as of a variable that is not set, is not the working folder."""
+    """A path; no name at all, as of a variable that is not set, is not the working folder.
+
+    A link to a GeoPackage is what it leads to: there the plan is saved, with its log and products.
+    """
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The path."""
         if value == "":
             self.fail("it is empty: give a name.", param, ctx)
-        return super().convert(value, param, ctx)
+        path = super().convert(value, param, ctx)
+        if isinstance(path, Path) and path.suffix.lower() == ".gpkg" and path.is_symlink():
+            return path.resolve()
+        return path
 
 
 PATH = NamedPath(path_type=Path)
