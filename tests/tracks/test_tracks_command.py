@@ -18,7 +18,7 @@ from click.testing import CliRunner
 
 from geofield import schema
 from geofield.cli.main import cli
-from geofield.errors import GeofieldError, TrackError, TrackWarning
+from geofield.errors import FormatWarning, GeofieldError, TrackError, TrackWarning
 from geofield.farm import read_farm
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -356,3 +356,35 @@ def test_a_plan_behind_a_link_is_saved_where_it_is(tmp_path: Path) -> None:
     assert link.is_symlink()
     assert read_plan(plan).tracks is None
     assert [each.name for each in tmp_path.glob("link*")] == ["link.gpkg"]
+
+
+def test_what_a_person_keeps_in_a_plan_comes_along_or_is_refused(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.gpkg"
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    run(tmp_path / "parcel.gpkg", "--spacing", "8", "-o", plan)
+    outlines(1).set_geometry(outlines(1).boundary).to_file(plan, layer="route")
+    with closing(sqlite3.connect(plan)) as file, file:
+        file.execute("CREATE TABLE visits (id INTEGER PRIMARY KEY, memo TEXT)")
+        file.execute("INSERT INTO visits VALUES (7, 'wet corner')")
+        file.execute("CREATE VIEW wet AS SELECT memo FROM visits")
+        file.execute("INSERT INTO gpkg_metadata VALUES (2, 'dataset', 'qgis', 'text/xml', '<a/>')")
+        file.execute(
+            "INSERT INTO gpkg_metadata_reference "
+            "VALUES ('table', 'obstacles', NULL, NULL, '2026-01-01T00:00:00.000Z', 2, NULL)"
+        )
+    for spacing in ("6", "5"):
+        with pytest.warns(FormatWarning, match="'route' is not geofield's"):
+            run(plan, "--spacing", spacing, "-o", plan)
+    with closing(sqlite3.connect(plan)) as file:
+        assert file.execute("SELECT * FROM visits").fetchall() == [(7, "wet corner")]
+        assert file.execute("SELECT * FROM wet").fetchall() == [("wet corner",)]
+        noted = "SELECT table_name, metadata FROM gpkg_metadata_reference JOIN gpkg_metadata "
+        noted += "ON md_file_id = id WHERE table_name IS NOT NULL"
+        assert file.execute(noted).fetchall() == [("obstacles", "<a/>")]
+    assert gpd.read_file(plan, layer="route")["name"].tolist() == ["Field 1"]
+    # Where the plan has such a layer itself, nothing is lost either.
+    before = plan.read_bytes()
+    with pytest.warns(FormatWarning, match="'route' is not geofield's"):
+        done = CliRunner().invoke(cli, ["tracks", str(plan), "--route", "skip", "-o", str(plan)])
+    assert "route cannot be taken along from the plan.gpkg that is there" in str(done.exception)
+    assert plan.read_bytes() == before

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import sqlite3
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
 from geofield import schema
-from geofield.errors import FormatWarning
+from geofield.errors import FormatError, FormatWarning
+from geofield.formats import origin
+from geofield.formats.gpkg_read import own_layers
 from geofield.formats.qgis import is_as_written, is_project_as_written
 
-_OURS = {layer.name for layer in schema.LAYERS} | {"layer_styles"}
+#: Of QGIS: their rows are brought one by one.
+_OF_QGIS = {"layer_styles", "qgis_projects"}
 #: Tables of the standard and of GDAL in which a layer has rows, and the column of its name.
 _REGISTERS = {
     "gpkg_contents": "table_name",
@@ -31,45 +34,59 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
     """Copy what is not geofield's from an earlier plan's file into the new one.
 
     Layers with features or attributes alone come with their reference system, index and triggers;
-    styles and projects where the new file has none of the name, or a person saved theirs over
-    geofield's. A style that a person made the default of a layer stays so. Files that are no plan
-    bring nothing.
+    plain tables and views as they are; styles and projects where the new file has none of the
+    name, or a person saved theirs over geofield's; metadata of all layers that are there. A style
+    that a person made the default of a layer stays so. Files that are no plan bring nothing.
 
-    Warns
-    -----
-    FormatWarning
-        With the names of layers that cannot come along.
+    Raises
+    ------
+    FormatError
+        With the names of what cannot come along.
     """
     with closing(sqlite3.connect(plan_file, isolation_level=None, uri=True)) as connection:
         connection.execute("PRAGMA synchronous = OFF")
         connection.execute("ATTACH ? AS old", (f"{earlier.absolute().as_uri()}?mode=ro",))
         try:
-            contents = dict(
-                connection.execute("SELECT table_name, data_type FROM old.gpkg_contents")
-            )
-            here = {name for (name,) in connection.execute("SELECT table_name FROM gpkg_contents")}
+            kinds = dict(connection.execute("SELECT table_name, data_type FROM old.gpkg_contents"))
         except sqlite3.DatabaseError:
             return  # not a GeoPackage
-        if schema.FIELD.name not in contents:
+        if schema.FIELD.name not in kinds:
             return
-        left = []
-        for name in sorted(contents.keys() - _OURS - here):
-            connection.execute("BEGIN")
-            try:
-                _bring_layer(connection, name, contents[name])
-                connection.execute("COMMIT")
-            except sqlite3.DatabaseError:
-                connection.execute("ROLLBACK")
-                left.append(name)
+        ours = own_layers(connection, "old") | _OF_QGIS
+        left = _bring_tables(connection, kinds, ours)
         _bring_styles(connection)
         _bring_projects(connection)
+        _bring_metadata(connection)
     if left:
-        warnings.warn(
-            f"{plan_file.name}: {', '.join(left)} could not be taken along from the file before. "
-            f"{earlier.name} still has it.",
-            FormatWarning,
-            stacklevel=2,
+        raise FormatError(
+            f"{', '.join(left)} cannot be taken along from the {plan_file.name} that is there: "
+            "nothing was written.",
+            hint="Export it into a file of its own (or give it another name, where the plan has a "
+            "layer of that name now), delete it there, and repeat.",
         )
+
+
+def _bring_tables(
+    connection: sqlite3.Connection, kinds: Mapping[str, str], ours: set[str]
+) -> list[str]:
+    """All layers, tables and views but ours; the names of those that cannot come."""
+    plain = connection.execute(
+        "SELECT name FROM old.sqlite_master WHERE type IN ('table', 'view') "
+        "AND name NOT IN (SELECT name FROM main.sqlite_master) "
+        "AND NOT (name GLOB 'gpkg_*' OR name GLOB 'rtree_*' OR name GLOB 'sqlite_*')"
+    ).fetchall()
+    left = []
+    for name in sorted({*kinds, *(name for (name,) in plain)} - ours):
+        if name not in kinds and _has(connection, "main", name):
+            continue  # came with another one, as what a text index keeps
+        connection.execute("BEGIN")
+        try:
+            _bring_layer(connection, name, kinds.get(name, "attributes"))
+            connection.execute("COMMIT")
+        except sqlite3.DatabaseError:
+            connection.execute("ROLLBACK")
+            left.append(name)
+    return left
 
 
 def keep_project(there: Path, new: Path) -> None:
@@ -166,6 +183,40 @@ def _bring_projects(connection: sqlite3.Connection) -> None:
             connection.execute("DELETE FROM main.qgis_projects WHERE name = ?", (name,))
     new = "(SELECT name FROM main.qgis_projects)"
     _fill(connection, "qgis_projects", f"WHERE name NOT IN {new}")
+
+
+def _bring_metadata(connection: sqlite3.Connection) -> None:
+    """What a person noted of the file, or of layers that are there, under new numbers."""
+    if not _has(connection, "old", "gpkg_metadata_reference"):
+        return
+    numbers: dict[int, int] = {}
+    for number, *row in connection.execute(
+        "SELECT id, md_scope, md_standard_uri, mime_type, metadata FROM old.gpkg_metadata AS told "
+        # GDAL puts all other rows into one of its own, when it writes.
+        "WHERE md_standard_uri <> ? AND metadata NOT LIKE '%\"GPKG_METADATA_ITEM_%' "
+        "AND EXISTS (SELECT 1 FROM old.gpkg_metadata_reference "
+        "WHERE md_file_id = told.id AND (table_name IS NULL OR table_name IN "
+        "(SELECT table_name FROM main.gpkg_contents))) ORDER BY id",
+        (origin.URI,),
+    ).fetchall():
+        numbers[number] = (
+            connection.execute(
+                "INSERT INTO main.gpkg_metadata (md_scope, md_standard_uri, mime_type, metadata) "
+                "VALUES (?, ?, ?, ?)",
+                row,
+            ).lastrowid
+            or 0
+        )
+    for *row, number, parent in connection.execute(
+        "SELECT reference_scope, table_name, column_name, row_id_value, timestamp, md_file_id, "
+        "md_parent_id FROM old.gpkg_metadata_reference WHERE table_name IS NULL OR table_name IN "
+        "(SELECT table_name FROM main.gpkg_contents)"
+    ).fetchall():
+        if number in numbers:
+            connection.execute(
+                "INSERT INTO main.gpkg_metadata_reference VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (*row, numbers[number], numbers.get(parent)),
+            )
 
 
 def _is_own_project(content: bytes | str | None) -> bool:

@@ -45,7 +45,9 @@ def read(path: Path) -> Dataset:
         return read_foreign([RawLayer(name, read_vector(path, name)) for name in layers], path)
     tables: dict[str, gpd.GeoDataFrame] = {}
     crs = record.crs
-    known = {layer.name: layer for layer in schema.LAYERS}
+    with opened(path) as connection:
+        own = own_layers(connection)
+    known = {layer.name: layer for layer in schema.LAYERS if layer.name in own}
     for name in layers:
         if name in known and name != schema.TRACK_POINTS.name:
             tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
@@ -172,6 +174,28 @@ def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     if not (shapely.get_num_geometries(frame.geometry.to_numpy()) > 1).any():
         return frame
     return frame.explode(index_parts=False, ignore_index=True)
+
+
+def own_layers(connection: sqlite3.Connection, of: str = "main") -> set[str]:
+    """The names of layers that are a plan's in its file, or a farm's.
+
+    What not every plan has is so only where geofield described its columns: a person may keep
+    a layer of that name. In a copy without geofield's record all are.
+    """
+    try:
+        described = connection.execute(
+            f"SELECT table_name, column_name FROM {of}.gpkg_data_columns WHERE EXISTS "  # noqa: S608
+            f"(SELECT 1 FROM {of}.gpkg_metadata WHERE md_standard_uri = ?)",
+            (origin.URI,),
+        ).fetchall()
+    except sqlite3.OperationalError:
+        described = []
+    return {
+        layer.name
+        for layer in (*schema.LAYERS, schema.PLACES)
+        if not (layer.optional and described)
+        or any((layer.name, name) in described for name in layer.column_names)
+    }
 
 
 def is_own(path: Path) -> bool:
