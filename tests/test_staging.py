@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
@@ -189,6 +190,23 @@ def test_links_in_the_output_folder_lead_nowhere(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="leads out of"):
         through_the_link()
     assert (outside / "precious").read_text() == "mine"
+
+
+def test_a_file_that_cannot_be_read_is_told_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture = tmp_path / "scene.tif"
+    picture.touch()
+    # Root may read all files.
+    monkeypatch.setattr(os, "access", lambda _, mode: mode != os.R_OK)
+
+    def read() -> None:
+        with staged_folder(tmp_path, overwrite=True):
+            raise PermissionError(errno.EACCES, "Permission denied", str(picture))
+
+    with pytest.raises(FormatError, match=r"/scene\.tif cannot be read") as told:
+        read()
+    assert told.value.hint == "Give yourself the right to read it, then repeat."
 
 
 @pytest.fixture(scope="module")

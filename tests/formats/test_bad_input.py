@@ -307,3 +307,11 @@ def test_a_strangers_plan_names_no_picture_elsewhere(dataset, tmp_path):
             connection.execute("UPDATE gpkg_metadata SET metadata = ?", (said,))
         connection.close()
         assert read_dataset(path).scene_path is None
+
+
+def test_a_picture_that_cannot_be_read_is_named_with_what_to_do(dataset, tmp_path):
+    picture = tmp_path / "scene.tif"
+    picture.write_bytes(b"no picture")
+    with pytest.raises(FormatError, match=r"The picture .*scene\.tif of the plan cannot") as told:
+        write_dataset(dataclasses.replace(dataset, scene_path=picture), tmp_path, ["gpkg"])
+    assert told.value.hint.startswith("Put a whole one there")

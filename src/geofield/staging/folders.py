@@ -55,11 +55,16 @@ def written_ns(file: Path, facts: os.stat_result | None = None) -> int:
 
 
 def cannot_write(target: Path, error: OSError) -> FormatError:
-    """Why a folder takes no products, in words."""
-    place = error.filename or target
+    """Why a folder takes no products, in words; or that a file which is read for them cannot be."""
+    place = Path(os.fsdecode(error.filename or target))
     if error.errno == errno.ENOSPC:
         return FormatError(f"The disk is full: {place}.", hint="Free some space, then repeat.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        if place.is_file() and not os.access(place, os.R_OK):
+            return FormatError(
+                f"{place} cannot be read ({error.strerror}).",
+                hint="Give yourself the right to read it, then repeat.",
+            )
         return FormatError(
             f"{target} cannot be written ({error.strerror}).",
             hint="Choose a folder you may write to.",

@@ -12,6 +12,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import authority_name
+from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.qgis.layer_style import look_of, style_attributes, style_elements
 from geofield.formats.qgis.looks import ORDER
@@ -203,14 +204,21 @@ def _colour_bands(path: Path) -> tuple[int, ...]:
         return (1, 2, 3)
     import rasterio
     from rasterio.enums import ColorInterp
+    from rasterio.errors import RasterioIOError
 
-    # Only what holds its pixels itself: the file may be a stranger's.
-    with rasterio.open(path, driver="GTiff") as picture:
-        roles = list(picture.colorinterp)
-        wanted = (ColorInterp.red, ColorInterp.green, ColorInterp.blue)
-        if all(role in roles for role in wanted):
-            return tuple(roles.index(role) + 1 for role in wanted)
-        return (1, 2, 3) if picture.count >= 3 else (1,)
+    try:
+        # Only what holds its pixels itself: the file may be a stranger's.
+        with rasterio.open(path, driver="GTiff") as picture:
+            roles, count = list(picture.colorinterp), picture.count
+    except RasterioIOError as error:
+        raise FormatError(
+            f"The picture {path} of the plan cannot be read: {str(error).rstrip('.')}.",
+            hint="Put a whole one there that you may read, or take it away, then repeat.",
+        ) from None
+    wanted = (ColorInterp.red, ColorInterp.green, ColorInterp.blue)
+    if all(role in roles for role in wanted):
+        return tuple(roles.index(role) + 1 for role in wanted)
+    return (1, 2, 3) if count >= 3 else (1,)
 
 
 def _first_view(dataset: Dataset) -> dict[str, str]:
