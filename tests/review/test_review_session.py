@@ -113,6 +113,11 @@ def test_tracks_turn_with_a_dragged_line(plan: Plan) -> None:
     ("command", "words"),
     [
         ({"do": "dance"}, "no edit"),
+        ({"do": "outline", "rings": [[[0, 0], [90, 0], [90, 90]]]}, "outside the picture"),
+        (
+            {"do": "outline", "rings": [[[553430, 3881500], [553530, 3881500], [553530, 3881600]]]},
+            "outside the picture",
+        ),
         ({"do": "status", "no": 999, "status": "rejected"}, "no obstacle 999"),
         ({"do": "status", "no": 8, "status": "maybe"}, "no status"),
         ({"do": "status", "status": "rejected"}, "needs a value"),

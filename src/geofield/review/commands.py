@@ -125,7 +125,12 @@ def delete(plan: Plan, command: Command) -> Plan:
 
 def set_outline(plan: Plan, command: Command) -> Plan:
     """The outline as a person drew it: ``rings``, the outer one first."""
-    return replace(plan, field=replace(plan.field, polygon=_polygon(command["rings"], "outline")))
+    field = replace(plan.field, polygon=_polygon(command["rings"], "outline"))
+    if plan.grid is not None:
+        frame = Polygon(plan.grid.corners_lonlat())
+        if not frame.intersects(field.polygon_lonlat):  # a part may be beyond its edge
+            raise EditError("The outline lies outside the picture.", hint="Draw on the picture.")
+    return replace(plan, field=field)
 
 
 def choose(plan: Plan, command: Command) -> Plan:
