@@ -12,15 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from click.testing import CliRunner
 
+from geofield.cli.main import cli
+from geofield.cli.review import end_session
 from geofield.errors import ChangedError, GeofieldError
 from geofield.formats import read_dataset
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
+from geofield.plan_files import save_plan
 from geofield.review import Session, apply_command
 from geofield.review.desk import Desk
-from geofield.review.journal import journal_path
+from geofield.review.plans import journal_path
 from geofield.review.session import planned
+from geofield.review.shelf import Shelf
 from geofield.settings import with_values
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -190,17 +195,90 @@ def test_edits_come_back_after_a_kill(plan_path: Path) -> None:
     assert row(saved, 8)["status"] == "confirmed"
 
 
-def test_edits_of_another_version_of_the_file_are_kept_aside(plan_path: Path) -> None:
+def test_edits_are_made_again_on_another_version_where_they_fit(plan_path: Path) -> None:
+    """They were put aside in a file that no command read."""
+    desk = Desk(plan_path)
+    x, y = desk.session.plan.field.polygon.representative_point().coords[0]
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.edit({"do": "circle", "x": x, "y": y, "radius_m": 2.0})
+    drawn = max(each["no"] for each in desk.opening()["obstacles"])
+    desk.edit({"do": "radius", "no": drawn, "radius_m": 3.0})
+    desk.edit({"do": "status", "no": 4, "status": "confirmed"})
+    desk.edit({"do": "status", "no": 5, "status": "rejected"})
+    desk.edit({"do": "undo"})
+    # Killed here; then somebody else rejects one of these, and draws one that takes the number.
+    other = apply_command(read_plan(plan_path), {"do": "status", "no": 4, "status": "rejected"})
+    other = apply_command(other, {"do": "circle", "x": x + 20, "y": y, "radius_m": 1.0})
+    save_plan(planned(other, None).plan, plan_path, read_from=plan_path)
+    again = Desk(plan_path)
+    told = str(again.brought_back)
+    assert "3 of its 4 edits were made again" in told
+    assert "Make these by hand: status: obstacle 4 is not there as it was. All are kept in" in told
+    assert plan_path.with_name("field.gpkg.review.jsonl.1").read_text().count("\n") == 7
+    plan = again.session.plan
+    assert [row(plan, no)["status"] for no in (3, 4, 5)] == ["rejected", "rejected", "detected"]
+    assert [row(plan, no)["radius_m"] for no in (drawn, drawn + 1)] == [1.0, 3.0]
+    # They are noted anew.
+    assert str(Desk(plan_path).brought_back).startswith("3 edits")
+
+
+def test_the_same_plan_in_other_bytes_has_its_edits(plan_path: Path) -> None:
+    Desk(plan_path).edit({"do": "status", "no": 3, "status": "rejected"})
+    before = plan_path.read_bytes()
+    with closing(sqlite3.connect(plan_path)) as file:  # as QGIS may
+        file.execute("PRAGMA journal_mode=wal")
+        file.execute("SELECT count(*) FROM obstacles")
+    assert plan_path.read_bytes() != before
+    assert str(Desk(plan_path).brought_back).startswith("1 edits")
+
+
+@pytest.mark.parametrize(("line", "left"), [(0, 0), (1, 0), (3, 2)])
+def test_a_damaged_line_takes_no_other_along(plan_path: Path, line: int, left: int) -> None:
+    """One damaged line deleted the notes of four edits without a word."""
+    desk, numbers = Desk(plan_path), (3, 4, 5, 6)
+    for number in numbers:
+        desk.edit({"do": "status", "no": number, "status": "rejected"})
+    notes = journal_path(plan_path)
+    lines = notes.read_bytes().splitlines(keepends=True)
+    lines[line] = lines[line][1:]
+    notes.write_bytes(b"".join(lines))
+    again = Desk(plan_path)
+    assert "damaged" in str(again.brought_back)
+    assert "field.gpkg.review.jsonl.1" in str(again.brought_back)
+    assert plan_path.with_name("field.gpkg.review.jsonl.1").read_bytes() == b"".join(lines)
+    statuses = [row(again.session.plan, number)["status"] for number in numbers]
+    assert statuses == ["rejected"] * left + ["detected"] * (4 - left)
+    assert str(Desk(plan_path).brought_back).startswith(f"{left} edits" if left else "None")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("tracks", "{}", "-o", "{}"), ("export", "{}", "-f", "kml", "--out", "{}.kml"),
+     ("refresh", "{}")],
+)  # fmt: skip
+def test_commands_tell_of_edits_that_were_not_saved(plan_path: Path, words: list[str]) -> None:
     desk = Desk(plan_path)
     desk.edit({"do": "status", "no": 3, "status": "rejected"})
-    lines = journal_path(plan_path).read_text().splitlines()
-    journal_path(plan_path).write_text(
-        "\n".join([json.dumps({"sha256": "another"}), *lines[1:]]) + "\n"
-    )
-    again = Desk(plan_path)
-    assert "kept in field.gpkg.review.jsonl.1" in str(again.brought_back)
-    assert '"no": 3' in plan_path.with_name("field.gpkg.review.jsonl.1").read_text()
-    assert row(again.session.plan, 3)["status"] == "detected"
+    line = [word.format(plan_path) for word in words]
+    told = " ".join(CliRunner().invoke(cli, line).output.split())
+    assert f"Bring them back: geofield review {plan_path}" in told
+    journal_path(plan_path).unlink()
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.save()
+    assert "not saved" not in CliRunner().invoke(cli, line).output
+
+
+def test_a_session_that_loses_edits_does_not_end_well(plan_path: Path) -> None:
+    first, second, third = Desk(plan_path), Shelf(plan_path), Shelf(plan_path)
+    first.edit({"do": "status", "no": 3, "status": "rejected"})
+    second.desk.edit({"do": "status", "no": 9, "status": "rejected"})
+    with pytest.raises(GeofieldError, match="are lost"):
+        end_session(second, plan_path)
+    third.desk.edit({"do": "status", "no": 9, "status": "rejected"})
+    third.desk.save("mine")
+    assert third.end() == [f"Edits of {plan_path} were saved as mine.gpkg."]
+    assert not third.lost
 
 
 def test_a_file_that_another_program_changed_is_not_overwritten(plan_path: Path) -> None:

@@ -10,7 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.farm import say_waiting
-from geofield.cli.files import FOLDER, PATH, claim_folder
+from geofield.cli.files import FOLDER, PATH, claim_folder, tell_unsaved
 
 
 @click.command(
@@ -92,6 +92,7 @@ def export(
             say_waiting(plan_file)
             datasets += [plan.to_dataset() for plan in read_farm(plan_file)]
             continue
+        tell_unsaved(plan_file.parent, (plan_file.name,))
         dataset = read_dataset(plan_file, crs=crs)
         for note in dataset.notes:
             say(note)

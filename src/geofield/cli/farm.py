@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say, say_note
-from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option
+from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
 from geofield.wording import nearest
 
 
@@ -96,6 +96,7 @@ def put(plan_file: Path, folder: str) -> None:
     place = store.folder
     if place is not None and place.is_dir():
         claim_folder(place)
+    tell_unsaved(plan_file.parent, (plan_file.name,))
     ids: list[str] = []
     if place is not None:
         # Edits in the overview first: it is written anew below.

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
+from geofield.cli.console import say_note
 from geofield.staging import claimed
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -52,6 +53,23 @@ def claim_folder(folder: Path, names: Collection[str] | None = None) -> None:
         Another geofield works there.
     """
     click.get_current_context().with_resource(claimed(folder, names))
+    tell_unsaved(folder, names)
+
+
+def tell_unsaved(folder: Path, names: Collection[str] | None = None) -> None:
+    """Tell of edits of the review page that were not saved: what a command makes has them not."""
+    from geofield.review.plans import REVIEWING, SUFFIX, unsaved_in
+
+    told: set[Path] = click.get_current_context().meta.setdefault(__name__, set())
+    for notes in set(unsaved_in(folder)) - told:
+        plan = notes.with_name(notes.name.removesuffix(SUFFIX))
+        if names is None or plan.name in names:
+            told.add(notes)
+            place = folder if notes.parent.name == REVIEWING else plan
+            say_note(
+                f"{notes} holds edits of the review page that were not saved, and that are not in "
+                f"what is made now. Bring them back: geofield review {place}"
+            )
 
 
 def claim_file(output: Path) -> None:

@@ -81,10 +81,22 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
         say("Ended.")
     finally:
         server.server_close()
+    end_session(shelf, plan_file)
+
+
+def end_session(shelf: Shelf, plan_file: Path) -> None:
+    """Tell where edits are that were not saved; refuse to call it well where they are lost."""
+    from geofield.errors import GeofieldError
+
     for words in shelf.end():
         say(words)
     if plan_file.is_file():
         say_outdated(plan_file)
+    if shelf.lost:
+        raise GeofieldError(
+            "Edits of this session are lost: neither saved, nor noted on the disk.",
+            hint="Make room, or close the other review of this plan, and make them again.",
+        )
 
 
 def _shelf(plan_file: Path, picture: Path | None) -> Shelf:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, say, say_note
-from geofield.cli.files import OLD_PATH, PATH, claim_file, claim_folder, output_option
+from geofield.cli.files import (
+    OLD_PATH,
+    PATH,
+    claim_file,
+    claim_folder,
+    output_option,
+    tell_unsaved,
+)
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
     continued,
@@ -92,6 +99,7 @@ def tracks(
     from geofield.farm.work import Job
 
     (claim_file if output.suffix else claim_folder)(output)
+    tell_unsaved(file.parent, (file.name,))
     plan = _own_plan(file)
     if plan is not None and not defaults:
         settings = continued(settings, plan.settings, "tracks")

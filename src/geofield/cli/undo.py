@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say
-from geofield.cli.files import plan_argument
+from geofield.cli.files import plan_argument, tell_unsaved
 
 
 @click.command(
@@ -27,6 +27,7 @@ def undo(plan_file: Path) -> None:
     """
     from geofield.staging.generations import earlier_of, undo
 
+    tell_unsaved(plan_file.parent, (plan_file.name,))
     undo(plan_file)
     from geofield.cli.refresh import say_outdated
 

@@ -21,7 +21,8 @@ from geofield.plan import Plan, read_plan
 from geofield.review.commands import Command
 from geofield.review.ground import Ground
 from geofield.review.journal import Journal, fingerprint, play
-from geofield.review.session import Session
+from geofield.review.refit import noted
+from geofield.review.session import Session, Step
 from geofield.review.shown import state_of, tracks_of
 from geofield.settings import DirectionName, Settings
 from geofield.staging import refuse_locked
@@ -50,7 +51,7 @@ class Desk:
             if self._picture_path is None
             else TiledPicture.open(self._picture_path, plan.field.crs)
         )
-        journal = Journal(self.path)
+        journal = Journal(self.path, plan)
         if journal.begins_at != self.path:
             plan = read_plan(journal.begins_at)
         ground = None if self._picture_path is None else Ground(self._scene_of)
@@ -65,6 +66,10 @@ class Desk:
         #: Tells this reading of file and picture from every other one.
         self.reading = secrets.token_hex(4)
         self._edits = 0
+        #: The state that was written under another name, and that name.
+        self._elsewhere: tuple[Step, str] | None = None
+        #: Whether edits were neither saved nor noted when the session ended.
+        self.lost = False
 
     def _read_plan(self) -> tuple[str, Plan]:
         """The version of the file, and the plan in it.
@@ -110,7 +115,7 @@ class Desk:
             play(self.session, command)
             if self.session.step is not before:
                 self._edits += 1
-                self.journal.write(command)
+                self.journal.write(noted(before.plan, command))
             return self._state()
 
     def preview(self, command: Command) -> dict[str, Any]:
@@ -136,11 +141,12 @@ class Desk:
                 place = self._beside(target)
                 with _in_words(place):
                     save_plan(step.plan, place, picture=self._picture_path)
+                self._elsewhere = step, place.name
                 return {**self._state(), "saved_as": place.name}
             if self._fingerprint() != self.seen:
                 raise ChangedError(
                     f"Another program changed {self.path.name} since it was opened here.",
-                    hint="Reload it (edits made here are kept in a file beside it), or save your "
+                    hint="Reload it (edits made here are made again where they fit), or save your "
                     "edits under another name.",
                 )
             refuse_locked(self.path)
@@ -191,6 +197,9 @@ class Desk:
             return None
         self.journal.flush()
         if self.journal.refused:
+            if self._elsewhere is not None and self._elsewhere[0] is self.session.step:
+                return f"Edits of {self.path} were saved as {self._elsewhere[1]}."
+            self.lost = True
             return f"Edits of {self.path} are lost: {self.journal.refused}."
         return f"Edits that were not saved lie in {self.journal.path}; the next session has them."
 

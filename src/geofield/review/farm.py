@@ -23,10 +23,9 @@ from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.review.desk import Desk
-from geofield.review.journal import journal_path
+from geofield.review.plans import REVIEWING, journal_path
 from geofield.staging import claimed
 
-_PLACE = "reviewing"
 #: Fields up to which a farm's overview is written anew (seconds) whenever one is saved; that of a
 #: larger farm when the session ends.
 _AT_ONCE = 1000
@@ -61,7 +60,7 @@ class FarmDesk(Desk):
                 raise ChangedError(
                     f"Another program changed {self._field_id} in the farm since it was opened "
                     "here.",
-                    hint="Reload it (edits made here are kept in a file beside it), or save your "
+                    hint="Reload it (edits made here are made again where they fit), or save your "
                     "edits under another name.",
                 )
             with tempfile.TemporaryDirectory(prefix="geofield-") as name:
@@ -138,7 +137,7 @@ def farm_desks(folder: Path, picture: Path | None) -> list[tuple[str, Callable[[
 
 
 def _file_of(folder: Path, field_id: str) -> Path:
-    return folder / _PLACE / name_of(field_id)
+    return folder / REVIEWING / name_of(field_id)
 
 
 def _title(row: Any) -> str:

@@ -1,6 +1,6 @@
 """The journal: every edit is on the disk before the page hears of it.
 
-A text file beside the plan, a JSON value per line: first which file it belongs to, then what was
+A text file beside the plan, a JSON value per line: first which plan it belongs to, then what was
 done, and when that was saved. When the program is killed, the next session does the same again. A
 session that saved can still undo what came before: the plan as it was opened is kept until the end.
 """
@@ -16,16 +16,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import shapely
+
 from geofield.errors import GeofieldError
+from geofield.plan import Plan, read_plan
+from geofield.review.plans import journal_path
+from geofield.review.refit import refit
 from geofield.review.session import Session
 from geofield.staging import log_of
-
-SUFFIX = ".review.jsonl"
-
-
-def journal_path(plan_path: Path) -> Path:
-    """Where the edits of a plan are kept until the session ends with all saved."""
-    return plan_path.with_name(plan_path.name + SUFFIX)
 
 
 def fingerprint(plan_path: Path) -> str:
@@ -36,10 +34,23 @@ def fingerprint(plan_path: Path) -> str:
     return version.hexdigest()
 
 
-class Journal:
-    """The edits of one session on a plan's GeoPackage, on the disk."""
+def content_of(plan: Plan) -> str:
+    """What tells a plan from every other one, however its file is written."""
+    dataset = plan.to_dataset()
+    provenance = dataset.provenance
+    facts = [dataset.crs.srs, provenance.settings, provenance.evidence]
+    digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
+    for name, table in sorted(dataset.tables.items()):
+        digest.update(name.encode())
+        digest.update(b"".join(shapely.to_wkb(table.geometry.to_numpy())))
+        digest.update(table.drop(columns=table.geometry.name).to_csv(index=False).encode())
+    return digest.hexdigest()
 
-    def __init__(self, plan_path: Path) -> None:
+
+class Journal:
+    """The edits of one session on a plan's GeoPackage, on the disk; `plan` is what that holds."""
+
+    def __init__(self, plan_path: Path, plan: Plan) -> None:
         self.plan_path = plan_path
         self.path = journal_path(plan_path)
         #: The plan as it was when the journal began; there only where that was saved over.
@@ -48,8 +59,11 @@ class Journal:
         #: The whole lines of the file as this session left it, and what it does not count.
         self._kept, self._rest = b"", b""
         self._waiting: list[Mapping[str, Any]] = []
-        self._plan = fingerprint(plan_path)
+        self._plan = content_of(plan)
         self._lost: str | None = None
+        #: What was noted on another version of the plan, and what stands behind a damaged line.
+        self._elsewhere: list[dict[str, Any]] = []
+        self._damaged: Path | None = None
         self._entries = self._read()
 
     @property
@@ -65,6 +79,8 @@ class Journal:
         is told in words.
         """
         told, self._lost = self._lost, None
+        if self._elsewhere:
+            return self._refit(session)
         whole = self._kept + self._rest
         unsaved = done = 0
         begin = self._entries[0][1] if self._entries else 0
@@ -82,6 +98,11 @@ class Journal:
                 return f"{done} edits were brought back; then: {error} All are in {kept.name}."
             begin = end
             done, unsaved = done + 1, unsaved + 1
+        if self._damaged is not None:
+            return (
+                f"{done} edits were brought back; the line of the notes after them is damaged. All "
+                f"are in {self._damaged.name}, where what follows can be read."
+            )
         if unsaved:
             return f"{unsaved} edits of a session that ended without saving were brought back."
         return told
@@ -92,7 +113,7 @@ class Journal:
         What the disk does not take waits for the next time, and :attr:`refused` says why.
         """
         if not self._kept and not self._waiting:
-            self._waiting = [{"sha256": self._plan}]
+            self._waiting = [{"plan": self._plan}]
         self._waiting.append(dict(entry))
         self.flush()
 
@@ -125,7 +146,7 @@ class Journal:
 
     def saved(self) -> None:
         """The edits so far lie in the plan now."""
-        self._plan = fingerprint(self.plan_path)
+        self._plan = content_of(read_plan(self.plan_path))
         if self._kept or self._waiting:
             self.write({"saved": self._plan})
 
@@ -168,21 +189,42 @@ class Journal:
             size += len(line)
             entries.append((entry, size))
         self._kept, self._rest = there[:size], there[size:]
-        if not entries or "saved" in entries[-1][0]:
+        if b"\n" in self._rest:  # only a last line may be cut off by a kill
+            self._damaged = self._copy()
+            self.path.write_bytes(self._kept)
+            self._rest = b""
+        if len(entries) < 2 or "saved" in entries[-1][0]:
             self._remove()
+            if self._damaged is not None:
+                self._lost = (
+                    "The notes of an earlier session are damaged, and its edits were not made "
+                    f"again; they are kept in {self._damaged.name}, where they can be read."
+                )
             return []
-        first = entries[0][0].get("sha256")
+        first = entries[0][0].get("plan")
         marks = [entry["saved"] for entry, _ in entries if "saved" in entry]
-        whole = not marks or (self.opened.exists() and fingerprint(self.opened) == first)
+        whole = not marks or (self.opened.exists() and content_of(read_plan(self.opened)) == first)
         if whole and [first, *marks][-1] == self._plan:
             return entries
-        kept = self._copy()
-        self._remove()
-        self._lost = (
-            "Edits of an earlier session belong to another version of this file and were "
-            f"not made again; they are kept in {kept.name}."
-        )
+        self._elsewhere = [entry for entry, _ in entries[1:]]
         return []
+
+    def _refit(self, session: Session) -> str:
+        """Make edits again that were noted on another version of the plan, where they fit."""
+        kept = self._damaged or self._copy()
+        self._remove()
+        made, lost = refit(session, self._elsewhere)
+        for entry in made:
+            self.write(entry)
+        words = (
+            f"The plan was changed since an earlier session ended without saving: {len(made)} of "
+            f"its {len(made) + len(lost)} edits were made again."
+        )
+        if not lost and self._damaged is None and self.refused is None:
+            kept.unlink()
+            return words
+        by_hand = f" Make these by hand: {'; '.join(lost)}." if lost else ""
+        return f"{words}{by_hand} All are kept in {kept.name}."
 
     def _copy(self) -> Path:
         number = 1

@@ -57,6 +57,11 @@ class Shelf:
         ended = [desk.end() for desk in self._desks.values()]
         return [words for words in ended if words is not None]
 
+    @property
+    def lost(self) -> bool:
+        """Whether edits were neither saved nor noted when the session ended."""
+        return any(desk.lost for desk in self._desks.values())
+
     def take(self, tab: str, *, force: bool = False) -> bool:
         """Whether a tab of the browser may edit: the first one, or one that takes over."""
         with self._lock:

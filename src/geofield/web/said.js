@@ -47,6 +47,7 @@ export const SAID = {
     [/^Save your edits under another name, or put the file back\.$/, "Speichern Sie unter anderem Namen (siehe Mehr) oder legen Sie die Datei zurück."],
     [/^Field or obstacles were edited after the tracks had been planned;.*$/, "Feld oder Hindernisse wurden geändert, nachdem die Spuren geplant waren; hier sind die Spuren neu geplant. Speichern Sie sie."],
     [/^Go on there, or take over here\.$/, "Machen Sie dort weiter, oder übernehmen Sie hier."],
+    [/^The plan was changed since an earlier session .*: (\d+) of its (\d+) edits were made again\..*$/, "Der Plan wurde geändert, seit eine Sitzung ohne Speichern endete: $1 ihrer $2 Änderungen sind wieder da; die übrigen liegen in einer Datei daneben."],
     [/^The outline lies outside the picture\.$/, "Der Umriss liegt außerhalb des Bildes."],
     [/^(\d+) edits of a session that ended without saving were brought back\.$/, "$1 Änderungen einer Sitzung, die ohne Speichern endete, sind wieder da."],
   ],
