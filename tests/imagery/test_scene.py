@@ -216,6 +216,20 @@ def test_grey_with_alpha(tmp_path: Path) -> None:
     assert (~scene.valid).sum() == 16
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+def test_the_lowest_value_may_be_white(tmp_path: Path, kind: Any) -> None:
+    bright = ground(bands=1)
+    bright[:, :9] = 0
+    values = (255 - bright).astype(kind)
+    negative = write(tmp_path / "x.tif", values, photometric="MINISWHITE", nodata=255)
+    scene = read_scene(negative)
+    positive = read_scene(write(tmp_path / "y.tif", bright.astype(kind), nodata=0))
+    assert np.array_equal(scene.bands, positive.bands)
+    assert np.array_equal(scene.valid, positive.valid)
+    assert not scene.valid.all()
+    assert any("MINISWHITE" in note for note in scene.notes)
+
+
 def test_palette_becomes_colour(tmp_path: Path) -> None:
     index = (ground(bands=1) // 64).astype(np.uint8)
     path = tmp_path / "p.tif"

@@ -37,6 +37,7 @@ from geofield.model.scene import ImagerySource, Scene, outside
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
+_NEGATIVE = "Its lowest value is white (MINISWHITE): the values were turned round."
 _NOTHING = OpenOptions()
 _FILLED = "The value {:g}, alike in all bands, is taken as no data: the file names none."
 
@@ -72,6 +73,8 @@ class SceneReader:
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
     has_mask: bool = False
+    #: The first band's lowest value is white.
+    negative: bool = False
     #: The scaling that made the file's own bytes.
     scaled_before: tuple[float, float] | None = None
     #: Set where the file is read through a warp: its own CRS, control points or transform.
@@ -125,7 +128,9 @@ class SceneReader:
             own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
-            taken = () if fill is None else (_FILLED.format(fill),)
+            negative = dataset.tags(ns="IMAGE_STRUCTURE").get("MINISWHITE") == "YES"
+            taken = [_NEGATIVE] if negative else []
+            taken += [] if fill is None else [_FILLED.format(fill)]
             return cls(
                 path=path,
                 grid=place.grid,
@@ -138,6 +143,7 @@ class SceneReader:
                 palette=palette,
                 reach=reach,
                 has_mask=has_mask,
+                negative=negative,
                 scaled_before=scaling_from_tags(tags) if dtype == "uint8" else None,
                 warped_from=place.warped_from,
             )
@@ -307,6 +313,9 @@ class SceneReader:
             valid &= ~np.all(values == self.nodata, axis=0)
         if values.dtype.kind == "f":
             valid &= np.all(np.isfinite(values), axis=0)
+        if self.negative and 0 in self.roles.shown:
+            first = values[self.roles.shown.index(0)]
+            first[:] = -first if values.dtype.kind == "f" else ~first
         if self.palette:
             table = np.asarray(self.palette, np.uint8)[values[0]]
             valid &= table[..., 3] >= 128
