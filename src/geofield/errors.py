@@ -126,7 +126,7 @@ class GeofieldWarning(UserWarning):
 
 
 class ImageryWarning(GeofieldWarning):
-    """Imagery is incomplete, or a cache file had to be rebuilt."""
+    """Imagery is incomplete or was guessed at, or a cache file had to be rebuilt."""
 
 
 class FieldWarning(GeofieldWarning):

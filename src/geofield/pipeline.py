@@ -46,7 +46,7 @@ from geofield.model.tracks import Tracks
 from geofield.model.written import Written
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
-from geofield.windows import first_side_m, open_scene, shows_all, wider
+from geofield.windows import first_side_m, open_scene, shows_all, tell_guesses, wider
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
@@ -277,9 +277,11 @@ def _find(
             latest = open_scene(path, lat, lon, wider(settings, size_m))
         return latest
 
-    return grow_field(
+    field, wide = grow_field(
         read, lat=lat, lon=lon, size_m=first_m, largest_m=max(6400.0, first_m), **options
     )
+    tell_guesses(wide, told=scene.guesses)
+    return field, wide
 
 
 def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:

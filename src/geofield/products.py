@@ -175,10 +175,20 @@ def make_report(
         # The rows of the obstacles' record are in the GeoPackage, for geofield alone.
         "evidence": {k: v for k, v in provenance.evidence.items() if k != "written"},
         "source": asdict(provenance.source),
+        "picture": _picture(dataset),
         "settings": dict(provenance.settings),
         "timings_s": {stage: round(seconds, 3) for stage, seconds in timings_s.items()},
         "versions": versions(),
     }
+
+
+def _picture(dataset: Dataset) -> dict[str, list[str]]:
+    """What the bands of the picture show and what was done to it, by its own word."""
+    if dataset.scene_path is None or not dataset.scene_path.is_file():
+        return {}
+    from geofield.imagery import picture_facts
+
+    return picture_facts(dataset.scene_path)
 
 
 def _turns(dataset: Dataset) -> dict[str, float]:

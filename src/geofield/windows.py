@@ -6,6 +6,8 @@ was drawn, and the further points that were clicked: what it does not show is no
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +16,7 @@ import shapely
 from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import PointOutsideError
+from geofield.errors import ImageryWarning, PointOutsideError
 
 if TYPE_CHECKING:
     from geofield.grid import Grid
@@ -34,14 +36,28 @@ def open_scene(
     """Read the picture around a point, degrees (stage 1), with all of an outline where it can.
 
     A picture that shows only a part of the outline, and not the point, is read around that part.
+
+    Warns
+    -----
+    ImageryWarning
+        Of all that had to be guessed about the picture.
     """
     try:
-        return _read(path, lat, lon, settings, outline)
+        scene = _read(path, lat, lon, settings, outline)
     except PointOutsideError:
         shown = None if outline is None else _point_shown(path, outline, settings)
         if shown is None:
             raise
-    return _read(path, *shown, settings, outline)
+        scene = _read(path, *shown, settings, outline)
+    tell_guesses(scene)
+    return scene
+
+
+def tell_guesses(scene: Scene, *, told: Sequence[str] = ()) -> None:
+    """Warn of what had to be guessed about a picture and was not told before."""
+    for guess in scene.guesses:
+        if guess not in told:
+            warnings.warn(guess, ImageryWarning, stacklevel=3)
 
 
 def _read(

@@ -134,6 +134,28 @@ def test_options_of_tiles_with_a_picture_are_told(capsys: pytest.CaptureFixture[
     assert "changes nothing" not in capsys.readouterr().err
 
 
+def test_what_is_guessed_about_a_picture_is_told(
+    simulated_tif: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with rasterio.open(simulated_tif) as file:
+        values, place = file.read(), {"crs": file.crs, "transform": file.transform}
+    write(Path("bare.tif"), values, photometric="MINISBLACK", **place)
+    lon, lat = read_scene("bare.tif").grid.centre_lonlat
+    point = ("--lat", lat, "--lon", lon)
+    guess = "Four unnamed bands are taken as red, green, blue, near infrared"
+    assert run("run", "bare.tif", *point, "--out", "out", "--format", "gpkg") == 0
+    assert capsys.readouterr().err.count(f"Note: {guess}") == 1
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["picture"]["bands"] == ["red", "green", "blue", "nir"]
+    assert [each[: len(guess)] for each in report["picture"]["notes"]] == [guess]
+    assert run("tiles", "bare.tif", *point, "-o", "cut.tif") == 0
+    assert capsys.readouterr().err.count(f"Note: {guess}") == 1
+    # The file that was cut says what its bands are; it remembers how that was known.
+    assert run("field", "cut.tif", *point, "-o", "field.gpkg") == 0
+    assert guess not in capsys.readouterr().err
+    assert guess in read_scene("cut.tif").notes[0]
+
+
 def test_terms_are_refused_until_acknowledged(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

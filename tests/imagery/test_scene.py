@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import re
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,8 @@ def test_real_chips_keep_their_near_infrared(shared: Path) -> None:
     [
         (["Blue", "Green", "Red", "NIR"], 4, ("blue", "green", "red", "nir")),
         (["B02", "B03", "B04", "B08"], 4, ("blue", "green", "red", "nir")),
+        (["B2", "B3", "B4", "B8"], 4, ("blue", "green", "red", "nir")),
+        (["B8", "B4", "B3", "B2", "B8A"], 5, ("nir", "red", "green", "blue")),
         (["Red", "Green", "Blue", "Red edge", "Near infrared"], 5, ("red", "green", "blue", "nir")),
         (None, 1, ("grey",)),
         (None, 3, ("red", "green", "blue")),
@@ -195,6 +198,27 @@ def test_roles_come_from_names_or_number(
         tmp_path / "x.tif", ground(bands=count), descriptions=descriptions, photometric="MINISBLACK"
     )
     assert read_scene(path).roles == roles
+
+
+@pytest.mark.parametrize(
+    ("descriptions", "told"),
+    [
+        (["NIR", "Red", "Green"], r"names \(NIR, Red, Green\) do not tell .* --bands"),
+        (["x1", "x2", "x3", "x4"], r"names \(x1, x2, x3, x4\) do not tell"),
+        (["Band 1", "Band 2", "Band 3"], None),
+        (["Red", "Green", "Blue"], None),
+        (None, None),
+    ],
+)
+def test_names_that_tell_nothing_are_told(
+    tmp_path: Path, descriptions: list[str] | None, told: str | None
+) -> None:
+    values = ground(bands=len(descriptions or "rgb"))
+    scene = read_scene(write(tmp_path / "x.tif", values, descriptions=descriptions))
+    assert scene.roles == ("red", "green", "blue", "nir")[: len(values)]
+    assert bool(scene.guesses) is bool(told)
+    assert told is None or re.search(told, " ".join(scene.guesses))
+    assert set(scene.guesses) <= set(scene.notes)
 
 
 def test_given_roles_win(tmp_path: Path) -> None:

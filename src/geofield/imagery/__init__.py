@@ -13,6 +13,7 @@ from geofield.late import late_names
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
     from geofield.imagery.at_place import picture_at
+    from geofield.imagery.facts import picture_facts
     from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
     from geofield.imagery.place_picture import PlacePicture, is_own_picture
@@ -32,6 +33,7 @@ __all__ = [
     "is_own_picture",
     "open_reader",
     "picture_at",
+    "picture_facts",
     "read_scene",
     "write_scene",
 ]
@@ -41,6 +43,7 @@ __getattr__ = late_names(
     {
         "acquisition": "Acquired Where acquire",
         "at_place": "picture_at",
+        "facts": "picture_facts",
         "opening": "FetchOptions",
         "pictures": "open_reader",
         "place_picture": "PlacePicture is_own_picture",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from pyproj import Geod
 from shapely.geometry.base import BaseGeometry
 
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, ImageryWarning
 from geofield.grid import Grid
 from geofield.imagery.cache import TileCache
 from geofield.imagery.client import Client
@@ -279,6 +280,8 @@ def _picture(
             allow=allow,
         )
     scene = _with_provenance(scene, source)
+    for guess in scene.guesses:
+        warnings.warn(guess, ImageryWarning, stacklevel=3)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 

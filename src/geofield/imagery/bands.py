@@ -48,6 +48,11 @@ _WORDS = {
 Look = Literal["picture", "mask", "flat"]
 _ROLES = ("red", "green", "blue", "nir", "grey", "alpha", "other")
 _SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
+#: Other satellites have bands 2, 3 and 4, too; those of Sentinel 2 go with band 8.
+_SHORT = {name.replace("0", ""): role for name, role in _SENTINEL_2.items()}
+#: What programs call a band that has no name.
+_NUMBERED = re.compile(r"(band|layer|channel)?_?\d+")
+_HOW = "name them with --bands (bands= in Python) where this is wrong"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +96,8 @@ def find_roles(
         names = [text or name for text, name in zip(descriptions, interpretation, strict=True)]
         return BandRoles(_checked(given, names))
     notes: list[str] = []
-    described = [_from_description(text) for text in descriptions]
+    described = _from_descriptions(descriptions)
+    words = described
     if any(described) and _is_consistent(described):
         if {"red", "green", "blue", "grey", "nir"} & set(described):
             return BandRoles(tuple(role or "other" for role in described))
@@ -100,14 +106,19 @@ def find_roles(
     for i, role in enumerate(roles):
         if role == "alpha" and looks[i] != "mask":
             roles[i] = ""
-            notes.append(
-                f"Band {i + 1} is marked as alpha, but its values are no mask's: not used as mask."
-            )
+            if not words[i]:
+                notes.append(
+                    f"Band {i + 1} is marked as alpha, but its values are no mask's: not used as "
+                    "mask."
+                )
         if not roles[i] and described[i] not in roles:
             roles[i] = described[i]
     colours = [role for role in roles if role in ("red", "green", "blue")]
     named = len(set(colours)) == len(colours) == 3
     roles, more = (_complete_colour if named else _from_count)(roles, looks)
+    unheard = any(word not in ("", "other", role) for word, role in zip(words, roles, strict=True))
+    if unheard or not any(words):
+        more = _unheard(descriptions, roles) or more
     return BandRoles(tuple(roles), (*notes, *more))
 
 
@@ -163,6 +174,25 @@ def _key(text: str) -> str:
     return re.sub(r"[\s\-]+", "_", text.strip().lower())
 
 
+def _from_descriptions(descriptions: Sequence[str | None]) -> list[str]:
+    """The role that each band's name tells, "" where it tells none."""
+    keys = [_key(text or "") for text in descriptions]
+    if set(_SHORT) <= set(keys):
+        return [_SHORT.get(key, "") for key in keys]
+    return [_from_description(text) for text in descriptions]
+
+
+def _unheard(descriptions: Sequence[str | None], roles: Sequence[str]) -> tuple[str, ...]:
+    """That the names of three bands or more were not gone by, where they have names."""
+    names = [text for text in descriptions if text and not _NUMBERED.fullmatch(_key(text))]
+    if not names or len(roles) < 3:
+        return ()
+    return (
+        f"The bands' names ({', '.join(names)}) do not tell which is which: taken as "
+        f"{', '.join(roles)}; {_HOW}.",
+    )
+
+
 def _from_description(text: str | None) -> str:
     if not text:
         return ""
@@ -195,7 +225,7 @@ def _complete_colour(roles: list[str], looks: Sequence[Look]) -> tuple[list[str]
         roles[i] = "other"
         if looks[i] == "picture" and "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
             roles[i] = "nir"
-            notes = (f"Band {i + 1} is taken as near infrared.",)
+            notes = (f"Band {i + 1} is taken as near infrared; {_HOW}.",)
     return roles, notes
 
 
@@ -219,10 +249,10 @@ def _from_count(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tup
         roles[pictures[3]] = "other"
         return roles, (
             f"The first three of {len(pictures)} unnamed bands are taken as red, green, blue; "
-            "name them with `bands` where this is wrong.",
+            f"{_HOW}.",
         )
     if len(pictures) == 4 and looks[pictures[3]] == "flat":
         roles[pictures[3]] = "other"
     elif len(pictures) == 4:
-        return roles, ("Four unnamed bands are taken as red, green, blue, near infrared.",)
+        return roles, (f"Four unnamed bands are taken as red, green, blue, near infrared; {_HOW}.",)
     return roles, ()

@@ -141,6 +141,7 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         source=known,
         scaling=reference.scaling,
         notes=(*reference.notes, *notes),
+        guesses=reference.guesses,
         palette=reference.palette,
         parts=tuple(parts),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from rasterio.windows import Window
 
 from geofield.errors import CRSError
 from geofield.imagery.bands import BandRoles, Look, find_roles, look_of
-from geofield.imagery.gdal import display_name, to_pyproj
-from geofield.imagery.tags import roles_from_tags
+from geofield.imagery.gdal import display_name, gdal_env, open_picture, to_pyproj
+from geofield.imagery.tags import notes_from_tags, roles_from_tags
 
 _SAMPLE_PX = 128
 
@@ -42,6 +43,13 @@ def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
             for i, name in enumerate(marked)
         ]
     return find_roles(dataset.descriptions, marked, looks, given)
+
+
+def picture_facts(path: str | Path) -> dict[str, list[str]]:
+    """What a picture that geofield wrote says of its bands and of what was done to it."""
+    with gdal_env(str(path)), open_picture(str(path)) as dataset:
+        tags = dataset.tags()
+    return {"bands": list(roles_from_tags(tags) or ()), "notes": list(notes_from_tags(tags))}
 
 
 def _sample(dataset: Any, band: int) -> NDArray[Any]:

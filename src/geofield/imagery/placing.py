@@ -51,6 +51,7 @@ class Place:
     grid: Grid
     warped_from: WarpOrigin | None = None
     notes: tuple[str, ...] = ()
+    guesses: tuple[str, ...] = ()
 
 
 def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
@@ -83,8 +84,8 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
         # GDAL fits the control points only on a grid of its own choice.
         with WarpedVRT(dataset, src_crs=to_rasterio(crs), crs=to_rasterio(target)) as warped:
             grid = Grid(warped.width, warped.height, warped.transform, target)
-        note = f"Placed by its {len(gcps)} ground control points."
-        return Place(grid, WarpOrigin(crs), (note,))
+        guess = f"Placed by its {len(gcps)} ground control points alone."
+        return Place(grid, WarpOrigin(crs), guesses=(guess,))
     native = Grid(dataset.width, dataset.height, transform, crs)
     aspect, skew_deg = pixel_shape(native, point)
     if aspect <= MAX_ASPECT and skew_deg <= MAX_SKEW_DEG:

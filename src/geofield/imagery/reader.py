@@ -60,7 +60,9 @@ class SceneReader:
     scaling : (float, float) or None
         Values that become 0 and 255 in every window; None means the window's percentiles.
     notes : tuple of str
-        What was decided about the whole picture.
+        What was done to the whole picture.
+    guesses : tuple of str
+        What had to be guessed about it.
     """
 
     path: str
@@ -70,6 +72,7 @@ class SceneReader:
     source: ImagerySource
     scaling: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
+    guesses: tuple[str, ...] = ()
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
     has_mask: bool = False
@@ -129,8 +132,8 @@ class SceneReader:
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
             negative = dataset.tags(ns="IMAGE_STRUCTURE").get("MINISWHITE") == "YES"
-            taken = [_NEGATIVE] if negative else []
-            taken += [] if fill is None else [_FILLED.format(fill)]
+            filled = () if fill is None else (_FILLED.format(fill),)
+            done = (*notes_from_tags(tags), *([_NEGATIVE] if negative else ()))
             return cls(
                 path=path,
                 grid=place.grid,
@@ -138,7 +141,8 @@ class SceneReader:
                 dtype=dtype,
                 source=options.source or source_from_tags(tags, path),
                 scaling=options.scaling,
-                notes=(*notes_from_tags(tags), *roles.notes, *taken, *place.notes),
+                notes=(*done, *place.notes),
+                guesses=(*roles.notes, *filled, *place.guesses),
                 nodata=dataset.nodata if fill is None else fill,
                 palette=palette,
                 reach=reach,
@@ -241,7 +245,8 @@ class SceneReader:
                 f"the picture of {self.grid.width_px} x {self.grid.height_px} px."
             )
         grid = self.grid.crop(column, row, width, height)
-        notes = self.notes
+        guesses = self.guesses
+        notes = (*self.notes, *guesses)
         if shape_px is not None and shape_px != (height, width):
             grid = grid.resized(shape_px[1], shape_px[0])
             notes += (
@@ -257,7 +262,7 @@ class SceneReader:
             bands, limits, more = self._scaled(values, roles, valid, scaling or self.scaling)
             notes += more
         bands = np.where(valid, bands, np.uint8(0))
-        return Scene(grid, bands, roles, valid, self.source, limits, notes)
+        return Scene(grid, bands, roles, valid, self.source, limits, notes, guesses)
 
     def _scaled(
         self,

@@ -74,6 +74,8 @@ class Scene:
         The file's values that became 0 and 255; None where the file held 8 bits.
     notes : tuple of str
         What was done to the picture on the way in (reprojected, rescaled, cut off).
+    guesses : tuple of str
+        Those of the notes that may be wrong, for a person to look at: what its bands show.
     """
 
     grid: Grid
@@ -83,6 +85,7 @@ class Scene:
     source: ImagerySource = field(default_factory=ImagerySource)
     scaling: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
+    guesses: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         grid, source = self.grid, self.source
