@@ -52,6 +52,8 @@ from geofield.imagery.sources.registry import kind_of
 from geofield.imagery.sources.xyz import XYZSource, quadkey
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile
+from geofield.settings import Settings
+from geofield.windows import open_scene
 
 from .pictures import EAST, NORTH, RESOLUTION, UTM, ground, write
 from .tile_server import Handler, TileServer, encode, serving, tile_pixels
@@ -616,6 +618,49 @@ def test_a_damaged_picture_of_a_folder_is_told(tmp_path: Path) -> None:
         (folder / f"{name}.tif").write_bytes(b"not a picture")
     assert "c.tif was left out" in field().stderr
     assert "So were 3 more." in field().stderr
+
+
+def east_sheets(folder: Path, values: np.ndarray, **profile: Any) -> None:
+    """The two sheets in the east anew, with other values."""
+    for row in (0, 100):
+        place = Affine(RESOLUTION, 0, EAST + 60, 0, -RESOLUTION, NORTH - row * RESOLUTION)
+        part = values[:, row : row + 100, 120:]
+        write(folder / f"sheet_{row}_120.tif", part, transform=place, **profile)
+
+
+def test_sheets_are_joined_by_the_bands_that_they_share(tmp_path: Path) -> None:
+    folder = tmp_path / "sheets"
+    values = sheets(folder)
+    four = np.concatenate([values[::-1], values[:1] // 2])
+    named = ["blue", "green", "red", "nir"]
+    east_sheets(folder, four, descriptions=named, photometric="MINISBLACK")
+    whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    for at in (30.5, 150.5):
+        lon, lat = whole.to_lonlat(at, 50.5)
+        scene = read_scene(folder, lat=lat, lon=lon)
+        colours = [scene.roles.index(role) for role in ("red", "green", "blue")]
+        assert scene.nir is None
+        assert np.array_equal(scene.bands[colours], values)
+        assert scene.valid.all()
+    assert scene.guesses[0].startswith("Read without nir, which sheet_0_0.tif does not have")
+    near = read_scene(folder, lat=lat, lon=lon, size_px=21)  # where all have it
+    assert np.array_equal(near.nir, values[0, 40:61, 140:161] // 2)
+    assert near.guesses == ()
+
+
+@pytest.mark.parametrize("kind", ["uint16", "grey"])
+def test_sheets_of_another_kind_are_told(tmp_path: Path, kind: str) -> None:
+    folder = tmp_path / "sheets"
+    values = sheets(folder)
+    east_sheets(folder, values.astype(np.uint16) * 40 if kind == "uint16" else values[:1])
+    whole = Grid(240, 200, Affine(RESOLUTION, 0, EAST, 0, -RESOLUTION, NORTH), UTM)
+    lon, lat = whole.to_lonlat(30.5, 50.5)
+    why = {"uint16": "its values are uint16, those of sheet_0_0.tif uint8; .* gdal_translate"}
+    told = rf"sheet_0_120\.tif was left out: {why.get(kind, 'it shows grey, unlike')}"
+    with pytest.warns(ImageryWarning, match=told):
+        scene = open_scene(folder, lat, lon, Settings())
+    assert "sheet_100_120.tif was left out" in scene.guesses[0]
+    assert read_scene(folder, lat=lat, lon=lon, size_px=41).guesses == ()  # far from them
 
 
 def test_sheets_of_another_zone_fit_to_a_pixel(tmp_path: Path) -> None:

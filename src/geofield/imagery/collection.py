@@ -20,17 +20,20 @@ from rasterio.windows import Window
 
 from geofield.errors import GeofieldError, ImageryError, ImageryWarning, PointOutsideError
 from geofield.grid import Grid
+from geofield.imagery.bands import BandRoles
 from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import REACH_M, WarpOrigin
 from geofield.imagery.reader import SceneReader
-from geofield.model.scene import swapped
+from geofield.model.scene import Scene, swapped
 
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
 _MOST_KNOWN = 10_000
 #: So many damaged pictures are named.
 _TOLD = 3
+#: A picture that is left out is missed this near to a window.
+_NEAR_PX = 32
 #: Lattices this near to each other (px) are the same.
 _SAME_PX = 1e-3
 #: Left, top, right, bottom, pixels.
@@ -48,6 +51,13 @@ class Part:
     #: Common pixels that it may touch.
     bounds: _Box
 
+    def picks(self, roles: Sequence[str]) -> list[int] | None:
+        """Which of its bands show these roles; None where one is not there."""
+        own = self.reader.shown_roles
+        if own == tuple(roles):
+            return list(range(len(own)))
+        return [own.index(role) for role in roles] if set(roles) <= set(own) else None
+
 
 @dataclass(frozen=True, eq=False)
 class CollectionReader(SceneReader):
@@ -55,6 +65,34 @@ class CollectionReader(SceneReader):
 
     #: In the order of precedence: the first picture with data at a pixel shows there.
     parts: tuple[Part, ...] = ()
+    #: Pictures that cannot be joined, and where they lie.
+    left_out: tuple[tuple[str, _Box], ...] = ()
+
+    def read(
+        self,
+        window: tuple[int, int, int, int] | None = None,
+        *,
+        shape_px: tuple[int, int] | None = None,
+        scaling: tuple[float, float] | None = None,
+    ) -> Scene:
+        """Read a part: the bands that all pictures there have; see `SceneReader.read`."""
+        column, row, width, height = window or (0, 0, self.grid.width_px, self.grid.height_px)
+        box = (column, row, column + width, row + height)
+        there = [part for part in self.parts if _meet(part.bounds, box)]
+        common = [role for role in self.shown_roles if all(part.picks([role]) for part in there)]
+        reader, lost = self, [role for role in self.shown_roles if role not in common]
+        if lost:
+            less = next(part.reader for part in there if not part.picks(lost))
+            guess = (
+                f"Read without {' and '.join(lost)}, which {display_name(less.path)} does not "
+                "have; take it out of the set to have it."
+            )
+            reader = replace(self, roles=BandRoles(tuple(common)), guesses=(*self.guesses, guess))
+        return SceneReader.read(reader, window, shape_px=shape_px, scaling=scaling)
+
+    def _guesses_in(self, box: _Box) -> tuple[str, ...]:
+        out = [why for why, place in self.left_out if _meet(place, box)]
+        return (*self.guesses, _told(out)) if out else self.guesses
 
     def _pixels(
         self, window: Window, shape: tuple[int, int]
@@ -81,8 +119,9 @@ class CollectionReader(SceneReader):
                 got, there = whole._pixels(window, shape)
                 place = np.s_[0 : shape[0], 0 : shape[1]]
             new = there & ~valid[place]
-            for band in range(count):
-                values[band][place][new] = got[band][new]
+            picks = range(count) if self.palette else part.picks(self.shown_roles) or ()
+            for band, pick in enumerate(picks):
+                values[band][place][new] = got[pick][new]
             valid[place] |= new
         return values, valid
 
@@ -116,15 +155,19 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
     reference = _reference(readers, options.point, name, told)
     if damaged:
         warnings.warn(told, ImageryWarning, stacklevel=2)
-    usable = [each for each in readers if _fits(each, reference)]
-    if len(usable) < len(readers):
-        notes.append(f"{len(readers) - len(usable)} pictures with other bands were left out.")
+    unlike = [_unlike(each, reference) for each in readers]
+    usable = [each for each, why in zip(readers, unlike, strict=True) if not why]
     usable.sort(key=lambda each: each is not reference)  # stable: the reference first
     grid, boxes = _common_grid(reference, usable, options.point)
     parts = [
         _part(reader, grid, box)
         for reader, box in zip(usable, boxes, strict=True)
         if box is not None
+    ]
+    left_out = [
+        (f"{display_name(each.path)} was left out: {why}.", place)
+        for each, why in zip(readers, unlike, strict=True)
+        if why and (place := _around(each, grid)) is not None
     ]
     if len(parts) > 1:
         moved = sum(part.offset is None for part in parts)
@@ -142,6 +185,7 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         scaling=reference.scaling,
         notes=(*reference.notes, *notes),
         guesses=reference.guesses,
+        left_out=tuple(left_out),
         palette=reference.palette,
         parts=tuple(parts),
     )
@@ -218,15 +262,33 @@ def _outside(readers: list[SceneReader], lon: float, lat: float, name: str) -> s
     return message
 
 
-def _fits(reader: SceneReader, reference: SceneReader) -> bool:
-    shown = [reader.roles.roles[i] for i in reader.roles.shown]
-    wanted = [reference.roles.roles[i] for i in reference.roles.shown]
-    placed = reader.warped_from is None or reader.warped_from.transform is not None
-    return (
-        (shown == wanted and reader.dtype == reference.dtype)
-        and bool(reader.palette) == bool(reference.palette)
-        and (placed or reader is reference)
-    )
+def _unlike(reader: SceneReader, reference: SceneReader) -> str:
+    """Why a picture cannot be joined to the reference; "" where it can."""
+    name, own = display_name(reference.path), reader.shown_roles
+    wanted = [role for role in reference.shown_roles if role != "nir"] or reference.shown_roles
+    by_points = reader.warped_from is not None and reader.warped_from.transform is None
+    if reader is reference:
+        return ""
+    if reader.dtype != reference.dtype:
+        return (
+            f"its values are {reader.dtype}, those of {name} {reference.dtype}; bring them to one "
+            "type, as with gdal_translate -ot Byte -scale"
+        )
+    if not set(wanted) <= set(own) or bool(reader.palette) != bool(reference.palette):
+        shows = "colours by number" if reader.palette else ", ".join(own)
+        return (
+            f"it shows {shows}, unlike {name}; make it a picture of the same bands, as with "
+            "gdal_translate -b or -expand rgb"
+        )
+    if by_points:
+        return "only control points place it; make a GeoTIFF of it with gdalwarp"
+    return ""
+
+
+def _meet(one: _Box, other: _Box) -> bool:
+    """Whether two boxes share pixels."""
+    left, top = max(one[0], other[0]), max(one[1], other[1])
+    return left < min(one[2], other[2]) and top < min(one[3], other[3])
 
 
 def _common_grid(
@@ -240,12 +302,9 @@ def _common_grid(
         x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
     near = [x0 - reach, y0 - reach], [x0 + reach, y0 + reach]
-    edge, zero, one = np.linspace(0.0, 1.0, 9), np.zeros(9), np.ones(9)
     boxes: list[tuple[Any, Any] | None] = []
     for reader in readers:
-        xs = np.concatenate([edge, one, edge, zero]) * reader.grid.width_px
-        ys = np.concatenate([zero, edge, one, edge]) * reader.grid.height_px
-        px = np.array(base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs))
+        px = _border_px(reader, base)
         low, high = np.maximum(px.min(axis=1), near[0]), np.minimum(px.max(axis=1), near[1])
         boxes.append((low, high) if np.isfinite(px).all() and (high > low).all() else None)
     there = [box for box in boxes if box is not None]
@@ -261,6 +320,23 @@ def _common_grid(
         stop = np.minimum(np.ceil(box[1]).astype(int) - first + 1, last - first)
         places.append((int(start[0]), int(start[1]), int(stop[0]), int(stop[1])))
     return grid, places
+
+
+def _border_px(reader: SceneReader, base: Grid) -> NDArray[np.float64]:
+    """Where the border of a picture lies on another one's grid: columns and rows."""
+    edge, zero, one = np.linspace(0.0, 1.0, 9), np.zeros(9), np.ones(9)
+    xs = np.concatenate([edge, one, edge, zero]) * reader.grid.width_px
+    ys = np.concatenate([zero, edge, one, edge]) * reader.grid.height_px
+    return np.array(base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs))
+
+
+def _around(reader: SceneReader, grid: Grid) -> _Box | None:
+    """The pixels of a grid, inside or not, near which a picture lies; None where it is far."""
+    px = _border_px(reader, grid)
+    if not np.isfinite(px).all():
+        return None
+    (left, top), (right, bottom) = px.min(axis=1) - _NEAR_PX, px.max(axis=1) + _NEAR_PX
+    return int(left), int(top), int(right), int(bottom)
 
 
 def _offset(grid: Grid, common: Grid) -> tuple[int, int] | None:

@@ -152,6 +152,11 @@ class SceneReader:
                 warped_from=place.warped_from,
             )
 
+    @property
+    def shown_roles(self) -> tuple[str, ...]:
+        """What the bands that a scene keeps show, in the file's order."""
+        return tuple(self.roles.roles[i] for i in self.roles.shown)
+
     # -- which part ------------------------------------------------------------------------
 
     def window_around(
@@ -245,7 +250,7 @@ class SceneReader:
                 f"the picture of {self.grid.width_px} x {self.grid.height_px} px."
             )
         grid = self.grid.crop(column, row, width, height)
-        guesses = self.guesses
+        guesses = self._guesses_in((column, row, right, bottom))
         notes = (*self.notes, *guesses)
         if shape_px is not None and shape_px != (height, width):
             grid = grid.resized(shape_px[1], shape_px[0])
@@ -258,11 +263,15 @@ class SceneReader:
             roles: tuple[str, ...] = ("red", "green", "blue")
             bands, limits = values.astype(np.uint8), None
         else:
-            roles = tuple(self.roles.roles[i] for i in self.roles.shown)
+            roles = self.shown_roles
             bands, limits, more = self._scaled(values, roles, valid, scaling or self.scaling)
             notes += more
         bands = np.where(valid, bands, np.uint8(0))
         return Scene(grid, bands, roles, valid, self.source, limits, notes, guesses)
+
+    def _guesses_in(self, box: tuple[int, int, int, int]) -> tuple[str, ...]:
+        """What had to be guessed about a part: left, top, right, bottom, pixels."""
+        return self.guesses
 
     def _scaled(
         self,
