@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 
 import shapely
 
+from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.errors import FieldError, GeofieldWarning, ObstacleError, ObstacleWarning
 from geofield.model.evidence import Evidence, outline_digest
@@ -167,17 +169,11 @@ def holds(previous: Plan, *, lat: float, lon: float) -> bool:
 
 def _refuse_to_forget(previous: Plan, lat: float, lon: float) -> None:
     """Another field's plan may be replaced, but not a person's work on it."""
-    reviewed = 0
-    if previous.obstacles is not None:
-        _, written = reconcile(previous.obstacles, previous.evidence.written)
-        reviewed = sum(row.kept for row in written.rows) + len(written.removed)
-    drawn = _drawn(previous) or previous.field.method in _GIVEN
-    if reviewed or drawn:
-        work = [f"{reviewed} reviewed obstacles"] if reviewed else []
-        work += ["an outline drawn by hand"] if drawn else []
+    work = list(_work_on(previous))
+    if work:
         raise FieldError(
             f"The earlier plan there is of another field ({previous.field.name}; lat {lat}, lon "
-            f"{lon} lies outside it) and holds {' and '.join(work)}.",
+            f"{lon} lies outside it) and holds {', '.join(work)}.",
             hint="Choose another folder, or --fresh to forget that work.",
         )
 
@@ -194,6 +190,30 @@ def is_planned(plan: Plan) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", GeofieldWarning)
         return reconcile(obstacles, written, plan.grid)[1] == written
+
+
+def _work_on(plan: Plan) -> Iterator[str]:
+    """What a person did on a plan, in words."""
+    columns = {name for name, _ in plan.field.own}
+    if plan.obstacles is not None:
+        _, written = reconcile(plan.obstacles, plan.evidence.written)
+        reviewed = sum(row.kept for row in written.rows) + len(written.removed)
+        if reviewed:
+            yield f"{reviewed} reviewed obstacles"
+        columns.update(schema.own_columns(schema.OBSTACLES, plan.obstacles))
+    if _drawn(plan) or plan.field.method in _GIVEN:
+        yield "an outline drawn by hand"
+    tracks = plan.track_edits
+    edited = [*tracks.edits, *tracks.apart]
+    if edited:
+        yield f"{len(edited)} edited tracks"
+    said = len(points_said(plan.settings))
+    if said:
+        yield f"{said} points said of its outline"
+    if plan.field.name != plan.field.field_id:
+        yield "a name"
+    if columns or tracks.beside:
+        yield "columns of your own"
 
 
 def refuse_lost_obstacles(plan: Plan) -> None:

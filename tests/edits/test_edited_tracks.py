@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -325,6 +327,24 @@ def test_what_is_drawn_in_an_emptied_layer_or_changed_beside_it_counts(folder: P
         for table in ("gpkg_contents", "gpkg_geometry_columns"):
             connection.execute(f"DELETE FROM {table} WHERE table_name = 'segments'")
     assert "5 taken away" in geofield("tracks", file, "-o", file)
+
+
+def test_a_run_for_another_field_does_not_forget_them(folder: Path, made: SimulatedField) -> None:
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", without(5))
+    rewritten(file, "field", lambda table: table.assign(name="Mine", crop="rye"))
+    written = file.read_bytes()
+    picture = gpd.GeoSeries([plan_in(folder).field.polygon], crs=plan_in(folder).field.crs)
+    west, south, *_ = picture.to_crs(4326).total_bounds
+    command = [sys.executable, "-m", "geofield", "field", folder / "picture.tif", "--overwrite"]
+    done = subprocess.run(
+        [*map(str, command), "--lat", f"{south}", "--lon", f"{west}", "-o", str(file)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "holds 1 edited tracks, a name, columns of your own" in done.stderr
+    assert "--fresh" in done.stderr
+    assert file.read_bytes() == written
 
 
 def test_the_review_page_goes_on_with_what_was_changed_elsewhere(folder: Path) -> None:
