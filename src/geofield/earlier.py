@@ -10,10 +10,17 @@ import shapely
 
 from geofield import schema
 from geofield.crs import LONLAT, transformer
-from geofield.errors import FieldError, GeofieldWarning, ObstacleError, ObstacleWarning
+from geofield.errors import (
+    FieldError,
+    GeofieldWarning,
+    ObstacleError,
+    ObstacleWarning,
+    TrackWarning,
+)
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.review import reconcile
+from geofield.model.track_edits import TrackEdits
 from geofield.plan import Plan
 from geofield.settings import Settings, TrackSettings, as_before, option_named
 
@@ -239,6 +246,25 @@ def tracks_come_back(plan: Plan) -> tuple[str, ...]:
         f"no planned track was left in {names}: that is no word on any one of them, and they come "
         "back (to drive only what you draw: draw it, plan, then delete the others)",
     )
+
+
+def read_track_edits(plan: Plan) -> TrackEdits:
+    """What a person changed of a plan's tracks; two words on one track are told.
+
+    Warns
+    -----
+    TrackWarning
+    """
+    twice = () if plan.tracks is None else plan.tracks.changed_twice
+    if twice:
+        numbers = ", ".join(map(str, twice))
+        warnings.warn(
+            f"Changed in both `tracks` and `segments`, in each another way: track {numbers}. What "
+            "`segments` has of it counts; change it there again where that is not what you want.",
+            TrackWarning,
+            stacklevel=3,
+        )
+    return plan.track_edits
 
 
 def warn_of_unsearched(evidence: Evidence) -> None:

@@ -26,6 +26,7 @@ from geofield.earlier import (
     known_outline,
     of_the_same_field,
     points_said,
+    read_track_edits,
     refuse_lost_obstacles,
     renamed,
     still_said,
@@ -198,7 +199,7 @@ def run_field(
     obstacles = written = None
     edits = TrackEdits()
     if previous is not None:
-        edits = previous.track_edits.reprojected(previous.field.crs, field.crs)
+        edits = read_track_edits(previous).reprojected(previous.field.crs, field.crs)
     if previous is not None and previous.obstacles is not None:
         obstacles, written = reconcile(previous.obstacles, previous.evidence.written, scene.grid)
         obstacles = obstacles.to_crs(field.crs)
@@ -310,7 +311,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
             plan.evidence,
             detection=found,
             written=written,
-            track_edits=plan.track_edits,
+            track_edits=read_track_edits(plan),
             searched=searched_in(plan.field),
             shown_px=scene.shown_px,
         ),
@@ -324,7 +325,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan)
     obstacles, said = None, still_said(plan, settings)
-    evidence = replace(plan.evidence, track_edits=plan.track_edits, said_tracks=said)
+    evidence = replace(plan.evidence, track_edits=read_track_edits(plan), said_tracks=said)
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
         evidence = replace(evidence, written=written)

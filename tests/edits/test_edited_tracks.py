@@ -347,6 +347,21 @@ def test_a_run_for_another_field_does_not_forget_them(folder: Path, made: Simula
     assert file.read_bytes() == written
 
 
+def test_a_track_changed_in_both_layers_is_told(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+
+    def moved(table: Frame) -> Frame:
+        mine = table["track_no"].isin([4, 6])
+        return table.set_geometry(table.geometry.where(~mine, table.geometry.translate(0.8, 0.3)))
+
+    rewritten(file, "tracks", lambda table: without(5)(moved(table)))
+    # Track 5 is gone and 6 moved in both: that is one word.
+    rewritten(file, "segments", lambda table: without(4)(without(5)(moved(table))))
+    told = geofield("tracks", file, "-o", file)
+    assert "`segments`, in each another way: track 4. What" in told
+    assert "4, 5 taken away, 6 drawn" in told
+
+
 def test_the_review_page_goes_on_with_what_was_changed_elsewhere(folder: Path) -> None:
     file = folder / "out/field.gpkg"
     rewritten(file, "tracks", without(5))

@@ -184,6 +184,26 @@ def edits_in(
     return TrackEdits(tuple(edits[no] for no in sorted(edits)), known.apart, beside)
 
 
+def changed_twice(
+    lines: gpd.GeoDataFrame, segments: gpd.GeoDataFrame, written: TracksWritten
+) -> tuple[int, ...]:
+    """The tracks that a person changed in both layers, in each another way.
+
+    Parameters are those of :func:`edits_in`, by which the segments count.
+    """
+    parts, row_of, _ = _rows_by_number(lines, written)
+    as_segments, _ = _segments_by_number(segments)
+    if not row_of or not as_segments:
+        return ()
+    found = []
+    for no, before in written.segments.items():
+        line = parts[row_of[no]] if no in row_of else []
+        pieces = as_segments.get(no, [])
+        if not (_same(line, before) or _same(pieces, before) or _same(line, pieces)):
+            found.append(no)
+    return tuple(found)
+
+
 def _write_own(
     edits: dict[int, TrackEdit], own: Mapping[int, Mapping[str, Any]], written: TracksWritten
 ) -> None:

@@ -18,7 +18,7 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
-from geofield.model.track_edits import TrackEdits, edits_in
+from geofield.model.track_edits import TrackEdits, changed_twice, edits_in
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
 from geofield.model.tracks_written import TracksWritten, track_numbers
 
@@ -152,6 +152,13 @@ class Tracks:
             return ()
         layers = {schema.TRACKS.name: self.lines, schema.SEGMENTS.name: self.segments}
         return tuple(name for name, rows in layers.items() if not any(track_numbers(rows)))
+
+    @property
+    def changed_twice(self) -> tuple[int, ...]:
+        """The tracks that a person changed in both layers, in each another way."""
+        if self.written is None or self.written.are(self.lines, self.segments):
+            return ()
+        return changed_twice(self.lines, self.segments, self.written)
 
     def _written(self) -> TracksWritten:
         if self.written is not None:
