@@ -19,6 +19,7 @@ from geofield.errors import (
 )
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
+from geofield.model.own_values import empty_columns
 from geofield.model.review import reconcile
 from geofield.model.track_edits import TrackEdits
 from geofield.plan import Plan
@@ -249,7 +250,7 @@ def tracks_come_back(plan: Plan) -> tuple[str, ...]:
 
 
 def read_track_edits(plan: Plan) -> TrackEdits:
-    """What a person changed of a plan's tracks; two words on one track are told.
+    """What a person changed of a plan's tracks; two words on one track, and what goes, are told.
 
     Warns
     -----
@@ -264,7 +265,24 @@ def read_track_edits(plan: Plan) -> TrackEdits:
             TrackWarning,
             stacklevel=3,
         )
+    _warn_of_empty_columns(plan)
     return plan.track_edits
+
+
+def _warn_of_empty_columns(plan: Plan) -> None:
+    """Columns beside tracks are found again by what stands in them: an empty one is not."""
+    if plan.tracks is None:
+        return
+    of_layer = ((schema.TRACKS, plan.tracks.lines), (schema.SEGMENTS, plan.tracks.segments))
+    for layer, rows in of_layer:
+        names = empty_columns(layer, rows)
+        if names and len(rows):
+            warnings.warn(
+                f"Nothing stands in {', '.join(names)} of `{layer.name}`: an empty column of your "
+                "own goes when tracks are planned anew. Add it again and write into one row.",
+                TrackWarning,
+                stacklevel=4,
+            )
 
 
 def warn_of_unsearched(evidence: Evidence) -> None:

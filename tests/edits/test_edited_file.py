@@ -251,3 +251,42 @@ def test_no_machine_is_steered_through_an_obstacle_drawn_since(folder: Path) -> 
     assert "out of the field" in done.stderr
     geofield("tracks", file, "-o", file)
     geofield("refresh", file)
+
+
+def test_columns_of_ones_own_keep_their_types_and_values(folder: Path) -> None:
+    """Of all that an editor can add; most cells stay empty."""
+    file = folder / "out/field.gpkg"
+    own = {
+        "cadastre": ("INTEGER", 1234567890123456789),
+        "litres": ("REAL", 5.0),
+        "sown": ("DATE", "2024-05-01"),
+        "stamp": ("DATETIME", "2024-05-01T12:30:00.000Z"),
+        "done": ("BOOLEAN", 1),
+        "pic": ("BLOB", b"\x89PNG\x00\xff"),
+        "code": ("TEXT", "007"),
+    }
+    layers = ("field", "obstacles", "tracks", "segments")
+    with closing(sqlite3.connect(file)) as connection, connection:
+        for function in ("IsEmpty", "MinX", "MaxX", "MinY", "MaxY"):
+            connection.create_function(f"ST_{function}", 1, lambda shape: 0)
+        for layer in layers:
+            for name, (kind, _) in own.items():
+                connection.execute(f"ALTER TABLE {layer} ADD COLUMN {name} {kind}")
+            cells = ", ".join(f"{name} = ?" for name in own)
+            first = f"(SELECT min(fid) FROM {layer})"
+            values = [value for _, value in own.values()]
+            connection.execute(f"UPDATE {layer} SET {cells} WHERE fid = {first}", values)
+        connection.execute("ALTER TABLE tracks ADD COLUMN later TEXT")
+        connection.execute("ALTER TABLE tracks ADD COLUMN geometry TEXT")
+    told = geofield("tracks", file, "--spacing", 6, "-o", file)
+    assert "Nothing stands in later of `tracks`" in told
+    assert "the column 'geometry' of layer 'tracks' has the name of the shapes" in told
+    geofield("tracks", file, "-o", file)
+    with closing(sqlite3.connect(file)) as connection:
+        for layer in layers:
+            types = {row[1]: row[2] for row in connection.execute(f"PRAGMA table_info({layer})")}
+            assert {name: types[name] for name in own} == {n: kind for n, (kind, _) in own.items()}
+            (row,) = connection.execute(
+                f"SELECT {', '.join(own)} FROM {layer} WHERE code IS NOT NULL"
+            )
+            assert row == tuple(value for _, value in own.values())

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pyproj import CRS
 
@@ -50,7 +50,8 @@ def read(path: Path) -> Dataset:
     known = {layer.name: layer for layer in schema.LAYERS if layer.name in own}
     for name in layers:
         if name in known and name != schema.TRACK_POINTS.name:
-            tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
+            frame = _exact(known[name], read_vector(path, name), path)
+            tables[name] = _own_table(known[name], frame, crs, path)
     field = tables.get(schema.FIELD.name)
     several = field is not None and len(field) > 1
     for name in layers:
@@ -138,6 +139,40 @@ def in_own_terms(
             hint="Export the layer in the CRS of the other layers, then repeat.",
         )
     return _as_spelled(of, frame.set_crs(crs, allow_override=True))
+
+
+def _exact(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
+    """A layer of which a person's own columns have the types that they have in the file.
+
+    Beside an empty cell pandas makes a number with a point of a whole number or truth value, and
+    a time of a date: from 2**53 on that is another number.
+    """
+    import pandas as pd
+    import pyarrow as pa
+    import pyogrio
+
+    if "geometry" in pyogrio.read_info(path, layer=of.name)["fields"]:
+        warnings.warn(
+            f"{path.name}: the column 'geometry' of layer {of.name!r} has the name of the shapes "
+            "and is not kept: give it another name.",
+            FormatWarning,
+            stacklevel=3,
+        )
+    names = schema.own_columns(of, frame)
+    if not names:
+        return frame
+    table = pyogrio.read_arrow(path, layer=of.name, columns=names, read_geometry=False)[1]
+    exact: dict[str, pd.Series[Any]] = {}
+    for name in (one for one in names if one in table.column_names):
+        kind = table.schema.field(name).type
+        if pa.types.is_date(kind) or pa.types.is_binary(kind):
+            exact[name] = table[name].to_pandas(types_mapper=pd.ArrowDtype)
+        elif table[name].null_count and pa.types.is_boolean(kind):
+            exact[name] = table[name].to_pandas(types_mapper=lambda _: pd.BooleanDtype())
+        elif table[name].null_count and pa.types.is_integer(kind):
+            whole = table[name].cast(pa.int64())
+            exact[name] = whole.to_pandas(types_mapper=lambda _: pd.Int64Dtype())
+    return frame.assign(**exact) if exact else frame
 
 
 def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
