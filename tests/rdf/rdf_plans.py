@@ -150,18 +150,23 @@ def _driving(field: Field, tracks: Tracks, crs: CRS):
 
 def plan_across_180() -> Dataset:
     """The small plan's field, obstacles and tracks where 180 degrees cut them, without points."""
-    plan, crs = small_plan(), CRS("EPSG:32660")
+    return plan_at(180.0, 35.07, "EPSG:32660")
+
+
+def plan_at(lon: float, lat: float, crs: CRS | str) -> Dataset:
+    """The small plan's field, obstacles and tracks at a place, without points."""
+    plan, crs = small_plan(), CRS(crs)
     middle = plan.tables["field"].geometry.iloc[0].centroid
-    x, _ = transformer(LONLAT, crs).transform(180.0, 35.07)
+    x, y = transformer(LONLAT, crs).transform(lon, lat)
     tables = {
-        name: table.set_geometry(table.geometry.translate(x - middle.x)).set_crs(
+        name: table.set_geometry(table.geometry.translate(x - middle.x, y - middle.y)).set_crs(
             crs, allow_override=True
         )
         for name, table in plan.tables.items()
     }
     centres = shapely.get_coordinates(tables["obstacles"].geometry.centroid)
-    lon, lat = transformer(crs, LONLAT).transform(*centres.T)
-    tables["obstacles"] = tables["obstacles"].assign(lon=lon, lat=lat)
+    lons, lats = transformer(crs, LONLAT).transform(*centres.T)
+    tables["obstacles"] = tables["obstacles"].assign(lon=lons, lat=lats)
     return replace(plan, tables=tables, crs=crs, grid=None, points=None)
 
 

@@ -10,7 +10,7 @@ import time
 import pyshacl
 import pytest
 import rdflib
-from rdf_plans import plan_across_180, small_plan
+from rdf_plans import plan_across_180, plan_at, small_plan
 
 from geofield.formats.rdf import write
 from geofield.formats.rdf.names import Names
@@ -37,6 +37,11 @@ def test_every_product_is_sound(plan, tmp_path, profile, syntax):
 @pytest.mark.parametrize("syntax", WRITERS)
 def test_every_product_across_180_is_sound(tmp_path, syntax):
     for path in WRITERS[syntax](plan_across_180(), tmp_path, options={}):
+        assert [str(problem) for problem in validate(path)] == []
+
+
+def test_a_product_near_a_pole_is_sound(tmp_path):
+    for path in write.write_turtle(plan_at(20.0, 84.5, "EPSG:5041"), tmp_path, options={}):
         assert [str(problem) for problem in validate(path)] == []
 
 

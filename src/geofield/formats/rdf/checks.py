@@ -123,13 +123,12 @@ def _on_earth(shape: Any) -> bool:
 
 
 def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
-    if crs.is_geographic:
-        (shape,) = unwrapped(np.array([shape]))
-    west, south, east, north = shapely.bounds(shape).tolist()
     if not crs.is_geographic:
+        # Every vertex: near a pole the corners of a box lie anywhere around what is in it.
         project = transformer(crs, LONLAT)
-        (west, east), (south, north) = project.transform([west, east], [south, north])
-        east += 360.0 if east < west else 0.0
+        shape = shapely.transform(shape, lambda xy: np.column_stack(project.transform(*xy.T)))
+    (shape,) = unwrapped(np.array([shape]))
+    west, south, east, north = shapely.bounds(shape).tolist()
     box = (west, south, east, north)
     return box if all(map(math.isfinite, box)) else None
 
@@ -188,7 +187,7 @@ def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:
 
 
 def _same(mine: Bounds, theirs: Bounds) -> bool:
-    # Bounds of a reprojected box differ by the grid's rotation: a tenth of its size.
+    # What is straight in one CRS bends in another one, and is rounded: a tenth of its size.
     size = max(mine[2] - mine[0], mine[3] - mine[1])
     apart = np.abs(np.subtract(mine, theirs))
     apart[[0, 2]] = np.minimum(apart[[0, 2]], 360.0 - apart[[0, 2]])
