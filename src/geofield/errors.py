@@ -105,6 +105,10 @@ class SeveralFieldsError(FormatError):
     """A file holds several fields where one is wanted."""
 
 
+class EmptyFileError(FormatError):
+    """A file holds no geometries."""
+
+
 class UnknownFormatError(FormatError):
     """A format was named that is not there: wrong usage, not work that failed."""
 

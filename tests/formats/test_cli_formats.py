@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -142,6 +143,22 @@ def test_validate_knows_products_that_nothing_checks(plan_file, tmp_path):
         assert "there is no check for" in only["message"]
         with pytest.raises(FormatError, match="can be written, not read"):
             run(info, file)
+
+
+@pytest.mark.parametrize("name", ["geojson", "shapefile", "geoparquet", "flatgeobuf"])
+def test_validate_passes_a_layer_that_is_empty(tmp_path, name):
+    dataset = make_dataset()
+    empty = dataset.tables["obstacles"].iloc[:0]
+    dataset = replace(dataset, tables={**dataset.tables, "obstacles": empty})
+    (file,) = (
+        path
+        for path in write_dataset(dataset, tmp_path, [name])
+        if path.stem == "obstacles" and path.suffix in FORMATS[name].suffixes
+    )
+    done = CliRunner().invoke(validate, [str(file), "--json"])
+    assert done.exit_code == 0
+    ((only,),) = json.loads(done.stdout).values()
+    assert (only["level"], only["message"]) == ("warning", "holds no geometries")
 
 
 def test_validate_finds_a_track_through_a_tree(tmp_path):

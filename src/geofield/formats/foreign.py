@@ -18,7 +18,7 @@ from pyproj.exceptions import ProjError
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, transformer
-from geofield.errors import FormatError, FormatWarning
+from geofield.errors import EmptyFileError, FormatError, FormatWarning
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
@@ -143,7 +143,7 @@ def read_foreign(
     ]
     present = [RawLayer(each.name, _whole(each.frame)) for each in present if len(each.frame)]
     if not present:
-        raise FormatError(f"{path} holds no geometries.")
+        raise EmptyFileError(f"{path} holds no geometries.")
     metric = _metric_of(present)
     own: dict[str, list[Any]] = {}
     foreign: list[RawLayer] = []

@@ -13,7 +13,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import ground_lengths_m
-from geofield.errors import FormatWarning, GeofieldError, SeveralFieldsError
+from geofield.errors import EmptyFileError, FormatWarning, GeofieldError, SeveralFieldsError
 from geofield.formats.clear_way import driven_through, leaving
 from geofield.formats.importing import read_dataset
 from geofield.formats.registry import detect, product_file
@@ -72,6 +72,9 @@ def validate_file(path: Path | str) -> list[Finding]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FormatWarning)
             dataset = _one_field(read_dataset(place), place)
+    except EmptyFileError:
+        # As a layer of a plan without obstacles is: there is nothing that could not fit together.
+        return [*findings, Finding("warning", place.name, "holds no geometries")]
     except SeveralFieldsError as error:
         words = f"{error} Each field's own rules were not checked."
         return [*findings, Finding("warning", place.name, words)]
