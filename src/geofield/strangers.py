@@ -26,6 +26,10 @@ _DIRECTIONS = {
     b"<VRTDataset": "a VRT",
     b"<WCS_GDAL": "a WCS connection",
 }
+#: So begin TIFF (BigTIFF, too), PNG, JPEG and JPEG 2000: GDAL would only tell of its drivers.
+_PICTURES = (
+    b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"\0\0\0\x0cjP",
+)  # fmt: skip
 _HEAD_BYTES = 1 << 18
 _HINT = "Nothing was read. Ask its maker for a file without it."
 #: Elements inside elements; an honest file needs about 20.
@@ -37,7 +41,7 @@ class _RootSeenError(Exception):
 
 
 def check_vector(path: Path | str) -> None:
-    """Refuse a vector file that only points elsewhere, or whose XML defines entities.
+    """Refuse a vector file that only points elsewhere, whose XML defines entities, or a picture.
 
     Raises
     ------
@@ -52,6 +56,12 @@ def check_vector(path: Path | str) -> None:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
         raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
+    if head.startswith(_PICTURES):
+        raise FormatError(
+            f"{file} is a picture; what is wanted here are shapes (polygons, points, lines).",
+            hint="Give the picture to `geofield run` or `geofield field`, which find the outline "
+            "in it.",
+        )
     for mark, what in _DIRECTIONS.items():
         if mark in head:
             raise FormatError(

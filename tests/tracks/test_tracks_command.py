@@ -18,7 +18,7 @@ from click.testing import CliRunner
 
 from geofield import schema
 from geofield.cli.main import cli
-from geofield.errors import FormatWarning, GeofieldError, TrackError, TrackWarning
+from geofield.errors import FormatError, FormatWarning, GeofieldError, TrackError, TrackWarning
 from geofield.farm import read_farm
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -41,6 +41,15 @@ def run(*arguments: str | Path) -> dict[str, Any]:
     result = CliRunner().invoke(cli, ["tracks", *map(str, arguments), "--json"])
     assert result.exception is None, result.output
     return json.loads(result.stdout)
+
+
+def test_a_picture_is_told_where_parcels_are_wanted(tmp_path: Path) -> None:
+    (tmp_path / "ortho.tif").write_bytes(b"II*\0" + bytes(60))
+    arguments = ["tracks", str(tmp_path / "ortho.tif"), "-o", str(tmp_path / "out.gpkg")]
+    error = CliRunner().invoke(cli, arguments).exception
+    assert isinstance(error, FormatError)
+    assert "is a picture" in error.message
+    assert "geofield run" in str(error.hint)
 
 
 def test_one_polygon_with_trees(tmp_path: Path) -> None:
