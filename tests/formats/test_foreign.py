@@ -11,6 +11,7 @@ from pyproj import CRS
 
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats import FORMATS, read_dataset, write_dataset
+from geofield.formats.foreign_tables import obstacle_table
 from geofield.formats.importing import merged
 
 UTM = "EPSG:32633"
@@ -81,6 +82,18 @@ def test_inner_polygons_are_obstacles_and_points_get_a_radius(tmp_path):
     by_kind = obstacles.set_index("kind")
     assert by_kind.geometry["other"].area == pytest.approx(400)
     assert by_kind["radius_m"]["tree"] == 2.0
+
+
+def test_a_kind_that_is_not_known_is_told(tmp_path):
+    shapes = [shapely.Point(x, 5_500_050).buffer(3) for x in (500_020, 500_050, 500_080, 500_110)]
+    kinds = ["hut", "Tree", None, "hut"]
+    path = write(tmp_path / "things.gpkg", shapes, kind=kinds, status=["gone", "added", "", None])
+    with pytest.warns(FormatWarning) as caught:
+        obstacles = obstacle_table(gpd.read_file(path), CRS(UTM), path)
+    assert list(obstacles["kind"]) == ["other", "tree", "other", "other"]
+    kind, status = (str(each.message) for each in caught)
+    assert "none of tree, other: 'hut' (now other). Correct" in kind
+    assert "'gone' (now added)" in status
 
 
 def test_points_with_a_radius_keep_it(tmp_path):

@@ -148,8 +148,8 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     }
     data |= {
         "obstacle_no": _whole_numbers(numbers_like(frame, NUMBER_COLUMNS)),
-        "kind": _one_of(frame, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
-        "status": _one_of(frame, "status", schema.STATUSES, np.full(count, "added")),
+        "kind": _one_of(frame, path, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
+        "status": _one_of(frame, path, "status", schema.STATUSES, np.full(count, "added")),
         "radius_m": radius,
         "buffer_m": margin,
         "lat": lat,
@@ -261,12 +261,28 @@ def _whole_numbers(values: np.ndarray) -> list[int]:
 
 
 def _one_of(
-    frame: gpd.GeoDataFrame, name: str, allowed: tuple[str, ...], default: np.ndarray
+    frame: gpd.GeoDataFrame, path: Path, name: str, allowed: tuple[str, ...], default: np.ndarray
 ) -> list[str]:
+    """A column's words where they are allowed, whatever their case; of others it is told."""
     series = column_like(frame, (name,))
     if series is None:
         return [str(value) for value in default]
-    return [
-        str(value).lower() if str(value).lower() in allowed else str(other)
-        for value, other in zip(series, default, strict=True)
+    said = ["" if pd.isna(value) else str(value).strip() for value in series]
+    taken = [
+        word.lower() if word.lower() in allowed else str(other)
+        for word, other in zip(said, default, strict=True)
     ]
+    unknown = {
+        f"{word!r} (now {now})": None
+        for word, now in zip(said, taken, strict=True)
+        if word and word.lower() != now
+    }
+    if unknown:
+        more = ", ..." if len(unknown) > 5 else ""
+        warnings.warn(
+            f"{path.name}: obstacles have a {name} that is none of {', '.join(allowed)}: "
+            f"{', '.join(list(unknown)[:5])}{more}. Correct it in the layer obstacles of the plan.",
+            FormatWarning,
+            stacklevel=3,
+        )
+    return taken
