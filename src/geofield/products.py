@@ -152,7 +152,7 @@ def make_report(
             "area_ha": _rounded(area_ha, 4),
             "perimeter_m": _rounded(field["perimeter_m"], 2),
             "longest_edge_m": _rounded(field["longest_edge_m"], 2),
-            "heading_deg": _rounded(field["heading_deg"], 3),
+            "heading_deg": _rounded(round(float(field["heading_deg"]), 3) % 180.0, 3),
             "method": field["method"],
             "certainty": _rounded(field["certainty"], 4),
             "doubts": _parts(field["doubts"]),

@@ -16,10 +16,12 @@ import pytest
 import shapely
 from click.testing import CliRunner
 
+import geofield as gf
 from geofield import schema
 from geofield.cli.main import cli
 from geofield.errors import FormatError, FormatWarning, GeofieldError, TrackError, TrackWarning
 from geofield.farm import read_farm
+from geofield.model.map_words import figures_in_words
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
 from geofield.tracks import plan_tracks
@@ -41,6 +43,21 @@ def run(*arguments: str | Path) -> dict[str, Any]:
     result = CliRunner().invoke(cli, ["tracks", *map(str, arguments), "--json"])
     assert result.exception is None, result.output
     return json.loads(result.stdout)
+
+
+def test_a_heading_just_west_of_north_is_not_shown_as_180(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    plan = tmp_path / "plan.gpkg"
+    arguments = [str(tmp_path / "parcel.gpkg"), "--spacing", "10", "--direction", "179.9997"]
+    result = CliRunner().invoke(cli, ["tracks", *arguments, "-o", str(plan)])
+    assert "heading 0.0 degrees" in result.output + result.stderr
+    read = gf.read_plan(plan)
+    assert read.tracks is not None
+    assert "heading 0.0 degrees" in repr(read.tracks)
+    assert "heading 0.0\N{DEGREE SIGN}" in "".join(figures_in_words(read.to_dataset()))
+    files = read.write(tmp_path / "out", formats=["report"])
+    (report,) = (each for each in files if each.name == "report.json")
+    assert json.loads(report.read_text(encoding="utf-8"))["field"]["heading_deg"] == 0.0
 
 
 def test_a_picture_is_told_where_parcels_are_wanted(tmp_path: Path) -> None:

@@ -229,9 +229,11 @@ def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
 
 def line_of(row: dict[str, Any]) -> str:
     """The figures of one field as a line for people."""
+    from geofield.model.map_words import heading_in_words
+
     text = (
         f"{row['name']}: {row['track_count']} tracks, {row['segment_count']} segments, "
-        f"{row['length_m']:.0f} m, heading {row['heading_deg']:.1f} degrees, "
+        f"{row['length_m']:.0f} m, heading {heading_in_words(row['heading_deg'])} degrees, "
         f"{row['coverage_percent']:.1f} % covered"
     )
     if "turn_count" in row:

@@ -161,11 +161,13 @@ def summarise(plan: Plan, files: list[Path], timings: dict[str, float]) -> None:
 
 
 def _say_tracks(tracks: Tracks) -> None:
+    from geofield.model.map_words import heading_in_words
+
     segments = tracks.segments
     say(
         f"Tracks     {len(tracks.lines)} in {len(segments)} segments, "
         f"{segments['length_m'].sum() / 1000:.2f} km, "
-        f"heading {tracks.heading_deg:.1f} degrees"
+        f"heading {heading_in_words(tracks.heading_deg)} degrees"
     )
     if tracks.turns is not None:
         _say_turns(tracks.turns)

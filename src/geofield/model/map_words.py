@@ -24,11 +24,11 @@ def figures_in_words(dataset: Dataset) -> list[str]:
     others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
     lines.append(counted(len(active(obstacles)), "obstacle") + (f" ({others})" if others else ""))
     if len(tracks):
-        heading = field["heading_deg"]
+        heading = f"{heading_in_words(field['heading_deg'])}\N{DEGREE SIGN}"
         lines.append(
             f"{counted(len(tracks), 'track')}, "
             f"{counted(int(tracks['segment_count'].sum()), 'segment')}, "
-            f"{tracks['length_m'].sum() / 1000:.2f} km, heading {heading:.1f}\N{DEGREE SIGN}"
+            f"{tracks['length_m'].sum() / 1000:.2f} km, heading {heading}"
         )
     return lines
 
@@ -57,6 +57,11 @@ def frame_lines(dataset: Dataset) -> list[shapely.LineString]:
     return [
         line for each in polygons for line in along_frame(each, dataset.crs, dataset.grid, shown_px)
     ]
+
+
+def heading_in_words(heading_deg: float) -> str:
+    """A track's heading to a tenth of a degree, from 0.0 to 179.9: 179.97 is north, as 0 is."""
+    return f"{round(heading_deg, 1) % 180.0:.1f}"
 
 
 def round_length_m(longest_m: float) -> float:

@@ -16,6 +16,7 @@ from geofield import schema
 from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
+from geofield.model.map_words import heading_in_words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
 from geofield.model.track_edits import TrackEdits, changed_twice, edits_in
@@ -119,7 +120,7 @@ class Tracks:
             "segments": str(len(self.segments)),
             "length": f"{self.segments['length_m'].sum() / 1000:.2f} km",
             "spacing": f"{self.spacing_m:g} m",
-            "heading": f"{self.heading_deg:.1f} degrees",
+            "heading": f"{heading_in_words(self.heading_deg)} degrees",
         }
         if self.turns is not None:
             unfit = int((self.turns["fits"] == "no").sum())

@@ -1,6 +1,6 @@
 // A plan on a page that is one file: picture, layers, what each thing is, legend.
 
-import {label, number, t, told} from "./words.js";
+import {heading, label, number, t, told} from "./words.js";
 import {cased, closed, driveFeatures, driveStyle, frameStyle, gapFeatures, gapStyle, legend, line, lonlatOf, obstacleFeature, obstacleStyle,
   outlineColor, setTheme, trackFeatures, trackStyle, turnStyle} from "./js";
 
@@ -70,7 +70,7 @@ map.on("pointermove", ({coordinate}) => {
 const f = plan.figures;
 const facts = [["area", `${number(plan.area_ha, 2)} ha`]];
 if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.length_m / 1000, 2)} km`], ["coverage", `${number(f.coverage_percent, 1)} %`],
-  ["heading", `${number(f.heading_deg, 1)}°`]);
+  ["heading", heading(f.heading_deg)]);
 if (f.turns) facts.push(["turns", String(f.turns)]);
 if (plan.obstacles.length) facts.push(["obstacles", String(plan.obstacles.length)]);
 document.getElementById("facts").replaceChildren(...facts.flatMap(([name, text]) => [node("dt", t(name)), node("dd", text)]));

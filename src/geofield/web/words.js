@@ -103,6 +103,9 @@ export const number = (value, digits = 0) =>
   value === null || value === undefined ? "–"
     : value.toLocaleString(language, {minimumFractionDigits: digits, maximumFractionDigits: digits});
 
+// A track's heading, from 0.0 to 179.9: 179.97 is north, as 0 is.
+export const heading = degrees => `${number(Math.round(degrees * 10) / 10 % 180, 1)}°`;
+
 // Writes the words into everything that has a data-t or data-label attribute.
 export function label(root = document) {
   document.documentElement.lang = language;

@@ -204,7 +204,7 @@ LOOKS: dict[str, Look] = {
         ),
         max_scale=REGION_SCALE,
         tip='<b>Track [% "track_no" %]</b>: [% round("length_m", 1) %] m, '
-        'heading [% round("heading_deg", 1) %]°<br>[% "segment_count" %] segments, '
+        'heading [% round("heading_deg", 1) % 180 %]°<br>[% "segment_count" %] segments, '
         '[% "gap_count" %] gaps',
     ),
     "segments": Look(

@@ -5,7 +5,7 @@ import * as maps from "./map.js";
 import * as tools from "./tools.js";
 import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
-import {currentLanguage, label, number, setLanguage, t, told} from "./web/words.js";
+import {currentLanguage, heading, label, number, setLanguage, t, told} from "./web/words.js";
 
 const $ = id => document.getElementById(id);
 let state, chosen = null, ended = false;
@@ -108,7 +108,7 @@ function showTracks(answer, moving = false) {
   $("figures").textContent = `${number(f.area_ha, 2)} ha · ${f.tracks} ${t("tracks")} · ${number(f.length_m / 1000, 2)} km · ${number(f.coverage_percent, 1)} %${unfit}`;
   const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} (${f.segments}), ${number(f.length_m)} m`],
     ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
-    ["heading", `${number(f.heading_deg, 1)}°`], ["lost_all", `${number(f.lost_m)} m`]];
+    ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
   if (f.turns !== null) facts.push(["turns", number(f.turns)]);
   $("facts").replaceChildren(...facts.flatMap(([name, value]) => [node("dt", t(name)), node("dd", value)]));
   $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
