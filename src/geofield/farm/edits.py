@@ -168,7 +168,7 @@ def _tracks(
         return {}
     there = edited_tracks.layers_in(overview)
     tables = {
-        of: lines_with_owners(table_in(overview, of, fields.crs), fields)
+        of: lines_with_owners(table_in(overview, of, fields.crs), fields, written)
         for of in edited_tracks.EDITED
         if of in there
     }

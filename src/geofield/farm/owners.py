@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,11 +39,17 @@ def obstacles_with_owners(
     return obstacles.assign(**{FIELD_ID: owners})
 
 
-def lines_with_owners(table: gpd.GeoDataFrame, fields: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """Lines that a person drew belong to the field that they lie in, or to the nearest."""
+def lines_with_owners(
+    table: gpd.GeoDataFrame, fields: gpd.GeoDataFrame, written: Collection[str]
+) -> gpd.GeoDataFrame:
+    """Lines that a person drew belong to the field that they lie in, or to the nearest.
+
+    Those of a field that was `written` and is deleted there are nobody's.
+    """
     shapes = table.geometry.to_numpy()
     known = table[FIELD_ID].isin(fields[FIELD_ID]).to_numpy()
-    new = ~known & ~shapely.is_missing(shapes) & ~shapely.is_empty(shapes)
+    gone = table[FIELD_ID].isin(list(written)).to_numpy() & ~known
+    new = ~known & ~gone & ~shapely.is_missing(shapes) & ~shapely.is_empty(shapes)
     if not new.any() or not len(fields):
         return table[known]
     tree = shapely.STRtree(fields.geometry.to_numpy())
