@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from geofield.farm.places import Places
     from geofield.farm.run import Count
     from geofield.farm.store import Store
-    from geofield.farm.work import Imagery
+    from geofield.farm.work import Imagery, Job
     from geofield.settings import Settings, Stage
 
 
@@ -143,7 +143,7 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("Name --workers or --scheduler, not both.")
     say(f"Places     {len(found)} of {places.name}")
-    waiting = take_in(store)
+    waiting = take_in(store, job)
     with (
         _overview_renewed(store, overview=overview),
         progress_bar(quiet=as_json) as progress,
@@ -160,7 +160,7 @@ def batch(
             f"{len(unused)} reviewed plans are of no id in {places.name}, and wait for one: "
             f"{', '.join(unused[:5])}."
         )
-    waiting = waiting and take_in(store, waiting)
+    waiting = waiting and take_in(store, job, waiting)
     files = finish(store, found, anew=count.done > count.before, overview=overview and not waiting)
     if as_json:
         echo_json({"farm": store.shown, "places": count.total, **count.statuses, "files": files})
@@ -204,7 +204,7 @@ def _overview_renewed(store: Store, *, overview: bool) -> Iterator[None]:
         raise
 
 
-def take_in(store: Store, only: list[str] | None = None) -> list[str]:
+def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
     """Take in what was edited in the overview; edited fields that have no plan.
 
     Before a run all edits; after it `only` those of fields that had no plan before.
@@ -219,7 +219,9 @@ def take_in(store: Store, only: list[str] | None = None) -> list[str]:
         take_in_place(store, one)
         say(f"Field      {one} as edited in {file_of(one)}: kept, its tracks planned again")
     overview = store.folder / OVERVIEW
-    edited, waiting = put_edits(store.folder, overview, only=only, anyway=only is not None)
+    edited, waiting = put_edits(
+        store.folder, overview, only=only, anyway=only is not None, around=job.standing
+    )
     for one in edited:
         say(f"Field      {one} as edited in {OVERVIEW}: kept, its tracks planned again")
     if waiting and only is not None:

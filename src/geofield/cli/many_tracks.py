@@ -126,14 +126,14 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
         return Here() if len(places) <= _FEW else Pool(cores())
 
     store, stays = Store.of(folder), folder == wanted.output
-    waiting = take_in(store) if stays else []
+    waiting = take_in(store, job) if stays else []
     with progress_bar(quiet=wanted.quiet) as progress:
 
         def tell(count: Count) -> None:
             progress(count.done, count.total, "fields")
 
         count = run_farm(places, job, store, engine, fresh=fresh, tell=tell)
-    waiting = waiting and take_in(store, waiting)
+    waiting = waiting and take_in(store, job, waiting)
     if stays:
         finish(store, places, anew=count.done > count.before, overview=not waiting)
     tell_unreached(job, outlines_in(store))

@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 import sqlite3
 import warnings
-from collections.abc import Collection, Iterable, Mapping
-from contextlib import closing
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from numbers import Real
 from pathlib import Path
@@ -23,17 +23,20 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.errors import FormatError, FormatWarning, GeofieldError
+from geofield.errors import FieldWarning, FormatError, FormatWarning, GeofieldError
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
-from geofield.farm.folder import REVIEWED
+from geofield.farm.folder import REVIEWED, Record
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.farm.neighbours import shared
 from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.reviewed import put_plans
+from geofield.farm.standing import with_further
 from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.model import Field
+from geofield.model.review import reconcile
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
@@ -56,6 +59,8 @@ TRACKS = "tracks_as_written"
 TAKEN = f"{REVIEWED}/.taken.json"
 #: Outlines that differ by less, in the units of the overview, are the same.
 _SAME = 1e-9
+#: Ground that an outline gained, square metres, that is worth a word.
+_LEAST_M2 = 1.0
 
 
 def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> None:
@@ -263,8 +268,13 @@ def is_overview(path: Path) -> bool:
         return False
 
 
-def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
-    """A plan as it was edited, its tracks planned again; `outlines` are the farm's, by id."""
+def _edited(
+    plan: Plan, edits: Edits, outlines: gpd.GeoSeries, around: gpd.GeoDataFrame | None
+) -> Plan:
+    """A plan as it was edited, with the tracks of before; `outlines` are the farm's, by id.
+
+    An outline that was moved has those obstacles `around` that stand in it now.
+    """
     field_id = plan.field.field_id
     fields, obstacles = edits.fields, edits.obstacles
     mine = fields[fields[FIELD_ID] == field_id]
@@ -275,7 +285,8 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
     field = replace(plan.field, own=own)
     if not pd.isna(row["name"]):
         field = replace(field, name=str(row["name"]))
-    if not shapely.equals_exact(outlines[field_id], mine.geometry.iloc[0], _SAME):
+    reshaped = not shapely.equals_exact(outlines[field_id], mine.geometry.iloc[0], _SAME)
+    if reshaped:
         field = replace(
             field, polygon=_polygon(row.geometry, field_id), method="drawn", quality=None
         )
@@ -285,11 +296,45 @@ def _edited(plan: Plan, edits: Edits, outlines: gpd.GeoSeries) -> Plan:
         table = table.drop(columns=[name for name in (FIELD_ID, EPSG) if name in table])
         table = table.rename(columns=edits.names.get(schema.OBSTACLES.name, {}))
         standing = schema.conform(schema.OBSTACLES, table, extras=True)
-    settings = plan.settings or Settings()
     if field_id in edits.driven:
         plan = edited_tracks.with_tracks(plan, edits.tracks, edits.names)
+    plan = replace(plan, field=field, obstacles=standing)
+    with _of_field(field_id):
+        if standing is not None:
+            standing, written = reconcile(standing, plan.evidence.written, plan.grid)
+            plan = replace(
+                plan, obstacles=standing, evidence=replace(plan.evidence, written=written)
+            )
+        return with_further(plan, around) if reshaped and around is not None else plan
+
+
+def _planned(plan: Plan) -> Plan:
+    """A plan with tracks as its settings say."""
+    with _of_field(plan.field.field_id):
+        return run_tracks(plan, settings=plan.settings or Settings())
+
+
+def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) -> None:
+    """Tell where an outline was moved over ground on which the file of obstacles was not read."""
+    file = ((Record.read(store) or Record()).imagery or {}).get("obstacles")
+    wider = [
+        one
+        for one, plan in edited.items()
+        if plan.field.polygon.difference(farm[one].field.polygon).area > _LEAST_M2
+    ]
+    if file and wider:
+        words = (
+            f"The obstacles of {file} are not looked up yet on ground that field "
+            f"{', '.join(wider[:5])} gained: `geofield batch` with --fresh does that."
+        )
+        warnings.warn(words, FieldWarning, stacklevel=3)
+
+
+@contextmanager
+def _of_field(field_id: str) -> Iterator[None]:
+    """Say whose edit it is that was refused."""
     try:
-        return run_tracks(replace(plan, field=field, obstacles=standing), settings=settings)
+        yield
     except GeofieldError as error:
         raise FormatError(
             f"Field {field_id}, as edited: {error.message}", hint=error.hint
@@ -346,16 +391,18 @@ def put_edits(
     only: Collection[str] | None = None,
     but: str | None = None,
     anyway: bool = False,
+    around: gpd.GeoDataFrame | None = None,
 ) -> tuple[list[str], list[str]]:
     """Take the edits of an overview into the farm, or `only` those of some fields.
 
     Fields that were changed elsewhere, too, are refused unless the edits are to hold `anyway`;
-    `but` is a field of which another plan is about to be put back.
+    `but` is a field of which another plan is about to be put back; `around` are the obstacles of
+    a file of their own, for outlines that were moved.
 
     Returns
     -------
     ids : list of str
-        The fields that are now as edited.
+        The fields that are now as edited, and those that an edited obstacle reaches into.
     waiting : list of str
         Edited fields of which the farm has no plan, or not yet.
 
@@ -384,10 +431,13 @@ def put_edits(
         return here, waiting
     outlines = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
     outlines = outlines.to_crs(edits.fields.crs)
-    plans = [_edited(farm[one], edits, outlines) for one in here]
+    edited = {one: _edited(farm[one], edits, outlines, around) for one in here}
+    plans = shared(edited, farm)
+    if around is None:
+        _tell_not_looked_up(store, farm, edited)
 
     def note() -> None:
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
 
-    put_plans(plans, store, note)
-    return here, waiting
+    put_plans([_planned(plan) for plan in plans.values()], store, note)
+    return list(plans), waiting

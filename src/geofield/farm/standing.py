@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -17,6 +17,9 @@ from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
 from geofield.farm.store import Store
+from geofield.model.obstacles import next_number
+from geofield.model.review import reconcile
+from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
 from geofield.plan import Plan
 
 if TYPE_CHECKING:
@@ -26,6 +29,10 @@ if TYPE_CHECKING:
 Shapes = Sequence[shapely.Geometry] | np.ndarray
 LINE_HALF_WIDTH_M = 0.05
 """A fence or wire drawn as a line becomes a strip of this half width."""
+#: What a plan was given of such a file, in its evidence.
+_GIVEN = "given"
+#: Shapes of a file that differ by less are the same, metres.
+_SAME_M = 0.05
 #: Points are wider than they look; the least that is looked at around a field.
 _NEAR_M = 100.0
 #: Rows of a file that have no shape, by their numbers from 1.
@@ -192,6 +199,54 @@ def outlines_in(store: Store) -> Iterator[np.ndarray]:
 def _near_m(standing: gpd.GeoDataFrame) -> float:
     """How far from a field something may stand that reaches into it, metres of its CRS."""
     return max(_NEAR_M, 1.1 * float(_reach_m(standing).max(initial=0.0)))
+
+
+def with_further(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
+    """A plan with those obstacles of a file that it was not given before.
+
+    What a person took away, moved or rejected of them stays so: an obstacle is taken in once.
+    """
+    known = list(plan.evidence.farm.get(_GIVEN, ()))
+    table = with_obstacles(Plan(plan.field), standing).obstacles
+    assert table is not None  # noqa: S101 - of a plan that had none
+    now = [list(one) if isinstance(one, tuple) else one for one in plain(table.geometry)]
+    given = {_GIVEN: [*known, *(one for one in now if one not in known)]}
+    evidence = replace(plan.evidence, farm={**plan.evidence.farm, **given})
+    if plan.obstacles is None:
+        return replace(plan, obstacles=table, evidence=evidence)
+    before, written = reconcile(plan.obstacles, plan.evidence.written, plan.grid)
+    shapes = shapes_of_plain([*map(_shape, known), *written.removed])
+    new = ~_is_one_of(table.geometry, np.concatenate([before.geometry.to_numpy(), shapes]))
+    if not new.any():
+        return plan
+    return with_rows(replace(plan, evidence=evidence), table[new])
+
+
+def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
+    """A plan with further obstacles, numbered behind its own."""
+    import pandas as pd
+
+    table, written = schema.empty(schema.OBSTACLES, plan.field.crs), plan.evidence.written
+    if plan.obstacles is not None:
+        table, written = reconcile(plan.obstacles, written, plan.grid)
+    first = next_number(table)
+    rows = rows.assign(obstacle_no=np.arange(first, first + len(rows)))
+    parts = [part for part in (table, rows) if len(part)]
+    joined = schema.conform(schema.OBSTACLES, pd.concat(parts, ignore_index=True), extras=True)
+    return replace(plan, obstacles=joined, evidence=replace(plan.evidence, written=written))
+
+
+def _shape(listed: Any) -> PlainShape:
+    return listed if isinstance(listed, str) else (listed[0], listed[1], listed[2])
+
+
+def _is_one_of(shapes: Any, others: Any) -> np.ndarray:
+    """Whether each is the same object as some other; a bent fence holds its own middle nowhere."""
+    mine = np.asarray(shapes, dtype=object)
+    known = matches(mine, others) >= 0
+    row, other = shapely.STRtree(others).query(mine, predicate="intersects")
+    known[row[same_shapes(mine[row], others[other], _SAME_M)]] = True
+    return known
 
 
 def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:

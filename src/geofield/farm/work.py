@@ -17,7 +17,7 @@ from geofield.earlier import drew_outline, with_said_tracks
 from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
-from geofield.farm.standing import obstacles_of, with_obstacles
+from geofield.farm.standing import obstacles_of, with_further
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.pipeline import run_field, run_obstacles, run_tracks
@@ -27,6 +27,8 @@ from geofield.tracks.outline import clean_outline
 from geofield.windows import WINDOW_M, open_scene, showing, wider
 
 if TYPE_CHECKING:
+    import geopandas as gpd
+
     from geofield.imagery import FetchOptions, PlacePicture
     from geofield.imagery.sources import Source
 
@@ -75,6 +77,11 @@ class Job:
     obstacles: Path | None = None
     #: Of that file, where it does not say its CRS.
     obstacles_crs: str | None = None
+
+    @property
+    def standing(self) -> gpd.GeoDataFrame | None:
+        """What stands in that file."""
+        return None if self.obstacles is None else obstacles_of(self.obstacles, self.obstacles_crs)
 
 
 def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
@@ -204,9 +211,7 @@ def _on_picture(
 
 def _around(plan: Plan, job: Job) -> Plan:
     """A plan with the obstacles of the user's file."""
-    if job.obstacles is None:
-        return plan
-    return with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
+    return plan if job.standing is None else with_further(plan, job.standing)
 
 
 def parcel_of(place: Place) -> Field:

@@ -42,6 +42,8 @@ class Evidence:
     searched: str | None = None
     #: Where the picture has data, pixel coordinates; None where that is all of it.
     shown_px: Shown | None = None
+    #: What a farm notes of a plan of its own, plain JSON values.
+    farm: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def obstacle_doubts(self) -> tuple[str, ...]:
@@ -89,6 +91,7 @@ class Evidence:
             "written": None if self.written is None else self.written.to_json(),
             "track_edits": self.track_edits.to_json() if self.track_edits else None,
             "said": said,
+            "farm": dict(self.farm) or None,
             "searched": self.searched,
             "tracks": None if tracks is None else dict(tracks),
         }
@@ -108,6 +111,7 @@ class Evidence:
             tuple(value.get("said", {}).get("tracks", ())),
             value.get("searched"),
             shown_from_json(value),
+            dict(value.get("farm", {})),
         )
 
 
