@@ -226,7 +226,13 @@ def test_names_and_columns_of_a_person_stay_with_other_settings(folder: Path) ->
 
 
 def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
+    def drawn(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        mine = table["field_id"] == "d"
+        table.loc[mine, "geometry"] = table.loc[mine].geometry.scale(0.8, 1)
+        return table
+
     _edit(folder, "obstacles", _tree_grown)
+    _edit(folder, "field", drawn)
     _batch(folder)
 
     def moved(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -236,13 +242,16 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
         return table.set_geometry(gpd.GeoSeries(shapes, crs=table.crs))
 
     _parcels(folder, moved)
-    _batch(folder, "--fresh")
+    said = " ".join(_batch(folder, "--fresh").split())
     status = gf.read_farm(folder / "farm").status.set_index("field_id")
     assert status["status"].to_dict() == {"a": "done", "b": "failed", "c": "done", "d": "done"}
     assert "reviewed as 'b' is of a field elsewhere" in status["error"]["b"]
-    assert status["notes"]["c"] == (
-        "The reviewed outline stands; that of the places differs by 0.14 ha."
-    )
+    # Of c an obstacle was reviewed, and the outline of d was drawn.
+    area_ha = gf.read_farm(folder / "farm").fields.set_index("field_id")["area_ha"]
+    assert area_ha["c"] == pytest.approx(0.9 * 1.44, rel=1e-3)
+    words = "The reviewed outline stands; that of the places differs by 0.29 ha."
+    assert status["notes"]["d"] == words
+    assert f"d: {words}" in said
     _parcels(folder, lambda table: table.assign(id=["a", "b", "C", "d"]))
     said = " ".join(_batch(folder, "--fresh").split())
     assert "1 reviewed plans are of no id in parcels.gpkg, and wait for one: reviewed/c" in said

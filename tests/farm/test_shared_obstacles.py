@@ -1,10 +1,11 @@
-"""What stands in several fields of a farm is avoided in each of them."""
+"""What stands in a field is avoided: beside a border, and in one that a person reviewed."""
 
 from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +14,20 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
+import shapely.affinity
 from pyproj import CRS
 
 import geofield as gf
+from geofield.errors import FieldWarning
 from geofield.farm.edits import put_edits
 from geofield.farm.finish import renew
 from geofield.farm.overview import write_overview
 from geofield.farm.places import Place
+from geofield.farm.reviewed import put_back
 from geofield.farm.store import Store
 from geofield.farm.work import Job, plan_place
+from geofield.pipeline import run_tracks
+from geofield.plan_files import save_plan
 from geofield.settings import Settings
 
 #: Three square fields of 100 m, 20 m apart, a tree in each.
@@ -124,3 +130,60 @@ def test_an_outline_moved_over_a_tree_of_the_file_avoids_it(farm: Path) -> None:
     put_edits(farm, farm / "farm.gpkg", around=job.standing)
     assert _inside_m(farm, "c", shed.buffer(4)) == 0
     assert len(gf.read_farm(farm)["c"].obstacles) == 2
+
+
+def test_a_reviewed_field_avoids_what_is_new_in_the_file(farm: Path) -> None:
+    """It was frozen; what a person took away or moved does not come back."""
+    trees, file = gpd.read_file(farm.parent / "trees.gpkg"), farm.parent / "more.gpkg"
+    bent = shapely.LineString([(X["a"] + 10, Y + 90), (X["a"] + 20, Y + 90), (X["a"] + 20, Y + 80)])
+    more = [shapely.Point(X["a"] + 40, Y + 50), shapely.Point(X["a"] + 30, Y + 20), bent]
+    pd.concat([trees, gpd.GeoDataFrame({"radius_m": [3.0] * 3}, geometry=more, crs=UTM)]).to_file(
+        file
+    )
+    job = replace(_job(farm.parent), obstacles=file)
+    plan = plan_place(_place("a"), job)
+    assert len(plan.obstacles) == 4
+    told = plan.obstacles.iloc[1:].copy()
+    told.loc[told.index[0], "geometry"] = shapely.affinity.translate(told.geometry.iloc[0], 0, 20)
+    reviewed = run_tracks(replace(plan, obstacles=told), settings=plan.settings)
+    again = plan_place(_place("a"), job, reviewed)
+    assert again.obstacles.geometry.equals(reviewed.obstacles.geometry)
+    new = shapely.Point(X["a"] + 80, Y + 80)
+    row = gpd.GeoDataFrame({"radius_m": [3.0]}, geometry=[new], crs=UTM)
+    pd.concat([gpd.read_file(file), row]).to_file(farm.parent / "newer.gpkg")
+    job = replace(_job(farm.parent), obstacles=farm.parent / "newer.gpkg")
+    again = plan_place(_place("a"), job, reviewed)
+    assert len(again.obstacles) == 4
+    assert again.obstacles.geometry.iloc[-1].contains(new)
+    assert not again.tracks.segments.intersects(new.buffer(2.9)).any()
+    assert plan_place(_place("a"), job, again).obstacles.equals(again.obstacles)
+
+
+def test_a_plan_put_back_has_what_the_farm_was_given_since(farm: Path) -> None:
+    save_plan(gf.read_farm(farm)["a"], farm.parent / "a.gpkg")
+    new = shapely.Point(X["a"] + 30, Y + 30)
+    row = gpd.GeoDataFrame({"radius_m": [3.0]}, geometry=[new], crs=UTM)
+    file = farm.parent / "trees.gpkg"
+    pd.concat([gpd.read_file(file), row]).to_file(farm.parent / "newer.gpkg")
+    job = replace(_job(farm.parent), obstacles=farm.parent / "newer.gpkg")
+    gf.Farm([plan_place(_place(one), job) for one in X]).write(farm, overwrite=True)
+    with pytest.warns(FieldWarning, match="planned again"):
+        put_back(farm.parent / "a.gpkg", farm)
+    assert _inside_m(farm, "a", new.buffer(3)) == 0
+
+
+def test_a_reviewed_field_gets_its_parcel_unless_its_outline_was_drawn(farm: Path) -> None:
+    job, plan = _job(farm.parent), gf.read_farm(farm)["a"]
+    wider = shapely.box(X["a"] - 50, Y, X["a"] + 100, Y + 100)
+    place = replace(_place("a"), outline=wider.wkb)
+    rejected = plan.obstacles.assign(status="rejected")
+    reviewed = run_tracks(replace(plan, obstacles=rejected), settings=plan.settings)
+    again = plan_place(place, job, reviewed)
+    assert again.field.polygon.equals(wider)
+    assert again.obstacles["status"].tolist() == ["rejected"]
+    assert again.tracks.segments.total_bounds[0] < X["a"] - 40
+    drawn = replace(plan.field, polygon=shapely.box(X["a"], Y, X["a"] + 100, Y + 90))
+    reviewed = run_tracks(replace(plan, field=drawn), settings=plan.settings)
+    with pytest.warns(FieldWarning, match="reviewed outline stands; that of the places differs by"):
+        again = plan_place(place, job, reviewed)
+    assert again.field.polygon.equals(drawn.polygon)

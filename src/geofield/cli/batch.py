@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from geofield.farm.work import Imagery, Job
     from geofield.settings import Settings, Stage
 
+#: Reviewed fields whose notes are told, each in a line.
+_TOLD = 10
+
 
 @click.command(
     cls=GroupedCommand,
@@ -119,7 +122,7 @@ def batch(
     """
     from geofield.farm.finish import finish
     from geofield.farm.limits import Limits
-    from geofield.farm.reviewed import without_place
+    from geofield.farm.reviewed import reviewed_rows, without_place
     from geofield.farm.run import run_farm
     from geofield.farm.standing import outlines_in
     from geofield.farm.store import Store
@@ -160,6 +163,9 @@ def batch(
             f"{len(unused)} reviewed plans are of no id in {places.name}, and wait for one: "
             f"{', '.join(unused[:5])}."
         )
+    reviewed = reviewed_rows(store)
+    if count.done > count.before:
+        _tell_notes(reviewed)
     waiting = waiting and take_in(store, job, waiting)
     files = finish(store, found, anew=count.done > count.before, overview=overview and not waiting)
     if as_json:
@@ -188,6 +194,15 @@ def _tell_unused(settings: Settings, places: Places, *, pictures: bool) -> None:
         )
     if not places.settings.num_columns:  # a column could choose another way for its field
         tell_idle(settings, unused=unused)
+
+
+def _tell_notes(reviewed: list[dict[str, Any]]) -> None:
+    """Say what the stages had to tell of fields that a person reviewed: it is about their word."""
+    told = [f"{row['field_id']}: {row['notes']}" for row in reviewed if row.get("notes")]
+    for words in told[:_TOLD]:
+        say_note(words)
+    if len(told) > _TOLD:
+        say_note(f"{len(told) - _TOLD} more reviewed fields have notes: see the farm's status.")
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part,
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
+from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
@@ -55,6 +56,13 @@ def file_of(field_id: str) -> str:
 def reviewed_files(store: Store) -> frozenset[str]:
     """The plans that a person put back, as :func:`file_of` names them."""
     return frozenset(f"{REVIEWED}/{name}" for name in store.names(REVIEWED))
+
+
+def reviewed_rows(store: Store) -> list[dict[str, Any]]:
+    """The status rows of fields that a person reviewed."""
+    tables = [read_part(store, STATUS, chunk) for chunk in committed(store)]
+    rows = [row for table in tables if table is not None for row in outcomes_of(table)]
+    return [row for row in rows if row["reviewed"]]
 
 
 def without_place(store: Store, ids: Iterable[str]) -> list[str]:
@@ -106,7 +114,8 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         )
     _refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
-    plan = _with_its_outline(plan, before)
+    if before is not None:
+        plan = with_given(_with_its_outline(plan, before), before)
     settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
@@ -145,9 +154,9 @@ def take_in_place(store: Store, field_id: str) -> None:
         When its tracks cannot be planned again.
     """
     edited = Path(store.place) / file_of(field_id)
-    settings = read_farm(store.place)[field_id].settings
-    plan = read_plan(edited)
-    plan = run_tracks(plan, settings=settings or plan.settings or Settings())
+    before = read_farm(store.place)[field_id]
+    plan = with_given(_with_its_outline(read_plan(edited), before), before)
+    plan = run_tracks(plan, settings=before.settings or plan.settings or Settings())
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         copy_whole(edited, file)
@@ -188,9 +197,9 @@ def _has_its_tracks(plan: Plan) -> bool:
     return plan.tracks is not None and recorded and is_planned(plan)
 
 
-def _with_its_outline(plan: Plan, before: Plan | None) -> Plan:
+def _with_its_outline(plan: Plan, before: Plan) -> Plan:
     """A plan whose outline counts as drawn where only the farm can tell that it was moved."""
-    if plan.evidence.outline is not None or before is None:
+    if plan.evidence.outline is not None:
         return plan
     if plan.field.polygon.equals_exact(before.field.polygon, 1e-6):
         return plan

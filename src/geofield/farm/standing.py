@@ -206,9 +206,22 @@ def with_further(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
 
     What a person took away, moved or rejected of them stays so: an obstacle is taken in once.
     """
-    known = list(plan.evidence.farm.get(_GIVEN, ()))
     table = with_obstacles(Plan(plan.field), standing).obstacles
-    assert table is not None  # noqa: S101 - of a plan that had none
+    return plan if table is None else _given(plan, table)
+
+
+def with_given(plan: Plan, before: Plan) -> Plan:
+    """A plan with what the farm's plan was given of such a file since this one was taken out."""
+    given = before.evidence.farm.get(_GIVEN, ())
+    if not given or before.obstacles is None or before.field.crs != plan.field.crs:
+        return plan
+    shapes = shapes_of_plain([*map(_shape, given)])
+    return _given(plan, before.obstacles[_is_one_of(before.obstacles.geometry, shapes)])
+
+
+def _given(plan: Plan, table: gpd.GeoDataFrame) -> Plan:
+    """A plan with those rows that are new to it."""
+    known = list(plan.evidence.farm.get(_GIVEN, ()))
     now = [list(one) if isinstance(one, tuple) else one for one in plain(table.geometry)]
     given = {_GIVEN: [*known, *(one for one in now if one not in known)]}
     evidence = replace(plan.evidence, farm={**plan.evidence.farm, **given})

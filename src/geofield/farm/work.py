@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _SHARED = 0.1
 #: Share by which they may differ before it is told.
 _PARTED = 0.01
+#: Outlines that differ by less are the same, metres.
+_SAME_M = 0.001
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,10 @@ class Job:
 
 
 def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
-    """The plan of one place; of a `previous` one, as a person left it, outline and obstacles stay.
+    """The plan of one place; of a `previous` one what a person said stays.
+
+    It gets the parcel as it is now, unless they drew its outline, and what is new in the file of
+    obstacles.
 
     Raises
     ------
@@ -96,11 +101,12 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     if not (np.isfinite(place.lat) and np.isfinite(place.lon)):
         raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
     if previous is not None:
+        reviewed, previous = previous, _around(_on_parcel(previous, place), job)
         place = _as_reviewed(place, previous)
         settings, said = with_said_tracks(settings, previous)
         for words in said:
             warnings.warn(words, FieldWarning, stacklevel=2)
-        if _same_stages(previous.settings, settings):
+        if previous is reviewed and _same_stages(previous.settings, settings):
             return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)
     if job.imagery is not None:
@@ -126,19 +132,8 @@ def _named(plan: Plan, place: Place) -> Plan:
 
 
 def _as_reviewed(place: Place, previous: Plan) -> Place:
-    """A place with the name and columns that a person left, at a point of their outline.
-
-    Raises
-    ------
-    FieldError
-        When what they reviewed is another field of that id.
-    """
+    """A place with the name and columns that a person left, at a point of their outline."""
     field = previous.field
-    if not (_holds(previous, place) if place.outline is None else _overlaps(previous, place)):
-        raise FieldError(
-            f"The plan that was reviewed as {place.field_id!r} is of a field elsewhere.",
-            hint="Give this place an id of its own, or take that plan out of the farm's reviewed/.",
-        )
     lon, lat = field.inside_lonlat
     known = {name for name, _ in field.own}
     own = (*field.own, *(each for each in place.own if each[0] not in known))
@@ -154,29 +149,53 @@ def _holds(previous: Plan, place: Place) -> bool:
     return told is not None and np.allclose(told, (place.lat, place.lon), rtol=0.0, atol=1e-6)
 
 
-def _overlaps(previous: Plan, place: Place) -> bool:
-    """Whether a reviewed field is that of a parcel; where that was changed since, it is told.
+def _on_parcel(previous: Plan, place: Place) -> Plan:
+    """A reviewed plan on its parcel as that is now; on its own outline where a person drew that.
+
+    Raises
+    ------
+    FieldError
+        When what they reviewed is another field of that id.
 
     Warns
     -----
     FieldWarning
-        With the area by which they differ.
+        With the area by which a drawn outline differs from the parcel.
     """
-    parcel = parcel_of(place)
-    there = reproject(previous.field.polygon, previous.field.crs, parcel.crs)
-    if not np.isfinite(there.bounds).all():
-        return False  # too far away for its metric CRS
-    least = min(parcel.polygon.area, there.area)
-    apart = parcel.polygon.symmetric_difference(there).area
-    if parcel.polygon.intersection(there).area < _SHARED * least:
-        return False
-    if apart > _PARTED * least and not drew_outline(previous):
+    parcel = None if place.outline is None else parcel_of(place)
+    if not (_holds(previous, place) if parcel is None else overlap(previous.field, parcel)):
+        raise FieldError(
+            f"The plan that was reviewed as {place.field_id!r} is of a field elsewhere.",
+            hint="Give this place an id of its own, or take that plan out of the farm's reviewed/.",
+        )
+    if parcel is None:
+        return previous
+    field = previous.field
+    polygon = reproject(parcel.polygon, parcel.crs, field.crs)
+    if polygon.equals_exact(field.polygon, _SAME_M):
+        return previous
+    # Of parcels that were reviewed without a record nobody knows who drew them.
+    given = field.method == "boundary" and previous.evidence.outline is not None
+    if given and not drew_outline(previous):
+        evidence = replace(previous.evidence, outline=outline_digest(polygon))
+        return replace(previous, field=replace(field, polygon=polygon), evidence=evidence)
+    apart = polygon.symmetric_difference(field.polygon).area
+    if apart > _PARTED * min(polygon.area, field.polygon.area):
         warnings.warn(
             f"The reviewed outline stands; that of the places differs by {apart / 10_000:.2f} ha.",
             FieldWarning,
             stacklevel=2,
         )
-    return True
+    return previous
+
+
+def overlap(field: Field, other: Field) -> bool:
+    """Whether two outlines are of one field: they share a part of the smaller one."""
+    there = reproject(field.polygon, field.crs, other.crs)
+    if not np.isfinite(there.bounds).all():
+        return False  # too far away for its metric CRS
+    least = min(other.polygon.area, there.area)
+    return bool(other.polygon.intersection(there).area >= _SHARED * least)
 
 
 def _same_stages(one: Settings | None, other: Settings) -> bool:
@@ -204,8 +223,9 @@ def _on_picture(
             picture.path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
             boundary=boundary, window=window, fetch_wider=picture.wider,
         )  # fmt: skip
-        if previous is None:
-            plan = _around(plan, job)
+        if previous is not None:
+            plan = replace(plan, evidence=replace(plan.evidence, farm=previous.evidence.farm))
+        plan = _around(plan, job)
         return run_obstacles(plan, plan.scene or window, settings=seen)
 
 
