@@ -37,6 +37,7 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     """Write the plan of field ID of FARM as a GeoPackage, for QGIS and `geofield review`."""
     from geofield.errors import FormatError
     from geofield.farm import read_farm
+    from geofield.farm.taken_out import taken_out
     from geofield.plan_files import save_plan
 
     whole = read_farm(folder)
@@ -45,7 +46,7 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
             f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
             hint="Its status table tells what became of each place.",
         )
-    save_plan(whole[field_id], output, overwrite=overwrite)
+    save_plan(taken_out(whole[field_id]), output, overwrite=overwrite)
     say(f"Plan       {output}")
 
 
@@ -78,7 +79,13 @@ Example:
 )
 @click.argument("plan_file", metavar="PLAN", type=OLD_PATH)
 @click.argument("folder", metavar="FARM")
-def put(plan_file: Path, folder: str) -> None:
+@click.option(
+    "--anyway",
+    is_flag=True,
+    help="Put it back although another one was put back since it was taken out; that stays in "
+    "FARM/reviewed as ID.gpkg.bak.",
+)
+def put(plan_file: Path, folder: str, anyway: bool) -> None:
     """Put the reviewed PLAN of one field back into FARM, or all fields edited in its farm.gpkg.
 
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
@@ -109,7 +116,7 @@ def put(plan_file: Path, folder: str) -> None:
                 hint="Go on with `geofield batch`: it takes them in when the field is planned.",
             )
     if alone:
-        ids.append(put_back(plan_file, folder))
+        ids.append(put_back(plan_file, folder, anyway=anyway))
     if ids:
         renew(store)
     for field_id in ids:

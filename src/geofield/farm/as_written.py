@@ -17,6 +17,8 @@ from geofield.farm.layers import EPSG, FIELD_ID
 if TYPE_CHECKING:
     import geopandas as gpd
 
+    from geofield.plan import Plan
+
 #: What a person may change, besides shapes.
 _FIELD_WORDS = ("name",)
 _OBSTACLE_WORDS = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
@@ -47,6 +49,21 @@ def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, st
                 row = of.name + json.dumps(told, sort_keys=True)
                 parts.setdefault(str(one), []).append(row.encode())
     return hashed(parts)
+
+
+def plan_digest(plan: Plan) -> str:
+    """A digest of all that a person may have said of one plan."""
+    tables = plan.to_dataset().tables
+    standing = tables.get(schema.OBSTACLES.name)
+    if standing is None:
+        standing = schema.empty(schema.OBSTACLES, plan.field.crs)
+    fields, obstacles = (
+        table.assign(**{FIELD_ID: ""}) for table in (tables[schema.FIELD.name], standing)
+    )
+    own = own_digests({schema.FIELD: fields, schema.OBSTACLES: obstacles})
+    settings = None if plan.settings is None else plan.settings.tracks.model_dump(mode="json")
+    told = [digests_of(fields, obstacles), own, plan.track_edits.to_json(), settings]
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def hashed(parts: Mapping[str, list[bytes]]) -> dict[str, str]:

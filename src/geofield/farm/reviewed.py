@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
+
+import numpy as np
 
 from geofield.earlier import is_planned
 from geofield.errors import FieldWarning, FormatError, GeofieldError
@@ -20,13 +22,15 @@ from geofield.farm.marks import CHANGED
 from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
+from geofield.farm.taken_out import note_put, refuse_changed
 from geofield.farm.value import read_farm
+from geofield.farm.work import is_near, overlap
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.settings import Settings
 from geofield.staging import refuse_locked, written_ns
-from geofield.staging.generations import copy_whole
+from geofield.staging.generations import copy_whole, earlier_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -55,7 +59,8 @@ def file_of(field_id: str) -> str:
 
 def reviewed_files(store: Store) -> frozenset[str]:
     """The plans that a person put back, as :func:`file_of` names them."""
-    return frozenset(f"{REVIEWED}/{name}" for name in store.names(REVIEWED))
+    names = (name for name in store.names(REVIEWED) if name.endswith(_SUFFIX))
+    return frozenset(f"{REVIEWED}/{name}" for name in names)
 
 
 def reviewed_rows(store: Store) -> list[dict[str, Any]]:
@@ -83,17 +88,19 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
         return read_plan(path)
 
 
-def put_back(plan_file: Path, folder: str | Path) -> str:
+def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> str:
     """Put a reviewed plan back into a farm, in the place of the one that is there; the field's id.
 
     The plan itself is kept in the farm, so that no later run changes what a person said. Tracks
     are planned again unless the plan's own record says that nothing was edited since they were.
+    One that a person put back is replaced by what was made from it, or by any `anyway`; it stays
+    beside as ``.bak``.
 
     Raises
     ------
     FormatError
-        When there is no such field in the farm, or the plan of it that was put back before was
-        edited since.
+        When there is no such field in the farm, or it lies elsewhere; when the plan of it that was
+        put back before is another than this one was made from, or was edited since.
     TrackError
         When its tracks cannot be planned again.
 
@@ -107,14 +114,19 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
     plan, farm = read_plan(plan_file), read_farm(folder)
     field_id = plan.field.field_id
-    if not _chunks_with(store, {field_id}):
+    chunks = _chunks_with(store, {field_id})
+    if not chunks:
         raise FormatError(
             f"{folder} has no field {field_id!r}.",
             hint="The field's id must be that of the farm: see its status table.",
         )
     _refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
+    _refuse_elsewhere(plan, before, chunks)
+    mine = store.folder is not None and _is_file(store.folder / file_of(field_id), plan_file)
     if before is not None:
+        if not (anyway or mine) and file_of(field_id) in reviewed_files(store):
+            refuse_changed(plan, before, plan_file, store)
         plan = with_given(_with_its_outline(plan, before), before)
     settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
@@ -140,7 +152,31 @@ def put_back(plan_file: Path, folder: str | Path) -> str:
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
     _replace(store, [plan])
+    if not mine:
+        note_put(read_farm(folder)[field_id], plan_file, store)
     return field_id
+
+
+def _is_file(there: Path, file: Path) -> bool:
+    """Whether a file is one that may be there."""
+    return there.is_file() and there.samefile(file)
+
+
+def _refuse_elsewhere(plan: Plan, before: Plan | None, chunks: Mapping[int, pa.Table]) -> None:
+    """Refuse a plan of other ground than the farm's of that id, or than its place without one."""
+    field = plan.field
+    if before is not None:
+        near = overlap(field, before.field)
+    else:
+        rows = [row for status in chunks.values() for row in outcomes_of(status)]
+        (row,) = [row for row in rows if row[FIELD_ID] == field.field_id]
+        near = is_near(field, row.get("lat", np.nan), row.get("lon", np.nan))
+    if not near:
+        raise FormatError(
+            f"This plan of {field.field_id!r} is of a field elsewhere: the farm's lies on other "
+            "ground.",
+            hint="Give it the id (field_id) of its own field, or put it into its own farm.",
+        )
 
 
 def take_in_place(store: Store, field_id: str) -> None:
@@ -166,10 +202,14 @@ def take_in_place(store: Store, field_id: str) -> None:
 
 
 def _put(store: Store, field_id: str, file: Path) -> None:
-    """Keep a reviewed plan, in the place of the one that is there."""
+    """Keep a reviewed plan, in the place of the one that is there, which stays beside it."""
     there = None if store.folder is None else store.folder / file_of(field_id)
     if there is not None and there.is_file():
         refuse_locked(there)
+        with tempfile.TemporaryDirectory(prefix="geofield-") as name:
+            copy_whole(there, earlier_of(Path(name) / there.name))
+            earlier = earlier_of(Path(name) / there.name).read_bytes()
+        store.put(f"{REVIEWED}/{earlier_of(there).name}", earlier)
     store.put(file_of(field_id), file.read_bytes())
 
 

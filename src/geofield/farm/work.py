@@ -198,6 +198,14 @@ def overlap(field: Field, other: Field) -> bool:
     return bool(other.polygon.intersection(there).area >= _SHARED * least)
 
 
+def is_near(field: Field, lat: float, lon: float) -> bool:
+    """Whether a field lies at a point, or no farther from it than it is wide."""
+    if not (np.isfinite(lat) and np.isfinite(lon)):
+        return True
+    point = shapely.Point(transformer(LONLAT, field.crs).transform(lon, lat))
+    return bool(field.polygon.distance(point) <= np.sqrt(field.polygon.area))
+
+
 def _same_stages(one: Settings | None, other: Settings) -> bool:
     """Whether both would have the stages do the same."""
     return one is not None and (one.field, one.obstacles, one.tracks) == (

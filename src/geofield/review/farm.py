@@ -66,7 +66,7 @@ class FarmDesk(Desk):
             with tempfile.TemporaryDirectory(prefix="geofield-") as name:
                 whole = Path(name) / "field.gpkg"
                 save_plan(self.session.plan, whole)
-                put_back(whole, self._folder)
+                put_back(whole, self._folder, anyway=True)  # compared above
             self._put_back = True
             self._there = self._in_farm()
             saved = {**super().save(), "saved_as": self._folder.name}

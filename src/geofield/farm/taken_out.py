@@ -1,0 +1,69 @@
+"""Plans that were taken out of a farm: whether what they are put over is what they came from.
+
+A plan that is taken out notes what the farm's plan said then. A farm notes which file each plan
+was put back from, so that the same file can be put back again and again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from geofield.errors import FormatError
+from geofield.farm.as_written import plan_digest
+from geofield.farm.folder import REVIEWED
+from geofield.farm.store import Store
+from geofield.plan import Plan
+
+#: Which file each plan was put back from, and a digest of what it said.
+PUT = f"{REVIEWED}/.put.json"
+#: What the farm's plan said, in the evidence of one that was taken out.
+_TAKEN = "taken"
+
+
+def taken_out(plan: Plan) -> Plan:
+    """A plan of a farm, noting what it says."""
+    farm = {**plan.evidence.farm, _TAKEN: plan_digest(plan)}
+    return replace(plan, evidence=replace(plan.evidence, farm=farm))
+
+
+def refuse_changed(plan: Plan, before: Plan, plan_file: Path, store: Store) -> None:
+    """Refuse to put a plan over one that a person put back since it was taken out.
+
+    Raises
+    ------
+    FormatError
+        With the ways on.
+    """
+    field_id, there = before.field.field_id, plan_digest(before)
+    taken = plan.evidence.farm.get(_TAKEN)
+    if there == taken or _puts(store).get(field_id) == [_name_of(plan_file), there]:
+        return
+    raise FormatError(
+        f"{store.shown} holds a reviewed plan of {field_id} from which {plan_file.name} was not "
+        "made."
+        if taken is None
+        else f"{field_id} was changed in {store.shown} since {plan_file.name} was taken out of it.",
+        hint="Take that plan out under another name (geofield farm get) and make your edits there; "
+        f"with --anyway {plan_file.name} takes its place, and it stays beside as .bak.",
+    )
+
+
+def note_put(plan: Plan, plan_file: Path, store: Store) -> None:
+    """Note from which file a plan of the farm was put back."""
+    puts = _puts(store) | {plan.field.field_id: [_name_of(plan_file), plan_digest(plan)]}
+    store.put(PUT, json.dumps(puts, sort_keys=True).encode())
+
+
+def _puts(store: Store) -> dict[str, Any]:
+    puts: dict[str, Any] = json.loads(store.get(PUT) or b"{}")
+    return puts
+
+
+def _name_of(file: Path) -> str:
+    """A file on this machine, without telling where it is."""
+    return hashlib.sha256(f"{platform.node()}:{file.resolve()}".encode()).hexdigest()[:16]
