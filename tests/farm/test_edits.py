@@ -242,7 +242,8 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
         return table.set_geometry(gpd.GeoSeries(shapes, crs=table.crs))
 
     _parcels(folder, moved)
-    said = " ".join(_batch(folder, "--fresh").split())
+    said = " ".join(_batch(folder, "--fresh", code=1).split())
+    assert "1 reviewed fields have no plan: b." in said
     status = gf.read_farm(folder / "farm").status.set_index("field_id")
     assert status["status"].to_dict() == {"a": "done", "b": "failed", "c": "done", "d": "done"}
     assert "reviewed as 'b' is of a field elsewhere" in status["error"]["b"]
@@ -253,7 +254,7 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
     assert status["notes"]["d"] == words
     assert f"d: {words}" in said
     _parcels(folder, lambda table: table.assign(id=["a", "b", "C", "d"]))
-    said = " ".join(_batch(folder, "--fresh").split())
+    said = " ".join(_batch(folder, "--fresh", code=1).split())
     assert "1 reviewed plans are of no id in parcels.gpkg, and wait for one: reviewed/c" in said
 
 

@@ -180,6 +180,12 @@ def batch(
         )
     if count.failed == count.total:
         raise GeofieldError("No place could be planned.", hint="The reasons are in failed.csv.")
+    without = [row["field_id"] for row in reviewed if row["status"] in ("failed", "lost")]
+    if without:
+        raise GeofieldError(
+            f"{len(without)} reviewed fields have no plan: {', '.join(without[:_TOLD])}.",
+            hint="The reasons are in failed.csv; what you said of them waits in reviewed/.",
+        )
 
 
 def _tell_unused(settings: Settings, places: Places, *, pictures: bool) -> None:
