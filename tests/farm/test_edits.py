@@ -20,7 +20,10 @@ from pyproj import CRS
 
 import geofield as gf
 from geofield.errors import FieldWarning
+from geofield.farm import reviewed
+from geofield.farm.edits import put_edits
 from geofield.farm.reviewed import put_back
+from geofield.farm.store import Store
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan
@@ -319,6 +322,30 @@ def test_a_field_edited_in_two_places_is_refused(folder: Path) -> None:
     geofield("farm", "put", path, farm)
     assert set(gf.read_farm(farm)["b"].obstacles["status"]) == {"added"}
     assert "as edited" not in _batch(folder)
+
+
+def test_edits_are_taken_in_after_a_kill_amid_that(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first of two plans is in place then, and the farm is as it was."""
+    farm, put = folder / "farm", reviewed._put
+    _edit(folder, "obstacles", _tree_grown)
+
+    def killed(store: Store, field_id: str, file: Path) -> None:
+        put(store, field_id, file)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reviewed, "_put", killed)
+    with pytest.raises(KeyboardInterrupt):
+        put_edits(farm, farm / "farm.gpkg")
+    assert [file.name for file in (farm / "reviewed").glob("*.gpkg")] == ["b.gpkg"]
+    said = _batch(folder)
+    assert "b as edited in farm.gpkg" in said
+    assert "c as edited in farm.gpkg" in said
+    after = gf.read_farm(farm)
+    assert after.status["reviewed"].tolist() == [False, True, True, False]
+    assert after["b"].obstacles.geometry.area.max() > 100
+    assert "rejected" in set(after["c"].obstacles["status"])
 
 
 def test_an_obstacle_copied_to_another_field_is_of_that_one(folder: Path) -> None:

@@ -27,11 +27,11 @@ from geofield.errors import FieldWarning, FormatError, FormatWarning, GeofieldEr
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
-from geofield.farm.folder import REVIEWED, Record
+from geofield.farm.folder import Record
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.farm.neighbours import shared
 from geofield.farm.owners import lines_with_owners, obstacles_with_owners
-from geofield.farm.reviewed import put_plans
+from geofield.farm.reviewed import TAKEN, put_plans
 from geofield.farm.standing import with_further
 from geofield.farm.store import Store
 from geofield.formats import origin
@@ -55,8 +55,6 @@ DETAILS = "has_obstacles"
 OWN = "own_as_written"
 #: And of the tracks of each field.
 TRACKS = "tracks_as_written"
-#: The edits that the farm holds already, while the overview is older than it.
-TAKEN = f"{REVIEWED}/.taken.json"
 #: Outlines that differ by less, in the units of the overview, are the same.
 _SAME = 1e-9
 #: Ground that an outline gained, square metres, that is worth a word.
@@ -436,8 +434,13 @@ def put_edits(
     if around is None:
         _tell_not_looked_up(store, farm, edited)
 
+    planned = [_planned(plan) for plan in plans.values()]
+    taken.pop("", None)
+
     def note() -> None:
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
 
-    put_plans([_planned(plan) for plan in plans.values()], store, note)
+    # Where all ends amid this, the same is done again, from the farm as it is until then.
+    store.put(TAKEN, json.dumps(taken | {"": [str(overview.absolute()), *plans]}).encode())
+    put_plans(planned, store, note)
     return list(plans), waiting

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _SUFFIX = ".gpkg"
+#: The edits of the overview that the farm holds already, while that is older than it; under no id,
+#: the overview and the fields of which edits are just being taken in.
+TAKEN = f"{REVIEWED}/.taken.json"
 #: Names of files may have 255 bytes, and what is half written has some more.
 _LONGEST = 200
 #: Of a status row that a person's plan took the place of.
@@ -269,7 +273,7 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
     FieldWarning
         When such a file cannot be read, or names another field.
     """
-    names = reviewed_files(store)
+    names = reviewed_files(store) - _begun(store)
     if only is not None:
         names &= {file_of(one) for one in only}
     if store.folder is None or not names:
@@ -286,6 +290,15 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
                 continue
             if _differs(file, farm[one]):
                 yield one
+
+
+def _begun(store: Store) -> frozenset[str]:
+    """Plans that a run put here which was killed before it had taken in all edits of an overview.
+
+    They are no edits made here, and are put again from the overview.
+    """
+    overview, *ids = json.loads(store.get(TAKEN) or b"{}").get("", [""])
+    return frozenset(map(file_of, ids) if Path(overview).is_file() else ())
 
 
 def _differs(file: Path, before: Plan) -> bool:
@@ -327,7 +340,9 @@ def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | No
         for plan in plans:
             save_plan(plan, file, overwrite=True)
             _put(store, plan.field.field_id, file)
-    _replace(store, plans, note)
+    if note is not None:
+        note()
+    _replace(store, plans)
 
 
 def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
@@ -340,7 +355,7 @@ def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
     }
 
 
-def _replace(store: Store, plans: Sequence[Plan], note: Callable[[], None] | None = None) -> None:
+def _replace(store: Store, plans: Sequence[Plan]) -> None:
     """Write chunks again with plans in the place of others."""
     by_id = {plan.field.field_id: plan for plan in plans}
     chunks = _chunks_with(store, by_id.keys())
@@ -348,8 +363,6 @@ def _replace(store: Store, plans: Sequence[Plan], note: Callable[[], None] | Non
         # Without it a chunk does not count: where all ends here, it is planned again.
         store.remove(file_in(STATUS, chunk))
     store.put(CHANGED, b"")
-    if note is not None:
-        note()
     for chunk, status in chunks.items():
         ids = status["field_id"].to_pylist()
         mine = {one: by_id[one] for one in ids if one in by_id}
