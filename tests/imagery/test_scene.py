@@ -148,6 +148,21 @@ def test_a_band_of_one_value_is_no_near_infrared(tmp_path: Path, kind: Any, name
     assert scene.valid.all()
 
 
+@pytest.mark.parametrize("top", [1, 255, 32767])
+@pytest.mark.parametrize("kind", [np.int16, np.uint16, np.float32])
+def test_alpha_is_known_by_its_values_whatever_their_type(
+    tmp_path: Path, kind: Any, top: int
+) -> None:
+    values = ground(bands=4).astype(kind) * 30
+    values[3], values[3, :, 100:] = top, 0
+    values[3, 40:50, 40:50] = int(top * 0.3)  # a feathered edge alone is no opaque one
+    named = [R, G, B, ALPHA]
+    path = write(tmp_path / "x.tif", values, interpretation=named, photometric="RGB")
+    reader = SceneReader.open(path)
+    assert reader.read().valid.sum() == 96 * 100 - 100
+    assert not reader.read((40, 40, 10, 10)).valid.any()
+
+
 @pytest.mark.parametrize("named", [None, ("red", "green", "blue", "alpha", "nir")])
 def test_the_mask_of_a_reprojected_picture_is_its_alpha_band(
     tmp_path: Path, named: tuple[str, ...] | None

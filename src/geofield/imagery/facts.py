@@ -13,7 +13,7 @@ from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from geofield.errors import CRSError
-from geofield.imagery.bands import BandRoles, Look, find_roles, look_of
+from geofield.imagery.bands import OPAQUE, BandRoles, Look, find_roles, look_of
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, to_pyproj
 from geofield.imagery.tags import notes_from_tags, roles_from_tags
 
@@ -61,14 +61,25 @@ def _sample(dataset: Any, band: int) -> NDArray[Any]:
     return np.concatenate([dataset.read(band, window=each).ravel() for each in windows])
 
 
-def opaque(alpha: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether an alpha band hides less than half."""
-    if alpha.dtype.kind in "ui":
-        top = 1 if alpha.max(initial=0) <= 1 else np.iinfo(alpha.dtype).max
-        if alpha.dtype == np.uint16 and alpha.max(initial=0) <= 255:
-            top = 255
-        return np.asarray(alpha.astype(np.float64) * 2 > top)
-    return np.asarray(alpha > 0)
+def top_of(dataset: Any, alpha: int | None) -> float | None:
+    """What an opaque pixel of a file's alpha band (0-based) holds: by its values, for all of it.
+
+    Alpha of 0 and 255 goes with pictures of any type.
+    """
+    if alpha is None:
+        return None
+    sample = _sample(dataset, alpha + 1)
+    most = float(np.nanmax(sample, initial=0))
+    ends = [end for end in OPAQUE if end >= most]
+    if sample.dtype.kind in "ui":
+        ends = [end for end in ends if end <= np.iinfo(sample.dtype).max]
+        ends.append(int(np.iinfo(sample.dtype).max))
+    return float(ends[0]) if ends else most
+
+
+def opaque(alpha: NDArray[Any], top: float) -> NDArray[np.bool_]:
+    """Whether an alpha band hides less than half; `top` hides nothing."""
+    return np.asarray(alpha.astype(np.float64) * 2 > top)
 
 
 def crs_of(dataset: Any, path: str) -> CRS:

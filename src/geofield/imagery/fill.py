@@ -28,13 +28,17 @@ _WINDOWS, _WINDOW_PX, _OVERVIEW_PX = 5, 128, 512
 
 
 def undeclared_fill(
-    dataset: Any, bands: Sequence[int], *, alpha: int | None = None
+    dataset: Any,
+    bands: Sequence[int],
+    *,
+    alpha: int | None = None,
+    top: float | None = None,
 ) -> float | None:
     """The value that bands (0-based) share where a picture of more than 8 bits shows nothing.
 
     It lies at the picture's frame, or is negative. It is decided from all of the picture, for each
     of its windows alike; what its `alpha` band hides does not count. None where there is no such
-    value, or the picture names its own.
+    value, or the picture names its own. `top` is what an opaque pixel of alpha holds.
     """
     names = dataset.dtypes
     kind = np.result_type(*(names[band] for band in bands))
@@ -42,7 +46,7 @@ def undeclared_fill(
     if said or kind == np.uint8:
         return None
     limits = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind)
-    values, at_frame = _looked_at(dataset, bands, alpha)
+    values, at_frame = _looked_at(dataset, bands, alpha, top)
     same = np.all(values == values[:1], axis=0)
     for fill in (*_USUAL, limits.min, limits.max):
         if not limits.min <= fill <= limits.max:
@@ -69,7 +73,7 @@ def _is_far(fill: float, ground: NDArray[Any], count: int) -> bool:
 
 
 def _looked_at(
-    dataset: Any, bands: Sequence[int], alpha: int | None
+    dataset: Any, bands: Sequence[int], alpha: int | None, top: float | None
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Values (bands, pixels) spread over a picture, and which lie at its frame."""
     size = dataset.shape
@@ -91,8 +95,8 @@ def _looked_at(
 
     at_frame = np.concatenate([_frame(each, (rows, columns), size).ravel() for each in windows])
     values = read(bands)
-    if alpha is not None:
-        shown = opaque(read([alpha])[0])
+    if alpha is not None and top is not None:
+        shown = opaque(read([alpha])[0], top)
         values, at_frame = values[:, shown], at_frame[shown]
     return values, at_frame
 

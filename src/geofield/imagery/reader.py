@@ -25,7 +25,7 @@ from geofield.crs import parse_crs
 from geofield.errors import ImageryError
 from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
-from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of
+from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of, top_of
 from geofield.imagery.fill import undeclared_fill
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading, to_rasterio
 from geofield.imagery.opening import OpenOptions
@@ -76,6 +76,8 @@ class SceneReader:
     nodata: float | None = None
     palette: tuple[tuple[int, int, int, int], ...] = ()
     has_mask: bool = False
+    #: What an opaque pixel of the alpha band holds.
+    opaque_at: float | None = None
     #: The first band's lowest value is white.
     negative: bool = False
     #: The scaling that made the file's own bytes.
@@ -125,9 +127,10 @@ class SceneReader:
                 roles = roles_of(dataset, options.bands) if not palette else BandRoles(("red",))
                 flags, tags = dataset.mask_flag_enums[0], dataset.tags()
                 has_mask = MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags
+                top = top_of(dataset, roles.alpha)
                 fill = None
                 if not palette and not has_mask:
-                    fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha)
+                    fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha, top=top)
             own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
@@ -147,6 +150,7 @@ class SceneReader:
                 palette=palette,
                 reach=reach,
                 has_mask=has_mask,
+                opaque_at=top,
                 negative=negative,
                 scaled_before=scaling_from_tags(tags) if dtype == "uint8" else None,
                 warped_from=place.warped_from,
@@ -316,9 +320,9 @@ class SceneReader:
             )
             valid = np.ones(shape, bool)
             nearest = {"window": window, "out_shape": shape, "resampling": Resampling.nearest}
-            if self.roles.alpha is not None:
+            if self.roles.alpha is not None and self.opaque_at is not None:
                 alpha = raster.read(self.roles.alpha + 1, **nearest)
-                valid &= opaque(alpha)
+                valid &= opaque(alpha, self.opaque_at)
             elif self.warped_from is not None:  # the mask that the warp added
                 valid &= raster.read(raster.count, **nearest) > 0
             elif self.has_mask:
