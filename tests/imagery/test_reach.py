@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,11 @@ import numpy as np
 import pytest
 import rasterio
 from affine import Affine
+from rasterio.control import GroundControlPoint
 
+from geofield.imagery import read_scene
+
+from .pictures import EAST, NORTH, UTM, ground
 from .tile_server import Handler, serving
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
@@ -122,6 +127,27 @@ def test_a_vrt_reads_its_own_folder(folder: Path) -> None:
     for name in ("a.vrt", "b.vrt"):
         done = cut(folder / name, "-o", folder / f"{name}.tif")
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "how", ["", "-order 2", "-tps", "-order 1 -refine_gcps 0.5 3", "-et 0", "-t_srs EPSG:32635"]
+)
+def test_a_vrt_that_warps_by_control_points_is_read(folder: Path, how: str) -> None:
+    """As `gdalwarp -of VRT` writes it: only numbers place its picture."""
+    if shutil.which("gdalwarp") is None:
+        pytest.skip("gdalwarp is not there")
+    points = [
+        GroundControlPoint(row, column, EAST + column / 2, NORTH - row / 2)
+        for row in (0, 32, 64)
+        for column in (0, 32, 64)
+    ]
+    profile = {"width": 64, "height": 64, "count": 3, "dtype": "uint8", "photometric": "RGB"}
+    source = folder / "points.tif"
+    with rasterio.open(source, "w", driver="GTiff", gcps=points, crs=UTM, **profile) as file:
+        file.write(ground(64, 64))
+    warped = folder / "warped.vrt"
+    subprocess.run(["gdalwarp", "-q", "-of", "VRT", *how.split(), source, warped], check=True)
+    assert read_scene(warped).valid.mean() > 0.8
 
 
 def test_a_vrt_reads_no_other_file_unless_allowed(folder: Path) -> None:

@@ -30,7 +30,8 @@ GDALWarpOptions WarpMemoryLimit ResampleAlg WorkingDataType Option BandList Band
 SrcNoDataReal SrcNoDataImag DstNoDataReal DstNoDataImag SrcAlphaBand DstAlphaBand Transformer
 ApproxTransformer MaxError BaseTransformer GenImgProjTransformer SrcGeoTransform
 SrcInvGeoTransform DstGeoTransform DstInvGeoTransform ReprojectTransformer ReprojectionTransformer
-Options PixelFunctionType PixelFunctionArguments SourceTransferType
+SrcGCPTransformer SrcTPSTransformer GCPTransformer TPSTransformer Order Reversed Refine MinimumGcps
+Tolerance Options PixelFunctionType PixelFunctionArguments SourceTransferType
 """
 #: Elements that hold figures and words, but never the name of a file.
 _PLAIN = frozenset(_WORDS.split())
