@@ -134,8 +134,12 @@ def test_validate_goes_on_behind_what_it_cannot_read(plan_file, tmp_path):
 
 def test_validate_knows_products_that_nothing_checks(plan_file, tmp_path):
     """The report of a run was called a GeoJSON file without features."""
-    run(export, plan_file, "-f", "report,csv", "--out", tmp_path)
-    for file in (tmp_path / "report.json", tmp_path / "csv" / "obstacles.csv"):
+    run(export, plan_file, "-f", "report,csv,html", "--out", tmp_path)
+    for file in (
+        tmp_path / "report.json",
+        tmp_path / "csv" / "obstacles.csv",
+        tmp_path / "field.html",
+    ):
         done = CliRunner().invoke(validate, [str(file), "--json"])
         assert done.exit_code == 0
         ((only,),) = json.loads(done.stdout).values()
@@ -159,6 +163,15 @@ def test_validate_passes_a_layer_that_is_empty(tmp_path, name):
     assert done.exit_code == 0
     ((only,),) = json.loads(done.stdout).values()
     assert (only["level"], only["message"]) == ("warning", "holds no geometries")
+
+
+def test_validate_knows_a_project_by_its_geopackage(plan_file):
+    project = plan_file.with_suffix(".qgz")
+    done = CliRunner().invoke(validate, [str(project)])
+    assert (done.exit_code, "check field.gpkg, which it shows" in done.output) == (0, True)
+    plan_file.rename(plan_file.with_name("other.gpkg"))
+    done = CliRunner().invoke(validate, [str(project)])
+    assert (done.exit_code, "field.gpkg, which it shows, is not" in done.output) == (1, True)
 
 
 def test_validate_finds_a_track_through_a_tree(tmp_path):

@@ -304,6 +304,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("{stem}.html",),
         ("field", "obstacles", "segments", "gaps", "headland_tracks", "route", "turns"),
         "geofield.web.html:write",
+        suffixes=(".html",),
         drops=(_ORIGIN,),
         crs="metric",
     ),

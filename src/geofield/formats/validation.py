@@ -60,6 +60,8 @@ def validate_file(path: Path | str) -> list[Finding]:
     if place.suffix.lower() == ".zip" and place.is_file():
         with unpacked(place) as folder:
             return validate_file(folder)
+    if place.suffix.lower() == ".qgz" and place.is_file():
+        return [_of_project(place)]
     found = detect(place)
     place = product_file(place, found)
     check = found.load_validator()
@@ -89,6 +91,18 @@ def validate_file(path: Path | str) -> list[Finding]:
         if issubclass(each.category, FormatWarning)
     ]
     return findings + list(check_dataset(dataset, with_segments="segments" in found.layers))
+
+
+def _of_project(project: Path) -> Finding:
+    """What there is to say of a QGIS project: it shows the GeoPackage of the same name."""
+    shown = project.with_suffix(".gpkg")
+    if not shown.is_file():
+        return Finding("error", project.name, f"{shown.name}, which it shows, is not beside it")
+    return Finding(
+        "warning",
+        project.name,
+        f"there is no check for QGIS projects; check {shown.name}, which it shows",
+    )
 
 
 def _one_field(dataset: Dataset, place: Path) -> Dataset:
