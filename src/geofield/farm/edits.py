@@ -11,35 +11,27 @@ from __future__ import annotations
 import json
 import sqlite3
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
-from numbers import Real
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
-import shapely
 
 from geofield import schema
-from geofield.errors import FieldWarning, FormatError, FormatWarning, GeofieldError
+from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import record_in, table_in, tell
-from geofield.farm.as_written import digests_of, own_digests, own_names, text_of
+from geofield.farm.as_written import digests_of, own_digests, own_names
+from geofield.farm.edited_plan import Edits, edited_plan, planned
 from geofield.farm.folder import Record
-from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.farm.layers import FIELD_ID
 from geofield.farm.neighbours import shared
 from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.reviewed import TAKEN, put_plans
-from geofield.farm.standing import with_further
 from geofield.farm.store import Store
 from geofield.formats import origin
-from geofield.model import Field
-from geofield.model.review import reconcile
-from geofield.pipeline import run_tracks
 from geofield.plan import Plan
-from geofield.settings import Settings
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -55,8 +47,6 @@ DETAILS = "has_obstacles"
 OWN = "own_as_written"
 #: And of the tracks of each field.
 TRACKS = "tracks_as_written"
-#: Outlines that differ by less, in the units of the overview, are the same.
-_SAME = 1e-9
 #: Ground that an outline gained, square metres, that is worth a word.
 _LEAST_M2 = 1.0
 
@@ -95,21 +85,6 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
         file.execute(
             "UPDATE gpkg_metadata SET metadata = ? WHERE md_standard_uri = ?", (text, origin.URI)
         )
-
-
-@dataclass(frozen=True)
-class Edits:
-    """What a person edited in an overview."""
-
-    #: By field id: the digests before and after.
-    marks: Mapping[str, str]
-    fields: gpd.GeoDataFrame
-    #: None where the overview has none.
-    obstacles: gpd.GeoDataFrame | None
-    names: edited_tracks.Names
-    #: Tracks and segments, and the fields where these were edited.
-    tracks: edited_tracks.Tables
-    driven: Collection[str]
 
 
 def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
@@ -266,52 +241,6 @@ def is_overview(path: Path) -> bool:
         return False
 
 
-def _edited(
-    plan: Plan, edits: Edits, outlines: gpd.GeoSeries, around: gpd.GeoDataFrame | None
-) -> Plan:
-    """A plan as it was edited, with the tracks of before; `outlines` are the farm's, by id.
-
-    An outline that was moved has those obstacles `around` that stand in it now.
-    """
-    field_id = plan.field.field_id
-    fields, obstacles = edits.fields, edits.obstacles
-    mine = fields[fields[FIELD_ID] == field_id]
-    row = mine.to_crs(plan.field.crs).iloc[0]
-    called = edits.names.get(schema.FIELD.name, {})
-    names = {name: called.get(name, name) for name in own_names(schema.FIELD, fields)}
-    own = _own_of(plan.field, row, names)
-    field = replace(plan.field, own=own)
-    if not pd.isna(row["name"]):
-        field = replace(field, name=str(row["name"]))
-    reshaped = not shapely.equals_exact(outlines[field_id], mine.geometry.iloc[0], _SAME)
-    if reshaped:
-        field = replace(
-            field, polygon=_polygon(row.geometry, field_id), method="drawn", quality=None
-        )
-    standing = plan.obstacles
-    if obstacles is not None:
-        table = obstacles[obstacles[FIELD_ID] == field_id].to_crs(field.crs)
-        table = table.drop(columns=[name for name in (FIELD_ID, EPSG) if name in table])
-        table = table.rename(columns=edits.names.get(schema.OBSTACLES.name, {}))
-        standing = schema.conform(schema.OBSTACLES, table, extras=True)
-    if field_id in edits.driven:
-        plan = edited_tracks.with_tracks(plan, edits.tracks, edits.names)
-    plan = replace(plan, field=field, obstacles=standing)
-    with _of_field(field_id):
-        if standing is not None:
-            standing, written = reconcile(standing, plan.evidence.written, plan.grid)
-            plan = replace(
-                plan, obstacles=standing, evidence=replace(plan.evidence, written=written)
-            )
-        return with_further(plan, around) if reshaped and around is not None else plan
-
-
-def _planned(plan: Plan) -> Plan:
-    """A plan with tracks as its settings say."""
-    with _of_field(plan.field.field_id):
-        return run_tracks(plan, settings=plan.settings or Settings())
-
-
 def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) -> None:
     """Tell where an outline was moved over ground on which the file of obstacles was not read."""
     file = ((Record.read(store) or Record()).imagery or {}).get("obstacles")
@@ -326,45 +255,6 @@ def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) ->
             f"{', '.join(wider[:5])} gained: `geofield batch` with --fresh does that."
         )
         warnings.warn(words, FieldWarning, stacklevel=3)
-
-
-@contextmanager
-def _of_field(field_id: str) -> Iterator[None]:
-    """Say whose edit it is that was refused."""
-    try:
-        yield
-    except GeofieldError as error:
-        raise FormatError(
-            f"Field {field_id}, as edited: {error.message}", hint=error.hint
-        ) from error
-
-
-def _own_of(
-    field: Field, row: pd.Series[Any], names: Mapping[str, str]
-) -> tuple[tuple[str, Any], ...]:
-    """The columns of a person's own, as they were where the file says the same."""
-    own = dict(field.own)
-    for there, name in names.items():
-        before, value = own.get(name), row[there]
-        if text_of(before) == text_of(value) or str(before) == str(value):
-            own.setdefault(name, None)
-        elif pd.isna(value):
-            own[name] = None
-        elif isinstance(before, int) and isinstance(value, Real) and float(value).is_integer():
-            own[name] = int(float(value))
-        else:
-            own[name] = value.item() if isinstance(value, np.generic) else value
-    return tuple(own.items())
-
-
-def _polygon(shape: Any, field_id: str) -> shapely.Polygon:
-    parts = [each for each in shapely.get_parts(shape) if isinstance(each, shapely.Polygon)]
-    if len(parts) != 1 or not parts[0].is_valid:
-        raise FormatError(
-            f"The outline of field {field_id} is no single polygon that does not cross itself.",
-            hint="Correct it in QGIS (Vector > Geometry Tools > Check Validity).",
-        )
-    return parts[0]
 
 
 def is_edited(folder: Path, overview: Path) -> bool:
@@ -429,12 +319,12 @@ def put_edits(
         return here, waiting
     outlines = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
     outlines = outlines.to_crs(edits.fields.crs)
-    edited = {one: _edited(farm[one], edits, outlines, around) for one in here}
+    edited = {one: edited_plan(farm[one], edits, outlines, around) for one in here}
     plans = shared(edited, farm)
     if around is None:
         _tell_not_looked_up(store, farm, edited)
 
-    planned = [_planned(plan) for plan in plans.values()]
+    put = [planned(plan) for plan in plans.values()]
     taken.pop("", None)
 
     def note() -> None:
@@ -442,5 +332,5 @@ def put_edits(
 
     # Where all ends amid this, the same is done again, from the farm as it is until then.
     store.put(TAKEN, json.dumps(taken | {"": [str(overview.absolute()), *plans]}).encode())
-    put_plans(planned, store, note)
+    put_plans(put, store, note)
     return list(plans), waiting
