@@ -94,6 +94,7 @@ def test_a_parcel_of_which_the_picture_shows_a_part_beside_its_middle(tmp_path: 
         pixels = opened.read(window=window)
     with rasterio.open(tmp_path / "part.tif", "w", **profile) as part:
         part.write(pixels)
+        part.set_band_description(4, "nir")
     lon, lat = TRUTH.field.inside_lonlat
     with pytest.warns(ObstacleWarning, match="does not show"):
         plan = plan_field(
