@@ -327,10 +327,12 @@ def put_edits(
     put = [planned(plan) for plan in plans.values()]
     taken.pop("", None)
 
+    def begin() -> None:
+        # Where all ends amid this, the same is done again, from the farm as it is until then.
+        store.put(TAKEN, json.dumps(taken | {"": [str(overview.absolute()), *plans]}).encode())
+
     def note() -> None:
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
 
-    # Where all ends amid this, the same is done again, from the farm as it is until then.
-    store.put(TAKEN, json.dumps(taken | {"": [str(overview.absolute()), *plans]}).encode())
-    put_plans(put, store, note)
+    put_plans(put, store, begin, note)
     return list(plans), waiting

@@ -332,16 +332,22 @@ def _own_of(plan: Plan) -> dict[str, Any]:
     return {name: value for name, value in plan.field.own if value is not None}
 
 
-def put_plans(plans: Sequence[Plan], store: Store, note: Callable[[], None] | None = None) -> None:
-    """Put plans of fields of the farm back; `note` is called when none of them can be lost."""
+def put_plans(
+    plans: Sequence[Plan], store: Store, begin: Callable[[], None], note: Callable[[], None]
+) -> None:
+    """Put plans of fields of the farm back.
+
+    `begin` is called when nothing speaks against that any more, and `note` when none of them can
+    be lost.
+    """
     _refuse_unseen(store, {plan.field.field_id for plan in plans})
+    begin()
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         for plan in plans:
             save_plan(plan, file, overwrite=True)
             _put(store, plan.field.field_id, file)
-    if note is not None:
-        note()
+    note()
     _replace(store, plans)
 
 
