@@ -143,7 +143,8 @@ def read_foreign(
     ]
     present = [RawLayer(each.name, _whole(each.frame)) for each in present if len(each.frame)]
     if not present:
-        raise EmptyFileError(f"{path} holds no geometries.")
+        rows = sum(len(each.frame) for each in layers)
+        raise (FormatError if rows else EmptyFileError)(f"{path} holds no geometries.")
     metric = _metric_of(present)
     own: dict[str, list[Any]] = {}
     foreign: list[RawLayer] = []

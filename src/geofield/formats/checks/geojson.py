@@ -37,6 +37,9 @@ def _check_file(file: Path) -> Iterator[Finding]:
 
 
 def _check_feature(feature: Any, where: str) -> Iterator[Finding]:
+    if not isinstance(feature, dict) or feature.get("type") != "Feature":
+        yield Finding("error", where, "no Feature (section 3.2)")
+        return
     geometry = feature.get("geometry")
     if geometry is None:
         yield Finding("warning", where, "no geometry")
