@@ -20,9 +20,8 @@ from pyproj import CRS
 
 import geofield as gf
 from geofield.errors import FieldWarning
-from geofield.farm import reviewed
 from geofield.farm.edits import put_edits
-from geofield.farm.reviewed import put_back
+from geofield.farm.put_back import _put, put_back
 from geofield.farm.store import Store
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.pipeline import run_tracks
@@ -328,14 +327,14 @@ def test_edits_are_taken_in_after_a_kill_amid_that(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first of two plans is in place then, and the farm is as it was."""
-    farm, put = folder / "farm", reviewed._put
+    farm = folder / "farm"
     _edit(folder, "obstacles", _tree_grown)
 
     def killed(store: Store, field_id: str, file: Path) -> None:
-        put(store, field_id, file)
+        _put(store, field_id, file)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reviewed, "_put", killed)
+    monkeypatch.setattr("geofield.farm.put_back._put", killed)
     with pytest.raises(KeyboardInterrupt):
         put_edits(farm, farm / "farm.gpkg")
     assert [file.name for file in (farm / "reviewed").glob("*.gpkg")] == ["b.gpkg"]

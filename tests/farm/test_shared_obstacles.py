@@ -23,7 +23,7 @@ from geofield.farm.edits import put_edits
 from geofield.farm.finish import renew
 from geofield.farm.overview import write_overview
 from geofield.farm.places import Place
-from geofield.farm.reviewed import put_back
+from geofield.farm.put_back import put_back
 from geofield.farm.store import Store
 from geofield.farm.work import Job, plan_place
 from geofield.pipeline import run_tracks

@@ -16,7 +16,7 @@ import geofield as gf
 from geofield import schema
 from geofield.cli.main import cli
 from geofield.errors import FormatError
-from geofield.farm.reviewed import put_back
+from geofield.farm.put_back import put_back
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan

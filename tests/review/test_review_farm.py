@@ -22,7 +22,7 @@ import geofield as gf
 from geofield.errors import ChangedError, GeofieldError
 from geofield.farm import read_farm
 from geofield.farm.edits import put_edits
-from geofield.farm.reviewed import put_back
+from geofield.farm.put_back import put_back
 from geofield.review import Session
 from geofield.review.shelf import Shelf
 

@@ -230,9 +230,11 @@ def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
 
     Before a run all edits; after it `only` those of fields that had no plan before.
     """
+    from geofield.farm.edited_in_place import edited_in_place
     from geofield.farm.edits import put_edits
     from geofield.farm.overview import OVERVIEW
-    from geofield.farm.reviewed import edited_in_place, file_of, take_in_place
+    from geofield.farm.put_back import take_in_place
+    from geofield.farm.reviewed import file_of
 
     if store.folder is None:
         return []

@@ -52,9 +52,10 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
 
 def say_waiting(folder: str | Path) -> None:
     """Tell of edits beside a farm that it does not hold yet: they are not in what is made of it."""
+    from geofield.farm.edited_in_place import edited_in_place
     from geofield.farm.edits import is_edited
     from geofield.farm.overview import OVERVIEW
-    from geofield.farm.reviewed import edited_in_place, file_of
+    from geofield.farm.reviewed import file_of
     from geofield.farm.store import Store
 
     store = Store.of(folder)
@@ -95,7 +96,7 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
     from geofield.farm.overview import OVERVIEW
-    from geofield.farm.reviewed import put_back
+    from geofield.farm.put_back import put_back
     from geofield.farm.store import Store
     from geofield.plan import read_plan
 

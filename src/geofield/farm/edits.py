@@ -23,12 +23,13 @@ from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names
+from geofield.farm.edited_in_place import BEGUN
 from geofield.farm.edited_plan import Edits, edited_plan, planned
-from geofield.farm.folder import Record
+from geofield.farm.folder import REVIEWED, Record
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.neighbours import shared
 from geofield.farm.owners import lines_with_owners, obstacles_with_owners
-from geofield.farm.reviewed import TAKEN, put_plans
+from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.plan import Plan
@@ -47,6 +48,8 @@ DETAILS = "has_obstacles"
 OWN = "own_as_written"
 #: And of the tracks of each field.
 TRACKS = "tracks_as_written"
+#: The edits that the farm holds already, while the overview is older than it.
+TAKEN = f"{REVIEWED}/.taken.json"
 #: Ground that an outline gained, square metres, that is worth a word.
 _LEAST_M2 = 1.0
 
@@ -325,14 +328,14 @@ def put_edits(
         _tell_not_looked_up(store, farm, edited)
 
     put = [planned(plan) for plan in plans.values()]
-    taken.pop("", None)
 
     def begin() -> None:
         # Where all ends amid this, the same is done again, from the farm as it is until then.
-        store.put(TAKEN, json.dumps(taken | {"": [str(overview.absolute()), *plans]}).encode())
+        store.put(BEGUN, json.dumps([str(overview.absolute()), *plans]).encode())
 
     def note() -> None:
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
+        store.remove(BEGUN)
 
     put_plans(put, store, begin, note)
     return list(plans), waiting

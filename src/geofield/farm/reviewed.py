@@ -3,47 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import tempfile
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
-from geofield.earlier import is_planned
-from geofield.errors import FieldWarning, FormatError, GeofieldError
-from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
-from geofield.farm.folder import file_of as file_in
-from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
-from geofield.farm.marks import CHANGED
-from geofield.farm.standing import with_given
-from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
+from geofield.errors import FormatError
+from geofield.farm.folder import REVIEWED, STATUS, committed, read_part
+from geofield.farm.status import outcomes_of
 from geofield.farm.store import Store
-from geofield.farm.taken_out import note_put, refuse_changed
-from geofield.farm.value import read_farm
-from geofield.farm.work import is_near, overlap
-from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
-from geofield.plan_files import save_plan
-from geofield.settings import Settings
-from geofield.staging import refuse_locked, written_ns
-from geofield.staging.generations import copy_whole, earlier_of
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-_SUFFIX = ".gpkg"
-#: The edits of the overview that the farm holds already, while that is older than it; under no id,
-#: the overview and the fields of which edits are just being taken in.
-TAKEN = f"{REVIEWED}/.taken.json"
+SUFFIX = ".gpkg"
 #: Names of files may have 255 bytes, and what is half written has some more.
 _LONGEST = 200
-#: Of a status row that a person's plan took the place of.
-_SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
 
 
 def name_of(field_id: str) -> str:
@@ -53,7 +27,7 @@ def name_of(field_id: str) -> str:
         stem = f"%2E{stem[1:]}"
     if len(stem) > _LONGEST:
         stem = f"{stem[:_LONGEST]}~{hashlib.sha256(field_id.encode()).hexdigest()[:16]}"
-    return f"{stem}{_SUFFIX}"
+    return f"{stem}{SUFFIX}"
 
 
 def file_of(field_id: str) -> str:
@@ -63,7 +37,7 @@ def file_of(field_id: str) -> str:
 
 def reviewed_files(store: Store) -> frozenset[str]:
     """The plans that a person put back, as :func:`file_of` names them."""
-    names = (name for name in store.names(REVIEWED) if name.endswith(_SUFFIX))
+    names = (name for name in store.names(REVIEWED) if name.endswith(SUFFIX))
     return frozenset(f"{REVIEWED}/{name}" for name in names)
 
 
@@ -90,315 +64,3 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
         path = Path(folder) / "field.gpkg"
         path.write_bytes(data)
         return read_plan(path)
-
-
-def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> str:
-    """Put a reviewed plan back into a farm, in the place of the one that is there; the field's id.
-
-    The plan itself is kept in the farm, so that no later run changes what a person said. Tracks
-    are planned again unless the plan's own record says that nothing was edited since they were.
-    One that a person put back is replaced by what was made from it, or by any `anyway`; it stays
-    beside as ``.bak``.
-
-    Raises
-    ------
-    FormatError
-        When there is no such field in the farm, or it lies elsewhere; when the plan of it that was
-        put back before is another than this one was made from, or was edited since.
-    TrackError
-        When its tracks cannot be planned again.
-
-    Warns
-    -----
-    FieldWarning
-        When its tracks were planned again.
-    """
-    store = Store.of(folder)
-    if Record.read(store) is None:
-        raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
-    plan, farm = read_plan(plan_file), read_farm(folder)
-    field_id = plan.field.field_id
-    chunks = _chunks_with(store, {field_id})
-    if not chunks:
-        raise FormatError(
-            f"{folder} has no field {field_id!r}.",
-            hint="The field's id must be that of the farm: see its status table.",
-        )
-    _refuse_unseen(store, {field_id}, but=plan_file)
-    before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
-    _refuse_elsewhere(plan, before, chunks)
-    mine = store.folder is not None and _is_file(store.folder / file_of(field_id), plan_file)
-    if before is not None:
-        if not (anyway or mine) and file_of(field_id) in reviewed_files(store):
-            refuse_changed(plan, before, plan_file, store)
-        plan = with_given(_with_its_outline(plan, before), before)
-    settings = plan.settings or (None if before is None else before.settings)
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        file = Path(name) / "field.gpkg"
-        whole = plan_file.suffix.lower() == _SUFFIX
-        if whole:
-            # With all that was written to it, also where a program has it open.
-            copy_whole(plan_file, file)
-        edited = plan.track_edits != plan.evidence.track_edits
-        if settings is not None and (edited or not _has_its_tracks(plan)):
-            if not edited:
-                why = (
-                    "there is no record of how its tracks were written, so they"
-                    if plan.tracks is None
-                    else "its tracks were not those of its outline and obstacles, and"
-                )
-                warnings.warn(
-                    f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2
-                )
-            plan, whole = run_tracks(plan, settings=settings), False
-        if not whole:
-            save_plan(plan, file, overwrite=True)
-        # First what must not be lost; the tables follow from it.
-        _put(store, field_id, file)
-    _replace(store, [plan])
-    if not mine:
-        note_put(read_farm(folder)[field_id], plan_file, store)
-    return field_id
-
-
-def _is_file(there: Path, file: Path) -> bool:
-    """Whether a file is one that may be there."""
-    return there.is_file() and there.samefile(file)
-
-
-def _refuse_elsewhere(plan: Plan, before: Plan | None, chunks: Mapping[int, pa.Table]) -> None:
-    """Refuse a plan of other ground than the farm's of that id, or than its place without one."""
-    field = plan.field
-    if before is not None:
-        near = overlap(field, before.field)
-    else:
-        rows = [row for status in chunks.values() for row in outcomes_of(status)]
-        (row,) = [row for row in rows if row[FIELD_ID] == field.field_id]
-        near = is_near(field, row.get("lat", np.nan), row.get("lon", np.nan))
-    if not near:
-        raise FormatError(
-            f"This plan of {field.field_id!r} is of a field elsewhere: the farm's lies on other "
-            "ground.",
-            hint="Give it the id (field_id) of its own field, or put it into its own farm.",
-        )
-
-
-def take_in_place(store: Store, field_id: str) -> None:
-    """Take in a plan that was edited in `reviewed/`, its tracks planned again as the farm's are.
-
-    Raises
-    ------
-    FormatError
-        When another program has it open.
-    TrackError
-        When its tracks cannot be planned again.
-    """
-    edited = Path(store.place) / file_of(field_id)
-    before = read_farm(store.place)[field_id]
-    plan = with_given(_with_its_outline(read_plan(edited), before), before)
-    plan = run_tracks(plan, settings=before.settings or plan.settings or Settings())
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        file = Path(name) / "field.gpkg"
-        copy_whole(edited, file)
-        save_plan(plan, file, overwrite=True)
-        _put(store, field_id, file)
-    _replace(store, [plan])
-
-
-def _put(store: Store, field_id: str, file: Path) -> None:
-    """Keep a reviewed plan, in the place of the one that is there, which stays beside it."""
-    there = None if store.folder is None else store.folder / file_of(field_id)
-    if there is not None and there.is_file():
-        refuse_locked(there)
-        with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-            copy_whole(there, earlier_of(Path(name) / there.name))
-            earlier = earlier_of(Path(name) / there.name).read_bytes()
-        store.put(f"{REVIEWED}/{earlier_of(there).name}", earlier)
-    store.put(file_of(field_id), file.read_bytes())
-
-
-def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> None:
-    """Refuse to write over plans in `reviewed/` whose edits the farm has not taken in."""
-    for one in edited_in_place(store, ids):
-        file = Path(store.place) / file_of(one)
-        if but is None or not file.samefile(but):
-            raise FormatError(
-                f"{file_of(one)} has edits that the farm does not hold yet.",
-                hint=f"Take them in first: geofield farm put {file} {store.place}; or move that "
-                "file out of the farm.",
-            )
-
-
-def _has_its_tracks(plan: Plan) -> bool:
-    """Whether a plan's record says that its tracks are those of its outline and obstacles.
-
-    What the farm has does not tell: tracks may have been planned before the last edit, and the
-    farm may have changed since.
-    """
-    recorded = plan.evidence.outline is not None and (
-        plan.obstacles is None or plan.obstacles.empty or plan.evidence.written is not None
-    )
-    return plan.tracks is not None and recorded and is_planned(plan)
-
-
-def _with_its_outline(plan: Plan, before: Plan) -> Plan:
-    """A plan whose outline counts as drawn where only the farm can tell that it was moved."""
-    if plan.evidence.outline is not None:
-        return plan
-    if plan.field.polygon.equals_exact(before.field.polygon, 1e-6):
-        return plan
-    return replace(plan, field=replace(plan.field, method="drawn", quality=None))
-
-
-def _same_ground(plan: Plan, other: Plan) -> bool:
-    """Whether outline and obstacles of two plans are the same."""
-    if not plan.field.polygon.equals_exact(other.field.polygon, 1e-6):
-        return False
-    # A file holds a layer without rows where none was looked for.
-    mine, theirs = (
-        None if one.obstacles is None or one.obstacles.empty else one.obstacles
-        for one in (plan, other)
-    )
-    return mine is theirs if mine is None or theirs is None else bool(mine.equals(theirs))
-
-
-def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]:
-    """Fields whose plan in `reviewed/` was edited there since the farm took it in.
-
-    Only those that the farm has a plan of, and `only` some where that is given; a file that is
-    newer, and says the same, is none.
-
-    Warns
-    -----
-    FieldWarning
-        When such a file cannot be read, or names another field.
-    """
-    names = reviewed_files(store) - _begun(store)
-    if only is not None:
-        names &= {file_of(one) for one in only}
-    if store.folder is None or not names:
-        return
-    farm = read_farm(store.place)
-    for chunk in committed(store):
-        taken_in_ns = written_ns(store.folder / file_in(STATUS, chunk))
-        status = read_part(store, STATUS, chunk, [FIELD_ID])
-        for one in [] if status is None else status[FIELD_ID].to_pylist():
-            if file_of(one) not in names or one not in farm:
-                continue
-            file = store.folder / file_of(one)
-            if written_ns(file) <= taken_in_ns:
-                continue
-            if _differs(file, farm[one]):
-                yield one
-
-
-def _begun(store: Store) -> frozenset[str]:
-    """Plans that a run put here which was killed before it had taken in all edits of an overview.
-
-    They are no edits made here, and are put again from the overview.
-    """
-    overview, *ids = json.loads(store.get(TAKEN) or b"{}").get("", [""])
-    return frozenset(map(file_of, ids) if Path(overview).is_file() else ())
-
-
-def _differs(file: Path, before: Plan) -> bool:
-    """Whether a reviewed plan was edited since the farm took it in; no, where it cannot be read."""
-    field_id = before.field.field_id
-    try:
-        plan = read_plan(file)
-        if plan.field.field_id != field_id:
-            raise FormatError(f"It is named {plan.field.field_id!r}, and not {field_id!r}.")
-        return _is_edited(plan, before)
-    except GeofieldError as error:
-        words = f"{file_of(field_id)} is not taken in: {error}"
-        warnings.warn(words, FieldWarning, stacklevel=3)
-        return False
-
-
-def _is_edited(plan: Plan, before: Plan) -> bool:
-    """Whether a reviewed plan says something else than the one that the farm made of it."""
-    known, said = plan.evidence.track_edits, before.evidence.track_edits
-    return (
-        not _same_ground(plan, before)
-        or plan.field.name != before.field.name
-        or _own_of(plan) != _own_of(before)
-        or plan.track_edits != known
-        or known != said
-    )
-
-
-def _own_of(plan: Plan) -> dict[str, Any]:
-    """What stands in the field's columns of a person's own."""
-    return {name: value for name, value in plan.field.own if value is not None}
-
-
-def put_plans(
-    plans: Sequence[Plan], store: Store, begin: Callable[[], None], note: Callable[[], None]
-) -> None:
-    """Put plans of fields of the farm back.
-
-    `begin` is called when nothing speaks against that any more, and `note` when none of them can
-    be lost.
-    """
-    _refuse_unseen(store, {plan.field.field_id for plan in plans})
-    begin()
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        file = Path(name) / "field.gpkg"
-        for plan in plans:
-            save_plan(plan, file, overwrite=True)
-            _put(store, plan.field.field_id, file)
-    note()
-    _replace(store, plans)
-
-
-def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
-    """The status of the chunks in which fields are."""
-    found = {chunk: read_part(store, STATUS, chunk) for chunk in committed(store)}
-    return {
-        chunk: status
-        for chunk, status in found.items()
-        if status is not None and not ids.isdisjoint(status["field_id"].to_pylist())
-    }
-
-
-def _replace(store: Store, plans: Sequence[Plan]) -> None:
-    """Write chunks again with plans in the place of others."""
-    by_id = {plan.field.field_id: plan for plan in plans}
-    chunks = _chunks_with(store, by_id.keys())
-    for chunk in chunks:
-        # Without it a chunk does not count: where all ends here, it is planned again.
-        store.remove(file_in(STATUS, chunk))
-    store.put(CHANGED, b"")
-    for chunk, status in chunks.items():
-        ids = status["field_id"].to_pylist()
-        mine = {one: by_id[one] for one in ids if one in by_id}
-        fresh = tables_of(mine.values())
-        tables = {name: read_part(store, name, chunk) for name in KEPT}
-        merged = {
-            name: _spliced(tables[name], fresh.get(name), list(mine), ids)
-            for name in KEPT
-            if name in fresh or tables[name] is not None
-        }
-        rows = [
-            row | outcome_words(mine[row["field_id"]]) | _SAID if row["field_id"] in mine else row
-            for row in outcomes_of(status)
-        ]
-        write_chunk(store, chunk, merged, status_table([Outcome(**row) for row in rows]))
-
-
-def _spliced(old: Any, new: Any, mine: list[str], ids: list[str]) -> pa.Table:
-    """A table with the rows of some fields exchanged, the fields in their order."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    rest = (
-        None
-        if old is None
-        else old.filter(pc.invert(pc.is_in(old["field_id"], pa.array(mine, pa.string()))))
-    )
-    parts = [part for part in (rest, new) if part is not None]
-    whole = stacked(parts)
-    at = pc.index_in(whole["field_id"], pa.array(ids, pa.string()))
-    order = pc.sort_indices(pa.table({"at": at, "row": range(len(whole))}),
-                            sort_keys=[("at", "ascending"), ("row", "ascending")])  # fmt: skip
-    return whole.take(order)

@@ -18,7 +18,8 @@ from geofield.farm.finish import renew_unless_edited
 from geofield.farm.folder import Record
 from geofield.farm.marks import CHANGED
 from geofield.farm.overview import OVERVIEW
-from geofield.farm.reviewed import name_of, put_back
+from geofield.farm.put_back import put_back
+from geofield.farm.reviewed import name_of
 from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
