@@ -25,7 +25,7 @@ from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import REACH_M, WarpOrigin
 from geofield.imagery.reader import SceneReader
-from geofield.model.scene import Scene, swapped
+from geofield.model.scene import swapped
 
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
@@ -68,31 +68,22 @@ class CollectionReader(SceneReader):
     #: Pictures that cannot be joined, and where they lie.
     left_out: tuple[tuple[str, _Box], ...] = ()
 
-    def read(
-        self,
-        window: tuple[int, int, int, int] | None = None,
-        *,
-        shape_px: tuple[int, int] | None = None,
-        scaling: tuple[float, float] | None = None,
-    ) -> Scene:
-        """Read a part: the bands that all pictures there have; see `SceneReader.read`."""
-        column, row, width, height = window or (0, 0, self.grid.width_px, self.grid.height_px)
-        box = (column, row, column + width, row + height)
+    def _for(self, box: _Box) -> SceneReader:
+        """The reader of a part: with the bands that all pictures there have."""
         there = [part for part in self.parts if _meet(part.bounds, box)]
         common = [role for role in self.shown_roles if all(part.picks([role]) for part in there)]
-        reader, lost = self, [role for role in self.shown_roles if role not in common]
+        lost = [role for role in self.shown_roles if role not in common]
+        guesses, roles = self.guesses, self.roles
         if lost:
             less = next(part.reader for part in there if not part.picks(lost))
-            guess = (
+            roles = BandRoles(tuple(common))
+            guesses += (
                 f"Read without {' and '.join(lost)}, which {display_name(less.path)} does not "
-                "have; take it out of the set to have it."
+                "have; take it out of the set to have it.",
             )
-            reader = replace(self, roles=BandRoles(tuple(common)), guesses=(*self.guesses, guess))
-        return SceneReader.read(reader, window, shape_px=shape_px, scaling=scaling)
-
-    def _guesses_in(self, box: _Box) -> tuple[str, ...]:
         out = [why for why, place in self.left_out if _meet(place, box)]
-        return (*self.guesses, _told(out)) if out else self.guesses
+        guesses += (_told(out),) if out else ()
+        return replace(self, roles=roles, guesses=guesses)
 
     def _pixels(
         self, window: Window, shape: tuple[int, int]

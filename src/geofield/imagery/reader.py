@@ -254,28 +254,28 @@ class SceneReader:
                 f"the picture of {self.grid.width_px} x {self.grid.height_px} px."
             )
         grid = self.grid.crop(column, row, width, height)
-        guesses = self._guesses_in((column, row, right, bottom))
-        notes = (*self.notes, *guesses)
+        there = self._for((column, row, right, bottom))
+        notes = (*self.notes, *there.guesses)
         if shape_px is not None and shape_px != (height, width):
             grid = grid.resized(shape_px[1], shape_px[0])
             notes += (
                 f"Read at {grid.ground_resolution_m:.3g} m per pixel instead of "
                 f"{self.grid.ground_resolution_m:.3g} m.",
             )
-        values, valid = self._pixels(Window(column, row, width, height), grid.shape)
+        values, valid = there._pixels(Window(column, row, width, height), grid.shape)
         if self.palette:
             roles: tuple[str, ...] = ("red", "green", "blue")
             bands, limits = values.astype(np.uint8), None
         else:
-            roles = self.shown_roles
+            roles = there.shown_roles
             bands, limits, more = self._scaled(values, roles, valid, scaling or self.scaling)
             notes += more
         bands = np.where(valid, bands, np.uint8(0))
-        return Scene(grid, bands, roles, valid, self.source, limits, notes, guesses)
+        return Scene(grid, bands, roles, valid, self.source, limits, notes, there.guesses)
 
-    def _guesses_in(self, box: tuple[int, int, int, int]) -> tuple[str, ...]:
-        """What had to be guessed about a part: left, top, right, bottom, pixels."""
-        return self.guesses
+    def _for(self, box: tuple[int, int, int, int]) -> SceneReader:
+        """The reader of a part (left, top, right, bottom, pixels): what it has and is guessed."""
+        return self
 
     def _scaled(
         self,
