@@ -353,9 +353,14 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
 
     field = plan.field
     _refuse_too_wide(field, settings.tracks.spacing_m)
-    edits = plan.track_edits
     tracks = plan_with_settings(
-        field.polygon, plan.obstacles, settings.tracks, crs=field.crs, grid=plan.grid, edits=edits
+        field.polygon,
+        plan.obstacles,
+        settings.tracks,
+        crs=field.crs,
+        grid=plan.grid,
+        outside=plan.frame_lines,
+        edits=plan.track_edits,
     )
     if not (len(tracks.rows()[schema.TRACKS.name]) or tracks.blocked_count or tracks.edits.edits):
         raise TrackError(

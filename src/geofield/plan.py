@@ -357,7 +357,7 @@ class Plan:
 
         one = self.field
         baseline = find_baseline(
-            one.polygon, "longest_edge", one.crs, strips=Strips(1.0), grid=self.grid
+            one.polygon, "longest_edge", one.crs, strips=Strips(1.0), outside=self.frame_lines
         )
         edge = baseline.edge
         edge_m = None if edge is None else edge.length / ground_scale_of(one.polygon, one.crs)

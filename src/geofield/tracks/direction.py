@@ -7,6 +7,7 @@ by the meridian convergence. Baselines are in the CRS; headings are converted he
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,9 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import grid_north_deg, ground_scale
 from geofield.errors import TrackError
-from geofield.grid import Grid
 from geofield.methods import LONGEST_EDGE, method
-from geofield.model.frame import picture_frame
 from geofield.tracks.dominant import dominant_edge
 from geofield.tracks.fewest import fewest_direction
 from geofield.tracks.frame import true_heading_deg
@@ -56,7 +55,7 @@ def find_baseline(
     *,
     strips: Strips,
     tolerance_m: float = 1.0,
-    grid: Grid | None = None,
+    outside: Sequence[LineString] = (),
     area: BaseGeometry | None = None,
     through: tuple[float, float] | None = None,
 ) -> Baseline:
@@ -74,8 +73,8 @@ def find_baseline(
         How tracks are laid, which ``fewest`` and ``fewest_turns`` count.
     tolerance_m : float
         Half the width of the band within which an edge counts as straight.
-    grid : Grid, optional
-        Of the picture that the outline was found in: its frame is no edge of the field.
+    outside : sequence of LineString
+        Where the outline is the edge of the picture that it was found in, and none of the field.
     area : polygon or multi-polygon, optional
         What is left of the field without its headland, where tracks are counted.
     through : (x, y), optional
@@ -91,11 +90,10 @@ def find_baseline(
     scale = ground_scale(crs, centre.x, centre.y)
     if isinstance(direction, str):
         if direction in ("dominant", "longest_edge"):
-            frame = None if grid is None else picture_frame(grid, crs)
             if direction == "longest_edge":
-                edge = longest_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
+                edge = longest_edge(polygon, tolerance=tolerance_m * scale, outside=outside)
                 return _from_edge(edge, north)
-            edge, share = dominant_edge(polygon, tolerance=tolerance_m * scale, frame=frame)
+            edge, share = dominant_edge(polygon, tolerance=tolerance_m * scale, outside=outside)
             why = (
                 f"along an edge of {edge.length / scale:.0f} m; {100.0 * share:.0f} % of the "
                 "border run that way"

@@ -8,10 +8,11 @@ a few degrees of them, and the tracks follow the longest straight run among thos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from shapely import Polygon
+from shapely import LineString, Polygon
 
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.longest_edge import StraightRun, longest_run, own_edges
@@ -26,14 +27,14 @@ _MOST_CELLS = 100_000
 
 
 def dominant_edge(
-    polygon: Polygon, *, tolerance: float = 1.0, frame: Polygon | None = None
+    polygon: Polygon, *, tolerance: float = 1.0, outside: Sequence[LineString] = ()
 ) -> tuple[StraightRun, float]:
     """Find the edge that tracks follow, and what share of the border runs its way.
 
     Arguments are those of :func:`geofield.tracks.longest_edge.longest_edge`. The share, 0 to 1, is
-    that of the field's own border (without the picture's frame) within a few degrees.
+    that of the field's own border (without the picture's edge) within a few degrees.
     """
-    xy, barred = own_edges(polygon, tolerance, frame)
+    xy, barred = own_edges(polygon, tolerance, outside)
     offset = np.roll(xy, -1, axis=0) - xy
     length = np.where(barred, 0.0, np.hypot(offset[:, 0], offset[:, 1]))
     angle = np.degrees(np.arctan2(offset[:, 1], offset[:, 0])) % 180.0

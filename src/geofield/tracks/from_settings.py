@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 from pyproj import CRS
-from shapely import Polygon
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import LONLAT, transformer
@@ -36,13 +37,14 @@ def plan_with_settings(
     *,
     crs: Any,
     grid: Grid | None = None,
+    outside: Sequence[LineString] | None = None,
     edits: TrackEdits | None = None,
 ) -> Tracks:
     """Plan tracks and, when `settings.route` names a pattern, the route through them.
 
     Parameters
     ----------
-    polygon, obstacles, crs, grid, edits
+    polygon, obstacles, crs, grid, outside, edits
         As for `plan_tracks`.
     settings : TrackSettings
         Places in it are longitude and latitude.
@@ -66,6 +68,7 @@ def plan_with_settings(
         if through is None
         else _place(through, metric_crs, polygon, "place to pass through"),
         grid=grid,
+        outside=outside,
         edits=edits,
         **{name: getattr(settings, name) for name in _OF_TRACKS},
     )

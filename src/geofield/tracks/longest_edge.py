@@ -8,16 +8,17 @@ the piecewise linear approximation of planar curves"), from all first vertices a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Polygon
+from shapely import LineString, Polygon
 
 from geofield.tracks.frame import FloatArray
 
-#: An outline of which less than this is not the picture's frame has no edge of its own.
+#: An outline of which less than this is not the picture's edge has no edge of its own.
 _REAL_SHARE = 0.15
 
 
@@ -43,7 +44,7 @@ class StraightRun:
 
 
 def longest_edge(
-    polygon: Polygon, *, tolerance: float = 1.0, frame: Polygon | None = None
+    polygon: Polygon, *, tolerance: float = 1.0, outside: Sequence[LineString] = ()
 ) -> StraightRun:
     """Find the longest straight run of a polygon's outer ring.
 
@@ -54,30 +55,33 @@ def longest_edge(
     tolerance : float
         How far a vertex may lie from the line, in units of the CRS. The default is that of
         outlines digitised from imagery of half a metre per pixel.
-    frame : shapely.Polygon, optional
-        The picture that the outline was found in. Where the outline runs along it, the field goes
-        on outside: that is no edge of the field, and nobody drives along it.
+    outside : sequence of LineString
+        Where the field goes on outside the picture that its outline was found in
+        (:func:`geofield.model.frame.along_frame`): that is no edge of the field, and nobody drives
+        along it.
 
     Returns
     -------
     StraightRun
     """
-    xy, barred = own_edges(polygon, tolerance, frame)
+    xy, barred = own_edges(polygon, tolerance, outside)
     return longest_run(xy, tolerance, barred)
 
 
 def own_edges(
-    polygon: Polygon, tolerance: float, frame: Polygon | None
+    polygon: Polygon, tolerance: float, outside: Sequence[LineString]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Vertices of the outer ring, and which edges from them run along the picture's frame."""
+    """Vertices of the outer ring, and which edges from them are the picture's."""
     ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
     if shapely.get_num_coordinates(ring) > 400:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
         ring = shapely.simplify(ring, tolerance / 4.0)
     xy = shapely.get_coordinates(ring)[:-1]
     barred = np.zeros(len(xy), dtype=bool)
-    if frame is not None:
-        barred = _along_frame(xy, frame, 2.0 * tolerance)
+    if outside:
+        edges = shapely.linestrings(np.stack([xy, np.roll(xy, -1, axis=0)], axis=1))
+        strip = shapely.union_all(shapely.buffer(np.asarray(outside), 2.0 * tolerance))
+        barred = np.asarray(shapely.covered_by(edges, strip))
         lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
         if lengths[~barred].sum() < _REAL_SHARE * lengths.sum():
             barred[:] = False
@@ -110,15 +114,6 @@ def fit_run(run: FloatArray) -> StraightRun:
         start = centre + axis * (axis @ (start - centre))
         end = centre + axis * (axis @ (end - centre))
     return StraightRun(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
-
-
-def _along_frame(xy: FloatArray, frame: Polygon, tolerance: float) -> NDArray[np.bool_]:
-    """Which edges of a ring run along one side of the frame."""
-    corners = shapely.get_coordinates(frame.exterior)
-    sides = np.asarray(shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1)))
-    points = np.asarray(shapely.points(xy))
-    near = shapely.distance(points[:, None], sides[None, :]) <= tolerance
-    return np.asarray((near & np.roll(near, -1, axis=0)).any(axis=1))
 
 
 def _longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) -> tuple[int, int]:

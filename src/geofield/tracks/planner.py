@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
 from geofield.grid import Grid
 from geofield.model.field import Field
+from geofield.model.frame import along_frame
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_edits import TrackEdits
 from geofield.model.track_statistics import ObstacleLoss
@@ -65,6 +67,7 @@ def plan_tracks(
     step_m: float = 1.0,
     straight_tolerance_m: float = 1.0,
     grid: Grid | None = None,
+    outside: Sequence[LineString] | None = None,
     edits: TrackEdits | None = None,
 ) -> Tracks:
     """Plan parallel tracks through a field, around what stands in it.
@@ -113,8 +116,10 @@ def plan_tracks(
         How far the vertices of a straight edge may stray, for ``dominant`` and
         ``longest_edge``.
     grid : Grid, optional
-        Of the picture: gives the track points their pixels; where the outline runs along the
-        picture's frame, that is no edge to follow.
+        Of the picture: gives the track points their pixels.
+    outside : sequence of LineString, optional
+        Where the outline is the picture's edge, and the field goes on (`Plan.frame_lines`): no
+        edge to follow. Along the frame of `grid` when not given.
     edits : TrackEdits, optional
         Tracks that a person took away, shortened or drew (`Plan.track_edits`): they stay so where
         the layout has the same lines, and what was drawn is cut at obstacles and border.
@@ -161,7 +166,7 @@ def plan_tracks(
         metric_crs,
         strips=strips,
         tolerance_m=straight_tolerance_m,
-        grid=grid,
+        outside=along_frame(outline, metric_crs, grid) if outside is None else outside,
         area=inner,
         through=place,
     )
