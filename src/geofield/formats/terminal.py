@@ -20,6 +20,8 @@ from geofield.model import Dataset
 
 #: Smaller pieces are left over from clipping, square metres.
 _SLIVER_M2 = 0.01
+#: How far a straight line's vertices may stray, metres.
+_STRAIGHT_M = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +86,14 @@ def main_field(dataset: Dataset, field: shapely.Polygon) -> list[shapely.Polygon
     rest = shapely.get_parts(shapely.orient_polygons(shapely.difference(field, strip)))
     parts = [part for part in rest if part.geom_type == "Polygon" and part.area > _SLIVER_M2]
     return sorted(parts, key=lambda part: -float(part.area))
+
+
+def are_bent(lines: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Which lines, in a metric CRS and whole over their gaps, are not straight from end to end."""
+    ways = [shapely.get_coordinates(line) for line in lines]
+    whole = np.array([shapely.LineString(way) for way in ways], dtype=object)
+    straight = np.array([shapely.LineString(way[[0, -1]]) for way in ways], dtype=object)
+    return np.asarray(shapely.hausdorff_distance(whole, straight) > _STRAIGHT_M)
 
 
 def _groups(shapes: NDArray[np.object_]) -> Any:

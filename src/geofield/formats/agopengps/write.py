@@ -18,13 +18,15 @@ from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
 from geofield.formats.origin import imagery_day
-from geofield.formats.terminal import main_field, terminal_obstacles
+from geofield.formats.terminal import are_bent, main_field, terminal_obstacles
 from geofield.model import Dataset
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
 _STEPS = ((20.0, 1.1), (40.0, 2.2), (float("inf"), 3.3))
 _RED = 0
-_STRAIGHT = 2
+_STRAIGHT, _CURVE = 2, 4
+#: Largest distance of a curve's points, metres.
+_CURVE_STEP_M = 1.0
 _NAME_CHARACTERS = 60
 
 
@@ -131,22 +133,36 @@ def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
     tracks = dataset.table(schema.TRACKS.name)
     if not len(tracks):
         return lines
-    placed = to_lonlat(exact_geometry(schema.TRACKS, tracks), dataset.crs)
-    for number, shape in zip(tracks["track_no"], placed, strict=True):
-        lonlat = shapely.get_coordinates(shape)[[0, -1]]
-        a, b = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
+    shapes = exact_geometry(schema.TRACKS, tracks)
+    placed = to_lonlat(shapes, dataset.crs)
+    for number, bent, shape in zip(tracks["track_no"], are_bent(shapes), placed, strict=True):
+        way = plane.to_plane(*shapely.get_coordinates(shape).T)
+        a, b = way[0], way[-1]
         heading = np.arctan2(b[0] - a[0], b[1] - a[1]) % (2 * np.pi)
+        curve = _curve(way) if bent else []
         lines += [
             f"Track {number}",
             f"{heading:.8f}",
             f"{a[0]:.3f},{a[1]:.3f}",
             f"{b[0]:.3f},{b[1]:.3f}",
             "0",
-            str(_STRAIGHT),
+            str(_CURVE if curve else _STRAIGHT),
             "True",
-            "0",
+            str(len(curve)),
+            *curve,
         ]
     return lines
+
+
+def _curve(way: FloatArray) -> list[str]:
+    """The points of a line with bends, as a person may draw one, and the heading at each."""
+    points = shapely.get_coordinates(shapely.segmentize(shapely.LineString(way), _CURVE_STEP_M))
+    ahead = np.gradient(points, axis=0)
+    headings = np.arctan2(ahead[:, 0], ahead[:, 1]) % (2 * np.pi)
+    return [
+        f"{east:.3f},{north:.3f},{heading:.5f}"
+        for (east, north), heading in zip(points, headings, strict=True)
+    ]
 
 
 def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pyproj import Geod
 
 from geofield import schema
@@ -34,7 +36,7 @@ from geofield.formats.isoxml.codes import (
 )
 from geofield.formats.many import last_imagery_day, owner_of
 from geofield.formats.names import cut_name, line_names
-from geofield.formats.terminal import main_field, terminal_obstacles
+from geofield.formats.terminal import are_bent, main_field, terminal_obstacles
 from geofield.formats.xml import node, write_xml
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
@@ -42,6 +44,8 @@ from geofield.model import Dataset
 _GEOD = Geod(ellps="WGS84")
 #: Behind the name of a boundary that a person should look at first.
 _DOUBTED = " (check)"
+#: Tracks whose directions differ by less are of one pattern, degrees.
+_SAME_DEG = 0.1
 
 
 def write_v4(
@@ -181,13 +185,13 @@ def _add_polygon(
 
 def _add_guidance_groups(part: ET.Element, dataset: Dataset, numbers: Iterator[int]) -> None:
     """One group per line: some readers look at the first pattern of a group only."""
-    width = _width(dataset)
-    reference = _reference(dataset)
-    if reference is not None:
-        line, left, right = reference
-        lonlat = to_lonlat(np.array([line], dtype=object), dataset.crs)[0]
+    pattern = _pattern(dataset)
+    width = _width(pattern)
+    if pattern is not None:
+        lonlat = to_lonlat(np.array([pattern.line], dtype=object), dataset.crs)[0]
         # The terminal may lay the same pattern itself from this one line.
-        how, sides = {"E": REPEAT_BOTH}, {"N": str(left), "O": str(right)}
+        how = {"E": REPEAT_BOTH}
+        sides = {"N": str(pattern.count(-1)), "O": str(pattern.count(1))}
         part.append(_group(next(numbers), "Reference AB", lonlat, width, how, sides))
     for name, lonlat in _lines(dataset):
         how = {"E": REPEAT_NONE, "F": EXTEND_NONE}
@@ -221,7 +225,7 @@ def _group(
 
 
 def _add_guidance_lines(part: ET.Element, dataset: Dataset) -> None:
-    width = _width(dataset)
+    width = _width(_pattern(dataset))
     for name, lonlat in _lines(dataset):
         line = node("LSG", {"A": LineType.GUIDANCE, "B": name}, width)
         for lon, lat in lonlat.coords:
@@ -254,32 +258,50 @@ def _heading_deg(line: Any) -> float:
     return round(float(azimuth) % 360.0, 4) % 360.0
 
 
-def _offsets(dataset: Dataset) -> tuple[Any, Any] | None:
-    """The first track as a straight line, and the others' middles right of it, ground metres."""
+@dataclass(frozen=True, slots=True)
+class _Pattern:
+    """What a terminal may lay itself from one line."""
+
+    #: The first track that has the field's direction, straight.
+    line: shapely.LineString
+    #: How far the others lie right of it, metres on the ground.
+    right_m: NDArray[np.float64]
+    #: Distance of neighbouring tracks; None of a single one that nobody planned.
+    spacing_m: float | None
+
+    def count(self, side: int) -> int:
+        """How many lines fit in on the right (1) or left (-1), none beyond the last track."""
+        if not self.spacing_m:
+            return 0
+        return int(max(0.0, float((side * self.right_m).max()) / self.spacing_m) + 0.01)
+
+
+def _pattern(dataset: Dataset) -> _Pattern | None:
+    """The pattern that the tracks were laid in: not the lines that a person drew across it."""
     tracks = dataset.table(schema.TRACKS.name)
-    if not len(tracks):
+    shapes = np.asarray(tracks.geometry.to_numpy(), dtype=object)
+    headings = tracks["heading_deg"].to_numpy(dtype=np.float64)
+    known = np.sort(headings[np.isfinite(headings)])
+    if not len(known):
         return None
-    coordinates = [shapely.get_coordinates(shape) for shape in tracks.geometry]
-    start, end = coordinates[0][0], coordinates[0][-1]
-    direction = (end - start) / np.hypot(*(end - start))
-    middles = np.array([(line[0] + line[-1]) / 2 for line in coordinates])
-    right = np.array([direction[1], -direction[0]])
+    turned = np.abs((headings - known[len(known) // 2] + 90.0) % 180.0 - 90.0)
+    kept = shapes[(turned < _SAME_DEG) & ~are_bent(shapes)]
+    if not len(kept):
+        return None
+    ends = np.array([shapely.get_coordinates(line)[[0, -1]] for line in kept])
+    start, end = ends[0]
+    along = (end - start) / np.hypot(*(end - start))
     scale = ground_scale_of(dataset.table(schema.FIELD.name).geometry.iloc[0], dataset.crs)
-    return shapely.LineString([start, end]), (middles - start) @ right / scale
+    right_m = (ends.mean(axis=1) - start) @ (along[1], -along[0]) / scale
+    # Where a person took tracks away, neighbours are farther apart than the pattern.
+    spacing_m = dataset.provenance.evidence.get("tracks", {}).get("spacing_m")
+    if spacing_m is None:
+        steps = np.diff(np.sort(right_m))
+        spacing_m = float(np.median(steps[steps > 0.01])) if (steps > 0.01).any() else None
+    return _Pattern(shapely.LineString([start, end]), right_m, spacing_m)
 
 
-def _reference(dataset: Dataset) -> tuple[Any, int, int] | None:
-    """The first track, and the numbers of tracks on its left and right."""
-    found = _offsets(dataset)
-    if found is None:
-        return None
-    line, offset = found
-    return line, int((offset < -0.01).sum()), int((offset > 0.01).sum())
-
-
-def _width(dataset: Dataset) -> dict[str, str]:
-    """The distance of neighbouring tracks, whole millimetres, as C; nothing for a single track."""
-    found = _offsets(dataset)
-    steps = np.array([]) if found is None else np.diff(np.sort(found[1]))
-    steps = steps[steps > 0.01]
-    return {"C": str(round(float(np.median(steps)) * 1000))} if len(steps) else {}
+def _width(pattern: _Pattern | None) -> dict[str, str]:
+    """The distance of neighbouring tracks, whole millimetres, as C; nothing where it is unknown."""
+    spacing_m = None if pattern is None else pattern.spacing_m
+    return {"C": str(round(spacing_m * 1000))} if spacing_m else {}
