@@ -17,6 +17,7 @@ from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
 from geofield.farm.store import Store
+from geofield.formats.antimeridian import unwrapped
 from geofield.model.obstacles import next_number
 from geofield.model.review import reconcile
 from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
@@ -38,6 +39,8 @@ _NEAR_M = 100.0
 #: Rows of a file that have no shape, by their numbers from 1.
 WITHOUT_SHAPE = "without_shape"
 _DEGREE_M = 111_000.0
+#: A longitude of -179.9 degrees is one of 180.1, too.
+_TURNS: tuple[float, ...] = (-360.0, 0.0, 360.0)
 
 
 @lru_cache(maxsize=2)
@@ -155,12 +158,17 @@ def any_reached(standing: gpd.GeoDataFrame, outlines_lonlat: Iterable[Shapes]) -
 
     They come in parts, of which no more are looked at than it takes.
     """
-    west, south, east, north = standing.to_crs(LONLAT).bounds.to_numpy().T
+    shapes = unwrapped(standing.to_crs(LONLAT).geometry.to_numpy())
+    west, south, east, north = shapely.bounds(shapes).reshape(-1, 4).T
     wide = _reach_m(standing) / _DEGREE_M
     along = wide / np.maximum(np.cos(np.radians(south)), 0.01)
-    boxes = shapely.box(west - along, south - wide, east + along, north + wide)
-    tree = shapely.STRtree(boxes)
-    return any(tree.query(part, predicate="intersects").size for part in outlines_lonlat)
+    west, east = west - along, east + along
+    boxes = [shapely.box(west + turn, south - wide, east + turn, north + wide) for turn in _TURNS]
+    tree = shapely.STRtree(np.concatenate(boxes))
+    return any(
+        tree.query(unwrapped(np.asarray(part, dtype=object)), predicate="intersects").size
+        for part in outlines_lonlat
+    )
 
 
 def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
@@ -268,8 +276,12 @@ def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
 
     near = plan.field.polygon.buffer(2.0 * _near_m(standing))
     around = gpd.GeoSeries([near], crs=plan.field.crs)
-    box = shapely.box(*around.to_crs(standing.crs).total_bounds)
-    return np.sort(standing.sindex.query(box))
+    there, turns = np.asarray(around.to_crs(standing.crs)), (0.0,)
+    if standing.crs.is_geographic:
+        there, turns = unwrapped(there), _TURNS
+    west, south, east, north = shapely.total_bounds(there)
+    boxes = [shapely.box(west + turn, south, east + turn, north) for turn in turns]
+    return np.unique(standing.sindex.query(boxes)[1])
 
 
 def _swapped_here(standing: gpd.GeoDataFrame, plan: Plan) -> bool:
