@@ -276,7 +276,8 @@ def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
 
     near = plan.field.polygon.buffer(2.0 * _near_m(standing))
     around = gpd.GeoSeries([near], crs=plan.field.crs)
-    there, turns = np.asarray(around.to_crs(standing.crs)), (0.0,)
+    there = np.asarray(around.to_crs(standing.crs))
+    turns: tuple[float, ...] = (0.0,)
     if standing.crs.is_geographic:
         there, turns = unwrapped(there), _TURNS
     west, south, east, north = shapely.total_bounds(there)
