@@ -202,7 +202,14 @@ def _from_environment() -> dict[str, Any]:
     if not given:
         return {}
     for name in given:
-        section, separator, _ = name.upper().removeprefix(_PREFIX).lower().partition("__")
+        after = name.upper().removeprefix(_PREFIX).lower()
+        section, separator, _ = after.partition("__")
+        first, _, setting = after.partition("_")
+        if not separator and setting and first in _KNOWN:
+            raise SettingsError(
+                f"{name} in the environment sets nothing.",
+                hint=f"Two underscores follow the section: {_PREFIX}{first}__{setting}".upper(),
+            )
         if separator and section not in _KNOWN and not section.startswith("key_"):
             raise SettingsError(
                 f"{name} in the environment names no section of the settings."
