@@ -414,3 +414,27 @@ def test_what_a_person_keeps_in_a_plan_comes_along_or_is_refused(tmp_path: Path)
         done = CliRunner().invoke(cli, ["tracks", str(plan), "--route", "skip", "-o", str(plan)])
     assert "route cannot be taken along from the plan.gpkg that is there" in str(done.exception)
     assert plan.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("how", "covered", "overlap"),
+    [
+        (("--spacing", "8"), 100.0, 0.0),
+        # Ten strips of 4 m in 80 m; ten of 10 m, of which the outer ones begin at the border.
+        (("--spacing", "8", "--width", "4"), 50.0, 0.0),
+        (("--width", "10", "--overlap", "2"), 100.0, 22.5),
+        (("--width", "10", "--overlap", "-10"), 50.0, 0.0),
+    ],
+)
+def test_what_is_covered_is_what_the_machine_works(
+    tmp_path: Path, how: tuple[str, ...], covered: float, overlap: float
+) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    plan = tmp_path / "plan.gpkg"
+    row = run(tmp_path / "parcel.gpkg", *how, "--direction", "90", "-o", plan)
+    found = row["fields"][0] if "fields" in row else row
+    assert found["coverage_percent"] == pytest.approx(covered, abs=0.2)
+    read = gf.read_plan(plan).tracks
+    assert read is not None
+    assert read.statistics.coverage_percent == pytest.approx(covered, abs=0.2)
+    assert read.statistics.overlap_percent == pytest.approx(overlap, abs=0.2)

@@ -55,7 +55,8 @@ class TrackStatistics:
     area_ha : float
         The field without its holes; NaN where the outline is not known.
     worked_ha : float
-        Of the field within half a spacing of a segment or headland track, as a strip of its length.
+        Of the field within half a working width (half a spacing where none was given) of a segment
+        or headland track, as a strip of its length.
     coverage_percent : float
         Worked area, of the field's.
     overlap_percent : float

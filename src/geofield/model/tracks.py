@@ -61,6 +61,8 @@ class Tracks:
         Of track 1, degrees clockwise from true north, 0 <= heading < 180.
     spacing_m : float
         Between neighbouring tracks, ground metres.
+    width_m : float or None
+        What a machine works along a track; the spacing where it is not known.
     step_m : float
         Between track points along a segment; both ends are always points.
     grid : Grid or None
@@ -105,6 +107,7 @@ class Tracks:
     turns: gpd.GeoDataFrame | None = None
     edits: TrackEdits = field(default_factory=TrackEdits)
     written: TracksWritten | None = None
+    width_m: float | None = None
 
     def __repr__(self) -> str:
         return words(f"Tracks: {len(self.lines)}", self._facts())
@@ -190,6 +193,7 @@ class Tracks:
             "blocked_count": self.blocked_count,
             "losses": [[each.obstacle_no, each.length_m, each.percent] for each in self.losses],
             "written": self._written().to_json(),
+            **({} if self.width_m is None else {"width_m": self.width_m}),
         }
 
     @staticmethod
@@ -233,6 +237,7 @@ class Tracks:
             headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
             route=tables.get(schema.ROUTE.name),
             turns=tables.get(schema.TURNS.name),
+            width_m=evidence.get("width_m"),
         )
 
     @cached_property
@@ -254,7 +259,7 @@ class Tracks:
         area = once = every = nan
         if self.outline is not None:
             area = float(self.outline.area)
-            width = self.spacing_m * scale
+            width = (self.width_m or self.spacing_m) * scale
             once, every = worked(self.segments, self.headland_tracks, self.outline, width, scale)
         return TrackStatistics(
             track_count=len(self.lines),

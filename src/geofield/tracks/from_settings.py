@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,7 @@ def plan_with_settings(
         edits=edits,
         **{name: getattr(settings, name) for name in _OF_TRACKS},
     )
+    tracks = replace(tracks, width_m=settings.width_m)
     if settings.route == "none":
         return tracks
     start = settings.start_lonlat
