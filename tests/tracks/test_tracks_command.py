@@ -438,3 +438,22 @@ def test_what_is_covered_is_what_the_machine_works(
     assert read is not None
     assert read.statistics.coverage_percent == pytest.approx(covered, abs=0.2)
     assert read.statistics.overlap_percent == pytest.approx(overlap, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        # A slip in one digit of A turned the tracks by 90 degrees.
+        ("--ab-lonlat", "15.0", "51.54", "15.002", "50.54"),
+        ("--through-lonlat", "15.001", "51.54"),
+        ("--route", "shortest", "--start-lonlat", "16.5", "50.54"),
+    ],
+)
+def test_a_place_far_from_the_field_is_a_slip(tmp_path: Path, place: tuple[str, ...]) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    arguments = ["tracks", str(tmp_path / "parcel.gpkg"), "--spacing", "8", *place]
+    error = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "plan.gpkg")]).exception
+    assert isinstance(error, TrackError)
+    assert "far from the field." in error.message
+    assert "20 km" in str(error.hint)
+    assert not (tmp_path / "plan.gpkg").exists()

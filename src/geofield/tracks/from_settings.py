@@ -90,22 +90,25 @@ def plan_with_settings(
 def _place(
     lonlat: tuple[float, ...], crs: CRS, polygon: BaseGeometry, what: str
 ) -> tuple[float, float]:
-    """A place in the CRS; refused where only its exchanged coordinates are near the field.
+    """A place in the CRS.
 
     Raises
     ------
     TrackError
-        When latitude and longitude are swapped.
+        When it is far from the field, as where latitude and longitude are swapped.
     """
     project, (lon, lat) = transformer(LONLAT, crs), lonlat[:2]
     x, y = project.transform(lon, lat)
-    if not _near(polygon, x, y) and abs(lon) <= 90 and _near(polygon, *project.transform(lat, lon)):
-        raise TrackError(
-            f"The {what} at longitude {lon}, latitude {lat} is far from the field; with the two "
-            "swapped it is there.",
-            hint=f"Longitude comes first: {lat} {lon}.",
-        )
-    return float(x), float(y)
+    if _near(polygon, x, y):
+        return float(x), float(y)
+    swapped = abs(lon) <= 90 and _near(polygon, *project.transform(lat, lon))
+    raise TrackError(
+        f"The {what} at longitude {lon}, latitude {lat} is far from the field"
+        + ("; with the two swapped it is there." if swapped else "."),
+        hint=f"Longitude comes first: {lat} {lon}."
+        if swapped
+        else f"It may be {_NEAR_M / 1000:.0f} km away. Longitude comes first, both in degrees.",
+    )
 
 
 def _near(polygon: BaseGeometry, x: float, y: float) -> bool:
