@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import warnings
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -457,3 +458,31 @@ def test_a_place_far_from_the_field_is_a_slip(tmp_path: Path, place: tuple[str, 
     assert "far from the field." in error.message
     assert "20 km" in str(error.hint)
     assert not (tmp_path / "plan.gpkg").exists()
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        (("--width", "6"), "a machine of 6 m reaches 1.5 m into obstacles: --clearance 3 "),
+        (("--width", "6", "--clearance", "1"), "reaches 0.5 m into"),
+        (("--width", "6", "--clearance", "3"), None),
+        (("--width", "3"), None),
+        (("--spacing", "6"), None),
+    ],
+)
+def test_a_machine_whose_side_is_in_a_tree_is_told(
+    tmp_path: Path, how: tuple[str, ...], told: str | None
+) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    trees = {"radius_m": [4.0, 3.0], "buffer_m": [1.5, 2.0]}
+    places = [shapely.Point(500050, 5600040), shapely.Point(500120, 5600020)]
+    gpd.GeoDataFrame(trees, geometry=places, crs=CRS).to_file(tmp_path / "trees.gpkg")
+    arguments = ["tracks", str(tmp_path / "parcel.gpkg"), *how]
+    arguments += ["--obstacles", str(tmp_path / "trees.gpkg"), "-o", str(tmp_path / "plan.gpkg")]
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", TrackWarning)
+        assert CliRunner().invoke(cli, arguments).exception is None
+    notes = gf.read_plan(tmp_path / "plan.gpkg").tracks.notes
+    assert list(notes) == [str(each.message) for each in found]
+    assert len(notes) == (0 if told is None else 1)
+    assert told is None or told in notes[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,8 +14,9 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import TrackError
+from geofield.errors import TrackError, TrackWarning
 from geofield.grid import Grid
+from geofield.model.obstacles import active
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
@@ -29,6 +31,8 @@ _OF_TRACKS = (
 _OF_ROUTE = ("skip", "turning_radius_m", "curve", "margin_m")
 #: A place given for a field is not farther from it, metres.
 _NEAR_M = 20_000.0
+#: So far into an obstacle is no fault, metres.
+_HAIR_M = 0.05
 
 
 def plan_with_settings(
@@ -73,7 +77,10 @@ def plan_with_settings(
         edits=edits,
         **{name: getattr(settings, name) for name in _OF_TRACKS},
     )
-    tracks = replace(tracks, width_m=settings.width_m)
+    told = _reaching_in(settings, obstacles)
+    for note in told:
+        warnings.warn(note, TrackWarning, stacklevel=2)
+    tracks = replace(tracks, width_m=settings.width_m, notes=(*tracks.notes, *told))
     if settings.route == "none":
         return tracks
     start = settings.start_lonlat
@@ -84,6 +91,21 @@ def plan_with_settings(
         pattern=settings.route,
         **{name: getattr(settings, name) for name in _OF_ROUTE},
         start=None if start is None else _place(start, metric_crs, polygon, "start"),
+    )
+
+
+def _reaching_in(settings: TrackSettings, obstacles: Any) -> tuple[str, ...]:
+    """That a machine's side is in obstacles which its middle passes, where it is."""
+    if not settings.width_m or "buffer_m" not in getattr(obstacles, "columns", ()):
+        return ()
+    margin_m = np.nan_to_num(active(obstacles)["buffer_m"].to_numpy(dtype=np.float64))
+    half_m = settings.width_m / 2.0
+    into_m = half_m - settings.clearance_m - margin_m.min(initial=np.inf)
+    if into_m < _HAIR_M:
+        return ()
+    return (
+        f"Beside its track a machine of {settings.width_m:g} m reaches {into_m:.1f} m into "
+        f"obstacles: --clearance {half_m:g} keeps it out.",
     )
 
 
