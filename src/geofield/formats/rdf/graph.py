@@ -24,6 +24,13 @@ class Graph:
     #: Class to subjects, made when first asked for.
     by_type: dict[str, dict[str, None]] = field(default_factory=dict, repr=False)
 
+    @classmethod
+    def of(cls, quads: Iterable[ox.Quad]) -> Graph:
+        """The graph of what a parser tells."""
+        graph = cls()
+        graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
+        return graph
+
     def add(self, triples: Iterable[tuple[str, str, str]]) -> None:
         """Take in triples: subjects, predicates and values."""
         columns, more = self.columns, self.more
@@ -96,10 +103,7 @@ class Graph:
 @cache
 def ontology() -> Graph:
     """The ontology of the package, in the order of its file."""
-    graph = Graph()
-    quads = ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE)
-    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
-    return graph
+    return Graph.of(ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE))
 
 
 def label(name: str) -> str:

@@ -19,7 +19,7 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ from geofield.formats.rdf.namespaces import (
     expand,
     node,
 )
-from geofield.formats.rdf.triples import Column, Group, Nodes, Typed, named
+from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
@@ -83,7 +83,7 @@ class StudyDescription(Description):
             frame = self.table(layer)
             iris, types = row_iris(layer, frame, self.names), self.types(layer, frame)
             avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
-            yield _members(STUDY_OBSTACLE, named(avoided))
+            yield _members(STUDY_OBSTACLE, Texts(avoided))
         if name != schema.TRACK_POINTS.name:
             yield from super().layer(layer)
 
@@ -105,7 +105,7 @@ class StudyDescription(Description):
             return columns
         study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
         taken = {predicate for predicate, _ in study}
-        image: Column = (node("dc:type"), [node(DCMI_IMAGE)] * len(frame))
+        image: Column = (node("dc:type"), node(DCMI_IMAGE))
         return [image, *study, *(each for each in columns if each[0] not in taken)]
 
     def detections(self, frame: Any) -> Iterator[Group]:
@@ -119,19 +119,18 @@ class StudyDescription(Description):
         )
         places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
         columns: list[Column] = [
-            (node("rdf:type"), [node(GML + "point")] * len(frame)),
+            (node("rdf:type"), node(GML + "point")),
             *_study_columns(rounded, STUDY_POINT_TERMS),
-            (node(GML + "pos"), Typed([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
-            (node("gf:segmentNo"), Typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
+            (node(GML + "pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
+            (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
-        points = named(iris)
-        yield _members(STUDY_TRAJECTORY, points)
-        yield (Nodes(points, columns),)
+        yield _members(STUDY_TRAJECTORY, iris)
+        yield (Nodes(iris, columns),)
 
 
-def _members(root: str, members: Iterable[Any]) -> Group:
+def _members(root: str, members: Texts) -> Group:
     """The study's root description holds its nodes."""
-    return (Nodes([node(root)], [(node("rdfs:member"), [tuple(members)])]),)
+    return (Nodes(Texts([root]), [(node("rdfs:member"), [tuple(terms(members, 0))])]),)
 
 
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
@@ -140,5 +139,5 @@ def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column
         texts: list[str | None] = list(map(repr, frame[column].tolist()))
         for row in np.flatnonzero(frame[column].isna()).tolist():
             texts[row] = None
-        result.append((node(predicate), Typed(texts, datatype)))
+        result.append((node(predicate), Texts(texts, datatype)))
     return result

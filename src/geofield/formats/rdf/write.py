@@ -17,7 +17,6 @@ import pyoxigraph as ox
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.describe import PRODUCTS, Description
-from geofield.formats.rdf.jsonld import write_jsonld as write_json
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import PREFIXES, STRING, STUDY_PREFIXES
 from geofield.formats.rdf.repeated import write_repeated
@@ -125,9 +124,5 @@ def _profile(options: Mapping[str, Any]) -> tuple[type[Description], bool, dict[
 def _write(
     path: Path, syntax: ox.RdfFormat, groups: Iterable[Group], options: Mapping[str, Any]
 ) -> None:
-    *_, prefixes = _profile(options)
     with path.open("wb") as file:
-        if syntax == ox.RdfFormat.JSON_LD:
-            write_json(groups, file, prefixes)
-        else:
-            write_repeated(groups, file, syntax, prefixes)
+        write_repeated(groups, file, syntax, _profile(options)[2])
