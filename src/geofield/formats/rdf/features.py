@@ -61,14 +61,16 @@ def feature_group(
     iris = row_iris(layer, frame, names)
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     nodes, links = _geometries(iris, geometry, CRS(frame.crs), accuracy_m)
-    area = _area(layer, frame)
-    return (
-        Nodes(
-            iris,
-            [(node("rdf:type"), types), *_label(layer, frame), *columns, *area, *links],
-        ),
-        *nodes,
-    )
+    told: list[Column] = [(node("rdf:type"), types)]
+    if layer.label:
+        rows = frame[list(layer.layer.key)].to_dict("records")
+        told.append((node("rdfs:label"), [term(layer.label.format(**row)) for row in rows]))
+    told += columns
+    if layer.layer.geometry in ("Polygon", "MultiPolygon"):
+        # GeoSPARQL's own property, square metres, beside the layer's columns.
+        areas = ground_areas_m2(geometry, CRS(frame.crs)).tolist()
+        told.append((node("geo:hasMetricArea"), Texts(map(repr, areas), "xsd:double")))
+    return Nodes(iris, [*told, *links]), *nodes
 
 
 def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
@@ -117,13 +119,6 @@ def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series
     return [None if text is None else literal(text) for text in texts]
 
 
-def _label(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
-    if not layer.label:
-        return []
-    rows = frame[list(layer.layer.key)].to_dict("records")
-    return [(node("rdfs:label"), [term(layer.label.format(**row)) for row in rows])]
-
-
 def link_properties(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[Column]:
     """A layer's links to other rows as properties."""
     result: list[Column] = []
@@ -143,14 +138,6 @@ def _causes(text: Any, names: Names) -> tuple[ox.NamedNode, ...]:
     match = None if pd.isna(text) else _OBSTACLES_IN_CAUSE.search(str(text))
     numbers = re.findall(r"\d+", match[1]) if match else []
     return tuple(ox.NamedNode(f"{names.survey}/obstacle/{int(number)}") for number in numbers)
-
-
-def _area(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
-    """Square metres of polygons: GeoSPARQL's own property beside the layer's columns."""
-    if layer.layer.geometry not in ("Polygon", "MultiPolygon"):
-        return []
-    areas_m2 = ground_areas_m2(frame.geometry.to_numpy(), CRS(frame.crs))
-    return [(node("geo:hasMetricArea"), list(map(term, np.asarray(areas_m2, float).tolist())))]
 
 
 # -- geometries ---------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -98,6 +99,15 @@ class Graph:
         for predicate in predicates:
             subject = self.columns.get(expand(predicate), {}).get(subject or "")
         return subject
+
+
+def number(text: str | None, kind: type[int] | type[float] = float) -> float | None:
+    """What a text means as a number; None for what is none, or has no end."""
+    try:
+        value = None if text is None else kind(text)
+        return value if value is None or math.isfinite(value) else None
+    except (ValueError, OverflowError):
+        return None
 
 
 @cache

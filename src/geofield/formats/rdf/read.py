@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from geofield.formats.arrow import TYPE_IDS, promoted
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
 from geofield.formats.rdf.geosparql import geometries_of, known_crs, split_literal
-from geofield.formats.rdf.graph import Graph
+from geofield.formats.rdf.graph import Graph, number
 from geofield.formats.rdf.layers import (
     YES_NO,
     LayerMap,
@@ -217,7 +216,7 @@ class _Rows:
         """Texts as the values of a column."""
         if column.type in ("int", "float"):
             kind = int if column.type == "int" else float
-            values = [None if text is None else _number(kind, text) for text in texts]
+            values = [number(text, kind) for text in texts]
             for text, value, subject in zip(texts, values, self.subjects, strict=True):
                 if value is None and text is not None:
                     raise FormatError(
@@ -290,15 +289,6 @@ class _Rows:
                 f"{of.name!r} holds geometries of type {of.geometry}."
             )
         return geometry
-
-
-def _number(kind: type[int] | type[float], text: str) -> float | None:
-    """A text as a number; None for what is none, or has no end."""
-    try:
-        value = kind(text)
-        return value if math.isfinite(value) else None
-    except (ValueError, OverflowError):
-        return None
 
 
 def _footprint_radius(data: dict[str, Any], rows: Any, pixel_m: float | None) -> Any:

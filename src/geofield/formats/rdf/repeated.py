@@ -57,7 +57,7 @@ class _Form:
     Attributes
     ----------
     value : str
-        Values in the text of a node: first of all the name of the node itself.
+        Values in the text of a node; the first group is the node's own name.
     between, end : str
         What stands between lines, and after the last node.
     text, unescape

@@ -2,12 +2,11 @@
 
 The study's sample (METHOD.md, section 5) cannot be taken literally; the choices made:
 
-- A root description (``http://www.DLC.org/Obstacle#``) holds the typed nodes. RDF/XML does
-  not allow a node inside a node, so each stands in an `rdfs:member` of the root.
-- The samples give nodes no names. Here they have the same IRIs as in the GeoSPARQL profile,
-  so that both may be merged and name the same obstacle.
-- The study writes the trajectory's properties in ``.../trajectory#`` but its root as
-  ``.../Trajectory#``. Both are kept as they are: IRIs are compared letter by letter.
+- RDF/XML allows no node inside a node: each stands in an `rdfs:member` of a root description
+  (``http://www.DLC.org/Obstacle#``).
+- The samples give nodes no names. Here they have those of the GeoSPARQL profile: both merge.
+- ``.../trajectory#`` of properties and ``.../Trajectory#`` of the root stay as the study has
+  them: IRIs are compared letter by letter.
 - Untyped numbers get the datatypes the study's table names: `xsd:int` for numbers,
   `xsd:double` for positions and pixels. `gml:pos` stays a text, "lat, long".
 - The class *tree* and the root's members are what is driven around; an obstacle of another kind,
@@ -21,8 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
-
-import numpy as np
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
@@ -136,8 +133,7 @@ def _members(root: str, members: Texts) -> Group:
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
     result: list[Column] = []
     for column, (predicate, datatype) in terms.items():
-        texts: list[str | None] = list(map(repr, frame[column].tolist()))
-        for row in np.flatnonzero(frame[column].isna()).tolist():
-            texts[row] = None
+        values = frame[column].astype(object).where(frame[column].notna(), None).tolist()
+        texts = [None if value is None else repr(value) for value in values]
         result.append((node(predicate), Texts(texts, datatype)))
     return result
