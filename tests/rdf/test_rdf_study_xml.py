@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from geofield.formats import FORMATS, read_dataset, write_dataset
-from geofield.formats.rdf.study_xml import write_study_xml
+from geofield.formats.study_xml import write_study_xml
 
 
 def test_it_has_the_studys_elements(plan, tmp_path):

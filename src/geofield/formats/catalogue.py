@@ -245,7 +245,7 @@ CATALOGUE: tuple[Format, ...] = (
         "Plain XML of the source study",
         ("obstacles.xml", "path.xml"),
         ("obstacles", "track_points"),
-        "geofield.formats.rdf.study_xml:write_study_xml",
+        "geofield.formats.study_xml:write_study_xml",
         drops=(
             _ORIGIN,
             Drop("the outlines of obstacles that are not round", "polygons"),

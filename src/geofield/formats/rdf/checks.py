@@ -14,7 +14,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.rdf.geosparql import geometry_of
-from geofield.formats.rdf.graph import Graph, ontology
+from geofield.formats.rdf.graph import Graph, number, ontology
 from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
 from geofield.formats.rdf.namespaces import GML, STUDY_POINT, compact
 from geofield.formats.rdf.parse import Problem
@@ -108,7 +108,7 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
     box = _lonlat_bounds(shape, crs)
     if box is not None:
         bounds[iri] = box
-    if crs.is_geographic and not _on_earth(shape):
+    if crs.is_geographic and (np.abs(shapely.bounds(shape)) > (180.0, 90.0, 180.0, 90.0)).any():
         pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
         message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
         hint = "Are they metres, or latitude before longitude?"
@@ -116,10 +116,6 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
     elif not shapely.is_valid(shape):
         message = f"Its shape is not valid: {shapely.is_valid_reason(shape)}."
         yield Problem(message, f"<{iri}>", rule="valid-shape")
-
-
-def _on_earth(shape: Any) -> bool:
-    return bool((np.abs(shapely.bounds(shape)) <= (180.0, 90.0, 180.0, 90.0)).all())
 
 
 def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
@@ -139,7 +135,7 @@ def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
         box = bounds.get(default)
         if box is None:
             continue
-        lat, lon = (_float(graph.value(iri, f"wgs84:{name}")) for name in ("lat", "long"))
+        lat, lon = (number(graph.value(iri, f"wgs84:{name}")) for name in ("lat", "long"))
         if lat is not None and lon is not None and not _near(box, lon, lat, _NEAR_DEG):
             swapped = _near(box, lat, lon, _NEAR_DEG)
             words = "has latitude and longitude swapped" if swapped else "is not at its position"
@@ -147,15 +143,12 @@ def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
             rule = "swapped-axes" if swapped else "position"
             yield Problem(message, f"<{iri}>", None, _AXES if swapped else "", rule)
         for other in graph.values(iri, "geo:hasGeometry"):
-            if other in bounds and not _same(box, bounds[other]) and _of_one(default, other):
+            # A field has one for each of its surveys: these need not be one place.
+            mine = "/survey/" not in other or other.startswith(default)
+            if mine and other in bounds and not _same(box, bounds[other]):
                 message = f"Its geometries <{default}> and <{other}> are not the same place."
                 hint = "Check CRS and axis order of the second."
                 yield Problem(message, f"<{iri}>", None, hint, "geometries-agree")
-
-
-def _of_one(default: str, other: str) -> bool:
-    """Whether two geometries should be one place: a field has one for each of its surveys."""
-    return "/survey/" not in other or other.startswith(default)
 
 
 def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
@@ -192,11 +185,3 @@ def _same(mine: Bounds, theirs: Bounds) -> bool:
     apart = np.abs(np.subtract(mine, theirs))
     apart[[0, 2]] = np.minimum(apart[[0, 2]], 360.0 - apart[[0, 2]])
     return bool((apart <= _SAME_PLACE_M / 111_000.0 + 0.1 * size).all())
-
-
-def _float(text: str | None) -> float | None:
-    try:
-        value = float(text or "")
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

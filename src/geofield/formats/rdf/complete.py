@@ -28,7 +28,12 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
     shapes = field.geometry.to_numpy()
     _fill(field, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
     _fill(field, "perimeter_m", ground_lengths_m(shapely.get_exterior_ring(shapes), crs))
-    _obstacles(tables["obstacles"], crs)
+    obstacles = tables["obstacles"]
+    _fill(obstacles, "kind", np.full(len(obstacles), "other", dtype=object))
+    _fill(obstacles, "status", np.full(len(obstacles), "added", dtype=object))
+    _fill(obstacles, "buffer_m", np.zeros(len(obstacles)))
+    numbered(obstacles, "obstacle_no")
+    _positions(obstacles, crs)
     numbered(tables["tracks"], "track_no")
     numbered(tables["track_points"], "point_no")
     if len(tables["tracks"]) and not len(tables["segments"]):
@@ -48,14 +53,6 @@ def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
     if len(frame) and frame[column].isna().any():
         missing = frame[column].isna()
         frame.loc[missing, column] = np.asarray(values)[missing.to_numpy()]
-
-
-def _obstacles(frame: gpd.GeoDataFrame, crs: CRS) -> None:
-    _fill(frame, "kind", np.full(len(frame), "other", dtype=object))
-    _fill(frame, "status", np.full(len(frame), "added", dtype=object))
-    _fill(frame, "buffer_m", np.zeros(len(frame)))
-    numbered(frame, "obstacle_no")
-    _positions(frame, crs)
 
 
 def numbered(frame: gpd.GeoDataFrame, column: str) -> None:

@@ -26,7 +26,7 @@ from geofield.formats.rdf.features import (
 from geofield.formats.rdf.layers import CANDIDATE, LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
 from geofield.formats.rdf.namespaces import crs_iri, node
-from geofield.formats.rdf.triples import Column, Group, Nodes, date_term, named, single
+from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, date_term, single
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import active
 
@@ -95,7 +95,7 @@ class Description:
             if name == schema.OBSTACLES.name:
                 yield from self.detections(frame)
 
-    def types(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[tuple[ox.NamedNode, ...]]:
+    def types(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Any]:
         """The classes of each row; obstacles that are not driven around are candidates."""
         own = tuple(map(node, (layer.cls, *layer.also, "geo:Feature")))
         if layer.layer.name != schema.OBSTACLES.name:
@@ -123,16 +123,16 @@ class Description:
 
     def belonging(self, layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
         """What the rows of a layer say beyond their columns: what they belong to."""
-        name, count = layer.layer.name, len(frame)
+        name = layer.layer.name
         result: list[Column] = [
-            (node(predicate), [_thing(getattr(self.names, owner))] * count)
+            (node(predicate), _thing(getattr(self.names, owner)))
             for predicate, owner in layer.belongs
         ]
         if name in (schema.OBSTACLES.name, schema.TRACKS.name):
             result.append(self._within(frame))
         if name == schema.ROUTE.name:
             steps = row_iris(layer, frame, self.names)
-            result.append((node("gf:nextStep"), named([*steps[1:], None])))
+            result.append((node("gf:nextStep"), Texts([*steps[1:], None])))
         return result
 
     def _within(self, frame: gpd.GeoDataFrame) -> Column:
@@ -191,19 +191,18 @@ class Description:
         """One observation for each obstacle that was not added by a person."""
         found = frame[frame["status"] != "added"]
         iris = row_iris(layer_map(schema.OBSTACLES.name), found, self.names)
-        count, imagery = len(found), _thing(self.names.imagery)
         confidence = schema.OBSTACLES.column("confidence")
         columns: list[Column] = [
-            (node("rdf:type"), [(node("gf:Detection"), node("sosa:Observation"))] * count),
-            (node("sosa:hasFeatureOfInterest"), named(iris)),
-            (node("sosa:observedProperty"), [node("gf:obstaclePresence")] * count),
+            (node("rdf:type"), [(node("gf:Detection"), node("sosa:Observation"))] * len(found)),
+            (node("sosa:hasFeatureOfInterest"), iris),
+            (node("sosa:observedProperty"), node("gf:obstaclePresence")),
             (
                 node("sosa:hasSimpleResult"),
                 column_terms("obstacles", confidence, "gf:confidence", found["confidence"]),
             ),
-            (node("prov:wasDerivedFrom"), [imagery] * count),
+            (node("prov:wasDerivedFrom"), _thing(self.names.imagery)),
         ]
-        yield (Nodes(named(f"{iri}/detection" for iri in iris), columns),)
+        yield (Nodes(Texts(f"{iri}/detection" for iri in iris), columns),)
 
     def origin(self) -> Iterator[Group]:
         """The dataset, the run, the software and the picture."""

@@ -20,16 +20,7 @@ from geofield.formats.rdf.geosparql import in_order
 from geofield.formats.rdf.layers import CODE_LISTS, YES_NO, LayerMap, layer_map, value_iri
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import CRS84, crs_iri, node
-from geofield.formats.rdf.triples import (
-    Column,
-    Group,
-    Nodes,
-    Typed,
-    date_term,
-    named,
-    term,
-    text_term,
-)
+from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, Values, date_term, term
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -41,14 +32,14 @@ POINT_DECIMALS = 7
 _OBSTACLES_IN_CAUSE = re.compile(r"obstacles?\s+([0-9][0-9,\s]*)")
 
 
-def row_iris(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[str | None]:
+def row_iris(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> Texts:
     """The IRIs of a layer's rows (or of the rows that the same key columns point to)."""
     owner = names.plan if layer.in_plan else names.survey
     if not layer.path:
-        return [owner] * len(frame)
+        return Texts([owner] * len(frame))
     keys = re.findall(r"\{(\w+)\}", layer.path)
     path = f"{owner}/{re.sub(r'{.*?}', '{}', layer.path)}".format
-    iris: list[str | None] = list(map(path, *(frame[key].tolist() for key in keys)))
+    iris = Texts(map(path, *(frame[key].tolist() for key in keys)))
     for row in np.flatnonzero(frame[keys].isna().any(axis=1)).tolist():
         iris[row] = None
     return iris
@@ -58,7 +49,7 @@ def feature_group(
     layer: LayerMap,
     frame: gpd.GeoDataFrame,
     names: Names,
-    types: Sequence[Any],
+    types: Values,
     columns: Sequence[Column],
     accuracy_m: float | None = None,
 ) -> Group:
@@ -70,52 +61,43 @@ def feature_group(
     iris = row_iris(layer, frame, names)
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     nodes, links = _geometries(iris, geometry, CRS(frame.crs), accuracy_m)
-    area = _area(layer, frame)
-    return (
-        Nodes(
-            named(iris),
-            [(node("rdf:type"), types), *_label(layer, frame), *columns, *area, *links],
-        ),
-        *nodes,
-    )
+    told: list[Column] = [(node("rdf:type"), types)]
+    if layer.label:
+        rows = frame[list(layer.layer.key)].to_dict("records")
+        told.append((node("rdfs:label"), [term(layer.label.format(**row)) for row in rows]))
+    told += columns
+    if layer.layer.geometry in ("Polygon", "MultiPolygon"):
+        # GeoSPARQL's own property, square metres, beside the layer's columns.
+        areas = ground_areas_m2(geometry, CRS(frame.crs)).tolist()
+        told.append((node("geo:hasMetricArea"), Texts(map(repr, areas), "xsd:double")))
+    return Nodes(iris, [*told, *links]), *nodes
 
 
 def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
     """Track points: number, segment and place, each told once; the rest follows from them."""
     layer = layer_map(schema.TRACK_POINTS.name)
     iris = row_iris(layer, frame, names)
-    places = [f"{iri}/geometry" for iri in iris]
-    keys = list(zip(frame["track_no"].tolist(), frame["segment_no"].tolist(), strict=True))
-    segments = {
-        key: ox.NamedNode(f"{names.plan}/track/{key[0]}/segment/{key[1]}") for key in set(keys)
-    }
+    segments = row_iris(layer_map(schema.SEGMENTS.name), frame, names)
+    places = Texts(f"{iri}/geometry" for iri in iris)
     positions = zip(frame["lon"].tolist(), frame["lat"].tolist(), strict=True)
     wkt = [
         f"<{CRS84}> POINT ({lon:.{POINT_DECIMALS}f} {lat:.{POINT_DECIMALS}f})"
         for lon, lat in positions
     ]
-    places_of, count = named(places), len(frame)
-    return (
-        Nodes(
-            named(iris),
-            [
-                (node("rdf:type"), [node("gf:TrackPoint")] * count),
-                (node("gf:pointNo"), Typed(map(str, frame["point_no"].tolist()), "xsd:integer")),
-                (node("gf:onSegment"), list(map(segments.__getitem__, keys))),
-                (node("geo:hasDefaultGeometry"), places_of),
-            ],
-        ),
-        Nodes(
-            places_of,
-            [
-                (node("rdf:type"), [node("sf:Point")] * count),
-                (node("geo:asWKT"), Typed(wkt, "geo:wktLiteral")),
-            ],
-        ),
-    )
+    point: list[Column] = [
+        (node("rdf:type"), node("gf:TrackPoint")),
+        (node("gf:pointNo"), Texts(map(str, frame["point_no"].tolist()), "xsd:integer")),
+        (node("gf:onSegment"), segments),
+        (node("geo:hasDefaultGeometry"), places),
+    ]
+    place: list[Column] = [
+        (node("rdf:type"), node("sf:Point")),
+        (node("geo:asWKT"), Texts(wkt, "geo:wktLiteral")),
+    ]
+    return Nodes(iris, point), Nodes(places, place)
 
 
-def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series[Any]) -> list[Any]:
+def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series[Any]) -> Values:
     """The terms of a column; refuses numbers that are infinite."""
     values = [None if pd.isna(value) else value for value in series.tolist()]
     if column.type == "float":
@@ -125,23 +107,16 @@ def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series
                     f"Layer {layer!r}, row {row}: {column.name} is infinite.",
                     hint="Correct the value, or leave it empty.",
                 )
-        return Typed([None if v is None else repr(float(v)) for v in values], "xsd:double")
+        return Texts([None if v is None else repr(float(v)) for v in values], "xsd:double")
     if column.type == "int":
-        return Typed([None if v is None else str(int(v)) for v in values], "xsd:integer")
+        return Texts([None if v is None else str(int(v)) for v in values], "xsd:integer")
     texts = [None if value is None else str(value) for value in values]
     if name in CODE_LISTS and all(t in column.values for t in texts if t is not None):
         return [None if t is None else node(value_iri(t)) for t in texts]
     if column.values == YES_NO:
         return [None if t is None else term(t == "yes") for t in texts]
-    literal = date_term if column.type == "date" else text_term
+    literal = date_term if column.type == "date" else term
     return [None if text is None else literal(text) for text in texts]
-
-
-def _label(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
-    if not layer.label:
-        return []
-    rows = frame[list(layer.layer.key)].to_dict("records")
-    return [(node("rdfs:label"), [text_term(layer.label.format(**row)) for row in rows])]
 
 
 def link_properties(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> list[Column]:
@@ -152,7 +127,7 @@ def link_properties(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> l
         if link.target_key != link.column:
             pointing = frame.assign(**{link.target_key: frame[link.column]})
         targets = row_iris(layer_map(link.target), pointing, names)
-        result.append((node(link.predicate), named(targets)))
+        result.append((node(link.predicate), targets))
     if layer.layer.name == schema.GAPS.name:
         result.append((node("gf:causedBy"), [_causes(text, names) for text in frame["cause"]]))
     return result
@@ -165,19 +140,11 @@ def _causes(text: Any, names: Names) -> tuple[ox.NamedNode, ...]:
     return tuple(ox.NamedNode(f"{names.survey}/obstacle/{int(number)}") for number in numbers)
 
 
-def _area(layer: LayerMap, frame: gpd.GeoDataFrame) -> list[Column]:
-    """Square metres of polygons: GeoSPARQL's own property beside the layer's columns."""
-    if layer.layer.geometry not in ("Polygon", "MultiPolygon"):
-        return []
-    areas_m2 = ground_areas_m2(frame.geometry.to_numpy(), CRS(frame.crs))
-    return [(node("geo:hasMetricArea"), list(map(term, np.asarray(areas_m2, float).tolist())))]
-
-
 # -- geometries ---------------------------------------------------------------------------------
 
 
 def _geometries(
-    iris: list[str | None], geometry: Any, crs: CRS, accuracy_m: float | None
+    iris: Texts, geometry: Any, crs: CRS, accuracy_m: float | None
 ) -> tuple[list[Nodes], list[Column]]:
     """The geometries' nodes, and the links from their features to them."""
     identifier = crs_iri(crs)
@@ -193,13 +160,12 @@ def _geometries(
         kinds = [(node(f"sf:{shape.geom_type}"), node("geo:Geometry")) for shape in shapes]
         columns: list[Column] = [
             (node("rdf:type"), kinds),
-            (node("geo:asWKT"), Typed([f"<{iri}> {text}" for text in wkt], "geo:wktLiteral")),
+            (node("geo:asWKT"), Texts([f"<{iri}> {text}" for text in wkt], "geo:wktLiteral")),
         ]
         if accuracy_m is not None:
-            accuracy = [term(float(accuracy_m))] * len(iris)
-            columns.append((node("geo:hasMetricSpatialAccuracy"), accuracy))
-        nodes.append(Nodes(named(f"{each}/geometry{name}" for each in iris), columns))
-    every = list(zip(*(each.subjects for each in nodes), strict=True))
+            columns.append((node("geo:hasMetricSpatialAccuracy"), term(float(accuracy_m))))
+        nodes.append(Nodes(Texts(f"{each}/geometry{name}" for each in iris), columns))
+    every = list(zip(*(map(ox.NamedNode, each.subjects) for each in nodes), strict=True))
     return nodes, [
         (node("geo:hasDefaultGeometry"), nodes[0].subjects),
         (node("geo:hasGeometry"), every),

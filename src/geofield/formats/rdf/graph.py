@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -23,6 +24,13 @@ class Graph:
     more: dict[str, dict[str, list[str]]] = field(default_factory=dict)
     #: Class to subjects, made when first asked for.
     by_type: dict[str, dict[str, None]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, quads: Iterable[ox.Quad]) -> Graph:
+        """The graph of what a parser tells."""
+        graph = cls()
+        graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
+        return graph
 
     def add(self, triples: Iterable[tuple[str, str, str]]) -> None:
         """Take in triples: subjects, predicates and values."""
@@ -93,13 +101,19 @@ class Graph:
         return subject
 
 
+def number(text: str | None, kind: type[int] | type[float] = float) -> float | None:
+    """What a text means as a number; None for what is none, or has no end."""
+    try:
+        value = None if text is None else kind(text)
+        return value if value is None or math.isfinite(value) else None
+    except (ValueError, OverflowError):
+        return None
+
+
 @cache
 def ontology() -> Graph:
     """The ontology of the package, in the order of its file."""
-    graph = Graph()
-    quads = ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE)
-    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
-    return graph
+    return Graph.of(ox.parse(resource(ONTOLOGY), ox.RdfFormat.TURTLE))
 
 
 def label(name: str) -> str:

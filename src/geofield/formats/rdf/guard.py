@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn
 from xml.parsers import expat
 
 from geofield.errors import FormatError
@@ -69,22 +68,21 @@ def check_json(text: str, name: str) -> None:
             )
 
 
-def check_xml(path: Path) -> None:
-    """Refuse an RDF/XML file that is hostile or not well-formed; names file, line and reason."""
-    with path.open("rb") as file:
-        parser = _XmlGuard(path).parser
-        try:
-            parser.ParseFile(file)
-        except expat.ExpatError as error:
-            reason = f"it is not well-formed XML ({expat.ErrorString(error.code)})"
-            raise _refused(path, error.lineno, reason) from error
-        except (LookupError, ValueError) as error:
-            raise _refused(path, 1, f"its encoding is not known ({error})") from error
+def check_xml(file: IO[bytes], name: str) -> None:
+    """Refuse RDF/XML that is hostile or not well-formed; names file, line and reason."""
+    parser = _XmlGuard(name).parser
+    try:
+        parser.ParseFile(file)
+    except expat.ExpatError as error:
+        reason = f"it is not well-formed XML ({expat.ErrorString(error.code)})"
+        raise _refused(name, error.lineno, reason) from error
+    except (LookupError, ValueError) as error:
+        raise _refused(name, 1, f"its encoding is not known ({error})") from error
 
 
-def _refused(path: Path, line: int, reason: str) -> FormatError:
+def _refused(name: str, line: int, reason: str) -> FormatError:
     return FormatError(
-        f"{path.name}, line {line}: {reason}.",
+        f"{name}, line {line}: {reason}.",
         hint="Nothing was read from it. Ask its maker for plain RDF/XML.",
     )
 
@@ -92,8 +90,8 @@ def _refused(path: Path, line: int, reason: str) -> FormatError:
 class _XmlGuard:
     """An expat parser that only counts."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.depth, self.entities = path, 0, 0
+    def __init__(self, file_name: str) -> None:
+        self.file_name, self.depth, self.entities = file_name, 0, 0
         parser = expat.ParserCreate(namespace_separator="")
         parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
         parser.buffer_text = True
@@ -132,7 +130,7 @@ class _XmlGuard:
         self.refuse("it refers to an external entity")
 
     def refuse(self, reason: str) -> NoReturn:
-        raise _refused(self.path, self.parser.CurrentLineNumber, reason)
+        raise _refused(self.file_name, self.parser.CurrentLineNumber, reason)
 
 
 def _unescaped(text: str) -> str:

@@ -7,17 +7,15 @@ each file, so that readers need no network.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from functools import cache
-from itertools import chain
-from json.encoder import encode_basestring as _quoted
-from typing import IO, Any
+from json.encoder import encode_basestring
+from typing import Any
 
 import pyoxigraph as ox
 
 from geofield.formats.rdf.namespaces import CONTEXT_TERMS, GF, STRING, TYPE, compact, expand
-from geofield.formats.rdf.triples import Group, Nodes, Typed
-from geofield.formats.rdf.triples import terms as terms_of
+from geofield.formats.rdf.triples import Group, Nodes, terms
 
 _KINDS = {"": STRING, "@id": "@id"}
 #: Short names by predicate and kind of value.
@@ -27,56 +25,42 @@ _TERMS = {
     if isinstance(entry, dict)
     for kind in [entry.get("@type", "")]
 }
+END = "\n]\n}\n"
 
 
-def write_jsonld(groups: Iterable[Group], file: IO[bytes], prefixes: dict[str, str]) -> None:
-    """Write groups of nodes as a flat graph, as they come."""
+def head(prefixes: dict[str, str]) -> str:
+    """What stands before the nodes; :data:`END` stands behind them."""
     whole = json.dumps({**CONTEXT_TERMS, **prefixes}, indent=1, ensure_ascii=False)
-    file.write(f'{{\n"@context": {whole},\n"@graph": ['.encode())
-    separator = "\n"
-    for group in groups:
-        told = [_lines(nodes) for nodes in group]
-        if told[0]:
-            rows = chain.from_iterable(zip(*told, strict=True))
-            file.write((separator + ",\n".join(rows)).encode())
-            separator = ",\n"
-    file.write(b"\n]\n}\n")
+    return f'{{\n"@context": {whole},\n"@graph": ['
 
 
-def _lines(nodes: Nodes) -> list[str]:
-    """Each node as a line of JSON."""
-    names = [f'"@id": "{subject.value}"' for subject in nodes.subjects]
-    columns = [_told(predicate.value, values) for predicate, values in nodes.columns]
-    return [f"{{{', '.join(filter(None, row))}}}" for row in zip(names, *columns, strict=True)]
+def lines(groups: Iterable[Group]) -> str:
+    """The nodes of groups, a line each, with a comma before it."""
+    rows = (row for group in groups for row in zip(*map(_nodes, group), strict=True))
+    return "".join(f",\n{{{told}}}" for row in rows for told in row)
 
 
-def _told(iri: str, values: Sequence[Any]) -> list[str]:
-    """Of each row the predicate's short name with its value or values; empty for none."""
-    # All alike: one look-up for the column.
-    if isinstance(values, Typed) and None not in values:
-        name, before, after = _frame(iri, values.datatype.value)
-        return [f'"{name}": {before}{_quoted(text)}{after}' for text in values]
-    values = terms_of(values)
-    if set(map(type, values)) == {ox.NamedNode}:
-        name, before, after = _frame(iri, "@id")
-        return [f'"{name}": {before}{_short(iri, each.value)}{after}' for each in values]
-    return ["" if value is None else _entry(iri, value) for value in values]
+def _nodes(nodes: Nodes) -> Iterator[str]:
+    names = [f'"@id": "{iri}"' for iri in nodes.subjects]
+    columns = [
+        [_entry(predicate.value, value) for value in terms(values, len(names))]
+        for predicate, values in nodes.columns
+    ]
+    return (", ".join(filter(None, row)) for row in zip(names, *columns, strict=True))
 
 
 def _entry(iri: str, value: Any) -> str:
-    """A predicate's short name with a value, or with a list of them."""
+    """A predicate's short name with a value, or with a list of them; empty for none."""
     name, told = "", []
     for each in value if isinstance(value, tuple) else (value,):
-        kind = "@id" if isinstance(each, ox.NamedNode) else each.datatype.value
-        name, before, after = _frame(iri, kind)
-        text = _short(iri, each.value) if kind == "@id" else _quoted(each.value)
-        told.append(f"{before}{text}{after}")
-    listed = f"[{', '.join(told)}]" if isinstance(value, tuple) else told[0]
+        if each is not None:
+            named = isinstance(each, ox.NamedNode)
+            name, before, after = _frame(iri, "@id" if named else each.datatype.value)
+            short = named and (iri == TYPE or each.value.startswith(GF))
+            text = compact(each.value) if short else each.value
+            told.append(f"{before}{encode_basestring(text)}{after}")
+    listed = f"[{', '.join(told)}]" if isinstance(value, tuple) else "".join(told)
     return f'"{name}": {listed}' if told else ""
-
-
-def _short(iri: str, text: str) -> str:
-    return f'"{compact(text) if iri == TYPE or text.startswith(GF) else text}"'
 
 
 @cache

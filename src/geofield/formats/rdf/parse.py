@@ -38,7 +38,8 @@ def parse(path: Path) -> Iterator[ox.Quad]:
     if not path.is_file():
         raise FormatError(f"There is no file {path}.")
     if syntax == ox.RdfFormat.RDF_XML:
-        check_xml(path)
+        with path.open("rb") as file:
+            check_xml(file, path.name)
     elif syntax == ox.RdfFormat.JSON_LD:
         check_json(path.read_text(encoding="utf-8", errors="replace"), path.name)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +22,12 @@ from geofield.formats.rdf.parse import parse
 _PARAMETER = re.compile(
     r'VALUES \?(?P<name>\w+) \{ (?P<value>"(?P<text>[^"]*)"(?:\^\^xsd:(?P<kind>\w+))?|-?\d+) \}'
 )
+#: By datatype what a literal's text means.
+_VALUES: dict[str, Callable[[str], Any]] = {
+    BOOLEAN: "true".__eq__,
+    **dict.fromkeys((INTEGER, XSD + "int"), int),
+    **dict.fromkeys((DOUBLE, XSD + "decimal", XSD + "float"), float),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,11 +157,5 @@ def _literal(match: re.Match[str], value: str) -> str:
 def _python(term: Any) -> Any:
     if term is None:
         return None
-    if not isinstance(term, ox.Literal):
-        return term.value
-    kind = term.datatype.value
-    if kind == BOOLEAN:
-        return term.value == "true"
-    if kind in (DOUBLE, XSD + "decimal", XSD + "float"):
-        return float(term.value)
-    return int(term.value) if kind in (INTEGER, XSD + "int") else term.value
+    kind = term.datatype.value if isinstance(term, ox.Literal) else ""
+    return _VALUES.get(kind, str)(term.value)

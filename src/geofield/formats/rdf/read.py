@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from geofield.formats.arrow import TYPE_IDS, promoted
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
 from geofield.formats.rdf.geosparql import geometries_of, known_crs, split_literal
-from geofield.formats.rdf.graph import Graph
+from geofield.formats.rdf.graph import Graph, number
 from geofield.formats.rdf.layers import (
     YES_NO,
     LayerMap,
@@ -84,10 +83,7 @@ def load(path: Path) -> Graph:
     """The triples of a file; many nodes of one shape by their pattern."""
     syntax = SYNTAXES.get(path.suffix.lower())
     graph = repeated(path, syntax) if syntax else None
-    if graph is None:
-        graph = Graph()
-        graph.add((s.value, p.value, o.value) for s, p, o, _ in parse(path))
-    return graph
+    return Graph.of(parse(path)) if graph is None else graph
 
 
 def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = None) -> Dataset:
@@ -219,18 +215,15 @@ class _Rows:
     def typed(self, column: schema.Column, texts: list[str | None]) -> list[Any]:
         """Texts as the values of a column."""
         if column.type in ("int", "float"):
-            kind, none = (int, None) if column.type == "int" else (float, np.nan)
-            try:
-                values: list[Any] = [none if t is None else kind(t) for t in texts]
-                if np.isfinite(
-                    [v for v, t in zip(values, texts, strict=True) if t is not None]
-                ).all():
-                    return values
-            except (ValueError, OverflowError, TypeError):
-                pass
-            for text, subject in zip(texts, self.subjects, strict=True):
-                if text is not None:
-                    _need_number(text, kind, column.name, subject)
+            kind = int if column.type == "int" else float
+            values = [number(text, kind) for text in texts]
+            for text, value, subject in zip(texts, values, self.subjects, strict=True):
+                if value is None and text is not None:
+                    raise FormatError(
+                        f"<{subject}>: {column.name} is {text[:40]!r}, not a finite number.",
+                        hint="`geofield validate` lists everything that is wrong.",
+                    )
+            return values
         meaning = {expand(value_iri(value)): value for value in column.values}
         if column.values == YES_NO:
             meaning = {"true": "yes", "false": "no", "1": "yes", "0": "no"}
@@ -239,14 +232,11 @@ class _Rows:
     def geometry(self, data: dict[str, Any], crs: CRS, pixel_m: float | None) -> Any:
         """Of each row: its literal, or what its position and radius tell."""
         if self.layer.layer.geometry == "Point":
-            exact = [
-                self.typed(
-                    schema.Column(name, "float", "", ""), self.told(self.subjects, [f"gf:{name}"])
-                )
-                for name in ("easting", "northing")
-            ]
+            columns = (schema.Column(name, "float", "", "") for name in ("easting", "northing"))
+            told = [self.typed(c, self.told(self.subjects, [f"gf:{c.name}"])) for c in columns]
+            exact = np.array(told, float)
             if not np.isnan(exact).any():
-                return shapely.points(*np.array(exact))
+                return shapely.points(*exact)
         places = [(self.scope.survey or s) if self.is_field else s for s in self.subjects]
         texts = self.literals(places, crs)
         geometry = geometries_of(texts, self.subjects, crs)
@@ -299,18 +289,6 @@ class _Rows:
                 f"{of.name!r} holds geometries of type {of.geometry}."
             )
         return geometry
-
-
-def _need_number(text: str, kind: type, column: str, subject: str) -> None:
-    try:
-        finite = math.isfinite(kind(text))
-    except (ValueError, OverflowError) as error:
-        raise FormatError(
-            f"<{subject}>: {column} is {text[:40]!r}, not a number.",
-            hint="`geofield validate` lists everything that is wrong.",
-        ) from error
-    if not finite:
-        raise FormatError(f"<{subject}>: {column} is {text}, not a finite number.")
 
 
 def _footprint_radius(data: dict[str, Any], rows: Any, pixel_m: float | None) -> Any:

@@ -2,12 +2,11 @@
 
 The study's sample (METHOD.md, section 5) cannot be taken literally; the choices made:
 
-- A root description (``http://www.DLC.org/Obstacle#``) holds the typed nodes. RDF/XML does
-  not allow a node inside a node, so each stands in an `rdfs:member` of the root.
-- The samples give nodes no names. Here they have the same IRIs as in the GeoSPARQL profile,
-  so that both may be merged and name the same obstacle.
-- The study writes the trajectory's properties in ``.../trajectory#`` but its root as
-  ``.../Trajectory#``. Both are kept as they are: IRIs are compared letter by letter.
+- RDF/XML allows no node inside a node: each stands in an `rdfs:member` of a root description
+  (``http://www.DLC.org/Obstacle#``).
+- The samples give nodes no names. Here they have those of the GeoSPARQL profile: both merge.
+- ``.../trajectory#`` of properties and ``.../Trajectory#`` of the root stay as the study has
+  them: IRIs are compared letter by letter.
 - Untyped numbers get the datatypes the study's table names: `xsd:int` for numbers,
   `xsd:double` for positions and pixels. `gml:pos` stays a text, "lat, long".
 - The class *tree* and the root's members are what is driven around; an obstacle of another kind,
@@ -19,10 +18,8 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
-
-import numpy as np
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
@@ -39,7 +36,7 @@ from geofield.formats.rdf.namespaces import (
     expand,
     node,
 )
-from geofield.formats.rdf.triples import Column, Group, Nodes, Typed, named
+from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
 #: The study's property and datatype for columns of its two tables.
 STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
@@ -83,7 +80,7 @@ class StudyDescription(Description):
             frame = self.table(layer)
             iris, types = row_iris(layer, frame, self.names), self.types(layer, frame)
             avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
-            yield _members(STUDY_OBSTACLE, named(avoided))
+            yield _members(STUDY_OBSTACLE, Texts(avoided))
         if name != schema.TRACK_POINTS.name:
             yield from super().layer(layer)
 
@@ -105,7 +102,7 @@ class StudyDescription(Description):
             return columns
         study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
         taken = {predicate for predicate, _ in study}
-        image: Column = (node("dc:type"), [node(DCMI_IMAGE)] * len(frame))
+        image: Column = (node("dc:type"), node(DCMI_IMAGE))
         return [image, *study, *(each for each in columns if each[0] not in taken)]
 
     def detections(self, frame: Any) -> Iterator[Group]:
@@ -119,26 +116,24 @@ class StudyDescription(Description):
         )
         places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
         columns: list[Column] = [
-            (node("rdf:type"), [node(GML + "point")] * len(frame)),
+            (node("rdf:type"), node(GML + "point")),
             *_study_columns(rounded, STUDY_POINT_TERMS),
-            (node(GML + "pos"), Typed([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
-            (node("gf:segmentNo"), Typed(map(str, frame["segment_no"].tolist()), "xsd:int")),
+            (node(GML + "pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
+            (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
-        points = named(iris)
-        yield _members(STUDY_TRAJECTORY, points)
-        yield (Nodes(points, columns),)
+        yield _members(STUDY_TRAJECTORY, iris)
+        yield (Nodes(iris, columns),)
 
 
-def _members(root: str, members: Iterable[Any]) -> Group:
+def _members(root: str, members: Texts) -> Group:
     """The study's root description holds its nodes."""
-    return (Nodes([node(root)], [(node("rdfs:member"), [tuple(members)])]),)
+    return (Nodes(Texts([root]), [(node("rdfs:member"), [tuple(terms(members, 0))])]),)
 
 
 def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
     result: list[Column] = []
     for column, (predicate, datatype) in terms.items():
-        texts: list[str | None] = list(map(repr, frame[column].tolist()))
-        for row in np.flatnonzero(frame[column].isna()).tolist():
-            texts[row] = None
-        result.append((node(predicate), Typed(texts, datatype)))
+        values = frame[column].astype(object).where(frame[column].notna(), None).tolist()
+        texts = [None if value is None else repr(value) for value in values]
+        result.append((node(predicate), Texts(texts, datatype)))
     return result

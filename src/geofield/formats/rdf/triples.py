@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, repeat
+from functools import partial
 from typing import Any
 
 import pyoxigraph as ox
@@ -19,59 +19,58 @@ from geofield.formats.xml import NOT_IN_XML
 
 #: Nodes of equal length that belong together row by row: a feature and its geometries.
 Group = tuple["Nodes", ...]
-#: A value of one row: a term, several, or none.
-Value = Any
-#: A predicate with a value for each row.
-Column = tuple[ox.NamedNode, Sequence[Value]]
 _DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
-_MANY_OR_NONE = {tuple, type(None)}
 _DATATYPES = {bool: BOOLEAN, int: INTEGER, float: DOUBLE}
+
+
+class Texts(list[Any]):
+    """Texts of one datatype (a prefixed name), IRIs without one; terms when asked for."""
+
+    __slots__ = ("datatype",)
+
+    def __init__(self, texts: Iterable[str | None], datatype: str | None = None) -> None:
+        super().__init__(texts)
+        self.datatype = node(datatype) if datatype else None
+
+
+#: Values of a predicate: a term that all rows have, texts, or of each row its value.
+Values = ox.NamedNode | ox.Literal | Texts | Sequence[Any] | None
+Column = tuple[ox.NamedNode, Values]
 
 
 @dataclass(frozen=True, slots=True)
 class Nodes:
-    """Descriptions of one shape: their subjects, and a column for each predicate."""
+    """Descriptions of one shape: their IRIs, and a column for each predicate."""
 
-    subjects: Sequence[ox.NamedNode]
+    subjects: Texts
     columns: Sequence[Column]
 
 
-class Typed(list[Any]):
-    """Texts of one datatype (a prefixed name or IRI), as literals when those are asked for."""
-
-    __slots__ = ("datatype",)
-
-    def __init__(self, texts: Iterable[str | None], datatype: str) -> None:
-        super().__init__(texts)
-        self.datatype = node(datatype)
-
-
-def terms(values: Sequence[Value]) -> Sequence[Value]:
-    """The terms of a column; None stays none."""
-    if not isinstance(values, Typed):
-        return values
-    kind = values.datatype
-    return [None if text is None else ox.Literal(text, datatype=kind) for text in values]
+def terms(values: Values, count: int) -> Sequence[Any]:
+    """The value of each row."""
+    if isinstance(values, Texts):
+        kind = values.datatype
+        made = ox.NamedNode if kind is None else partial(ox.Literal, datatype=kind)
+        return [None if text is None else made(text) for text in values]
+    return values if isinstance(values, Sequence) else [values] * count
 
 
 def triples(groups: Iterable[Group]) -> Iterator[ox.Triple]:
     """The triples of groups, row by row: a feature, then its geometries, then the next."""
-    triple = ox.Triple
     for group in groups:
+        count = len(group[0].subjects)
         columns = [
-            (each.subjects, name, terms(values)) for each in group for name, values in each.columns
+            (subjects, predicate, terms(values, count))
+            for each in group
+            for subjects in [terms(each.subjects, count)]
+            for predicate, values in each.columns
         ]
-        if not any(_MANY_OR_NONE & set(map(type, values)) for *_, values in columns):
-            # One value in every row: no step of Python for each.
-            made = (map(triple, s, repeat(p), values) for s, p, values in columns)
-            yield from chain.from_iterable(zip(*made, strict=True))
-            continue
-        for index in range(len(group[0].subjects)):
+        for row in range(count):
             for subjects, predicate, values in columns:
-                value = values[index]
+                value = values[row]
                 for each in value if type(value) is tuple else (value,):
                     if each is not None:
-                        yield triple(subjects[index], predicate, each)
+                        yield ox.Triple(subjects[row], predicate, each)
 
 
 def single(iri: str, types: str, **properties: Any) -> Group:
@@ -85,32 +84,22 @@ def single(iri: str, types: str, **properties: Any) -> Group:
     **properties
         Prefixed names with an underscore for the colon: ``gf_inField``.
     """
-    columns = [(node("rdf:type"), [tuple(map(node, types.split()))])]
+    columns: list[Column] = [(node("rdf:type"), [tuple(map(node, types.split()))])]
     for name, value in properties.items():
         if value is not None and value != "":
             columns.append((node(name.replace("_", ":", 1)), [term(value)]))
-    return (Nodes([ox.NamedNode(iri)], columns),)
+    return (Nodes(Texts([iri]), columns),)
 
 
 def term(value: Any) -> Any:
-    """A Python value as a term; terms as they are."""
+    """A Python value as a term; terms as they are. What XML cannot carry stands in no syntax."""
     kind = _DATATYPES.get(type(value))
     if kind is not None:
         text = str(value).lower() if kind == BOOLEAN else repr(value)
         return ox.Literal(text, datatype=node(kind))
-    return text_term(value) if isinstance(value, str) else value
-
-
-def text_term(text: str) -> ox.Literal:
-    """A plain text as a literal; what XML cannot carry stands in no syntax."""
-    return ox.Literal(NOT_IN_XML.sub("\ufffd", text))
+    return ox.Literal(NOT_IN_XML.sub("\ufffd", value)) if isinstance(value, str) else value
 
 
 def date_term(text: str) -> ox.Literal:
     """A day as a date; a text where only the year or month is known."""
-    return ox.Literal(text, datatype=node("xsd:date")) if _DAY.fullmatch(text) else text_term(text)
-
-
-def named(iris: Iterable[str | None]) -> list[Any]:
-    """IRIs as terms; None stays none."""
-    return [None if iri is None else ox.NamedNode(iri) for iri in iris]
+    return ox.Literal(text, datatype=node("xsd:date")) if _DAY.fullmatch(text) else term(text)

@@ -36,8 +36,7 @@ def validate(path: Path) -> list[Problem]:
         message = error.message.split(": ", 1)[-1]
         place = int(line[1]) if line else None
         return [Problem(message, path.name, place, error.hint or "", "syntax")]
-    graph = Graph()
-    graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
+    graph = Graph.of(quads)
     known = [iri for layer in layer_maps() for iri in classes(layer)]
     if not quads and _GEOFIELD in path.read_bytes()[:20_000]:
         return []  # one of a plan's three files: it has no obstacles, or no tracks

@@ -8,7 +8,7 @@ when asked.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,11 @@ import pyoxigraph as ox
 
 from geofield.errors import FormatError
 from geofield.formats.rdf.describe import PRODUCTS, Description
-from geofield.formats.rdf.jsonld import write_jsonld as write_json
 from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import PREFIXES, STRING, STUDY_PREFIXES
 from geofield.formats.rdf.repeated import write_repeated
 from geofield.formats.rdf.study import StudyDescription
-from geofield.formats.rdf.triples import Group, triples
+from geofield.formats.rdf.triples import triples
 from geofield.model.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -49,7 +48,8 @@ def write_rdfxml(
     paths = [folder / f"{before}{product}.rdf" for product in PRODUCTS]
     for path, product in zip(paths, PRODUCTS, strict=True):
         groups = chain.from_iterable(each.product(product) for each in told)
-        _write(path, ox.RdfFormat.RDF_XML, groups, options)
+        with path.open("wb") as file:
+            write_repeated(groups, file, ox.RdfFormat.RDF_XML, _profile(options)[2])
     return paths
 
 
@@ -65,8 +65,9 @@ def _one_file(suffix: str, syntax: ox.RdfFormat) -> Callable[..., list[Path]]:
         fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
     ) -> list[Path]:
         path = folder / f"{stem}{suffix}"
-        told = _described(fields, options)
-        _write(path, syntax, chain.from_iterable(each.everything() for each in told), options)
+        groups = chain.from_iterable(each.everything() for each in _described(fields, options))
+        with path.open("wb") as file:
+            write_repeated(groups, file, syntax, _profile(options)[2])
         return [path]
 
     return write
@@ -120,14 +121,3 @@ def _profile(options: Mapping[str, Any]) -> tuple[type[Description], bool, dict[
             f"There is no RDF profile {profile!r}.", hint=f"Profiles: {', '.join(PROFILES)}."
         )
     return _PROFILES[profile]
-
-
-def _write(
-    path: Path, syntax: ox.RdfFormat, groups: Iterable[Group], options: Mapping[str, Any]
-) -> None:
-    *_, prefixes = _profile(options)
-    with path.open("wb") as file:
-        if syntax == ox.RdfFormat.JSON_LD:
-            write_json(groups, file, prefixes)
-        else:
-            write_repeated(groups, file, syntax, prefixes)
