@@ -12,6 +12,8 @@ SAMPLE := sample_data/field_1.tif --lat 35.075373 --lon 33.531142
 # One thread per process: the work is split by process, and figures stay comparable.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# A command that compiles its source each time takes a fifth longer.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test check pytest format lock bench docs notebooks pictures plugin clean
 

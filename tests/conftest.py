@@ -16,6 +16,17 @@ settings.load_profile("geofield")
 ROOT = Path(__file__).resolve().parents[1]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share a fixture of their module run in one worker, where it is made once."""
+    for item in items:
+        known = getattr(item, "_fixtureinfo", None)
+        found = known.name2fixturedefs.values() if known else ()
+        shares = any(each[-1].scope == "module" for each in found)
+        if shares and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
 def shared_folder() -> Path | None:
     """The folder with real data, where there is one."""
     place = Path(os.environ.get("GEOFIELD_SHARED", ROOT.parent / "shared"))

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from forks import Forks
 
 #: QGIS belongs to Debian's Python, never to the environment of the tests.
 PYTHON = "/usr/bin/python3"
@@ -40,8 +43,11 @@ def environment_in(home: Path, more: Mapping[str, str] | None = None) -> dict[st
     return environment
 
 
-def asking(client: Path, environment: Mapping[str, str]) -> Callable[..., Any]:
+@contextmanager
+def asking(client: Path, environment: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
     """Questions to a client script: what it is to do, further variables, its arguments."""
+    program = Path(__file__).with_name("forked_qgis.py")
+    forks = Forks([PYTHON, str(program)], environment)
 
     def ask(
         do: str,
@@ -49,18 +55,19 @@ def asking(client: Path, environment: Mapping[str, str]) -> Callable[..., Any]:
         timeout_s: float = 300,
         **arguments: Any,
     ) -> Any:
-        done = subprocess.run(
-            [PYTHON, str(client), json.dumps({"do": do, **arguments})],
-            env={**environment, **(variables or {})},
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-            check=False,
-        )
+        words = [str(client), json.dumps({"do": do, **arguments})]
+        if variables:  # which a library may read while it loads
+            done = subprocess.run(
+                [PYTHON, *words], env={**environment, **variables}, capture_output=True, text=True,
+                timeout=timeout_s, check=False,
+            )  # fmt: skip
+        else:
+            done = forks.run(words, timeout_s=timeout_s)
         assert "@@@" in done.stdout, f"QGIS failed: {done.stdout[-500:]} {done.stderr[-3000:]}"
         return json.loads(done.stdout.rsplit("@@@", 1)[1])
 
-    return ask
+    yield ask
+    forks.end()
 
 
 def mark_all(items: list[pytest.Item], folder: Path) -> None:

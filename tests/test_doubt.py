@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -28,6 +27,7 @@ from geofield.review.live import LivePlans
 from geofield.review.shown import field_of
 from geofield.settings import load_settings
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 OUTSIDE = "outside the picture"
 
@@ -170,12 +170,7 @@ def parcel(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def _called(*command: object) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, command)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_geofield(*command)
     assert done.returncode == 0, done.stderr
     return done
 

@@ -1,8 +1,6 @@
 """What a driver loses, counted on ground where the answer is known."""
 
 import json
-import subprocess
-import sys
 
 import geopandas as gpd
 import numpy as np
@@ -12,6 +10,7 @@ from shapely import LineString, Point, box
 import geofield as gf
 from geofield.errors import ObstacleError
 from geofield.evaluation import driving
+from geofield_command import run_geofield
 
 UTM = "EPSG:32636"
 EAST, NORTH = 500_000.0, 3_900_000.0
@@ -101,8 +100,7 @@ def test_tracks_need_their_field():
 
 
 def geofield(*arguments, folder):
-    command = [sys.executable, "-m", "geofield", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return run_geofield(*arguments, folder=folder)
 
 
 def test_the_command_tells_what_a_driver_loses(simulated, simulated_tif, tmp_path):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import pytest
 
 import geofield as gf
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 pytest.importorskip("matplotlib")
 
@@ -29,12 +28,8 @@ def maps(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) ->
         name="Hill & Dale \N{LATIN SMALL LETTER D WITH PALATAL HOOK}",
     )
     plan.write(folder, formats=["gpkg"])
-    geofield, plan_file = Path(sys.executable).with_name("geofield"), folder / "field.gpkg"
-    subprocess.run(
-        [geofield, "export", plan_file, "-f", "map-svg", "-f", "map-pdf", "--out", folder],
-        check=True,
-        capture_output=True,
-    )
+    export = ("export", folder / "field.gpkg", "-f", "map-svg", "-f", "map-pdf")
+    run_geofield(*export, "--out", folder, check=True)
     return folder
 
 
@@ -70,11 +65,10 @@ def test_letters_that_the_usual_font_lacks_are_drawn_with_another(maps: Path) ->
 
 
 def test_they_are_renewed_with_the_plan(maps: Path) -> None:
-    geofield = Path(sys.executable).with_name("geofield")
     plan = maps / "field.gpkg"
-    subprocess.run([geofield, "tracks", plan, "--spacing", "20", "-o", plan], check=True)
+    run_geofield("tracks", plan, "--spacing", 20, "-o", plan, check=True)
     before = (maps / "map.svg").read_text(encoding="utf-8")
-    subprocess.run([geofield, "refresh", plan], check=True)
+    run_geofield("refresh", plan, check=True)
     after = (maps / "map.svg").read_text(encoding="utf-8")
     assert after != before
     assert f"{len(gf.read_plan(plan).tracks.lines)} tracks" in after

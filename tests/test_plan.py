@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from geofield.model.obstacles import circle_polygons
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.settings import load_settings
+from geofield_command import run_geofield
 
 UTM = CRS.from_epsg(32636)
 X, Y = 545_000.0, 3_880_000.0
@@ -68,12 +67,7 @@ def test_the_command_tells_the_same_figures_as_the_plan_that_it_wrote(
 ) -> None:
     plan.write(tmp_path / "out")
     file = tmp_path / "out/field.gpkg"
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", "tracks", file, "--spacing", "5", "-o", file, "--json"],
-        capture_output=True,
-        check=True,
-        text=True,
-    )
+    done = run_geofield("tracks", file, "--spacing", 5, "-o", file, "--json", check=True)
     (told,) = json.loads(done.stdout)["fields"]
     tracks = read_plan(file).tracks
     assert tracks is not None

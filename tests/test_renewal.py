@@ -6,7 +6,6 @@ import json
 import os
 import sqlite3
 import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -16,15 +15,14 @@ import pytest
 from geofield.renewal import outdated
 from geofield.simulate import SimulatedField
 from geofield.staging import written_ns
+from geofield_command import run_geofield
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
 PRODUCTS = ["field.rdf", "geojson/", "map.png", "obstacles.rdf", "report.json", "shapefile/"]
 PRODUCTS += ["tracks.rdf"]
 
 
 def geofield(*words: object) -> subprocess.CompletedProcess[str]:
-    line = [str(each) for each in (GEOFIELD, *words)]
-    return subprocess.run(line, capture_output=True, text=True, check=True)
+    return run_geofield(*words, check=True)
 
 
 @pytest.fixture(scope="module")

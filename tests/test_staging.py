@@ -19,6 +19,7 @@ from geofield.errors import FormatError, OutputExistsError
 from geofield.plan import read_plan
 from geofield.simulate import SimulatedField
 from geofield.staging import staged_folder
+from geofield_command import run_geofield
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 
@@ -215,7 +216,7 @@ def plan(
 ) -> Path:
     out = tmp_path_factory.mktemp("kills") / "out"
     line = ["run", simulated_tif, "--lat", simulated.lat, "--lon", simulated.lon, "--out", out]
-    subprocess.run([GEOFIELD, *map(str, line), "--spacing", "8"], check=True, capture_output=True)
+    run_geofield(*line, "--spacing", 8, check=True)
     return out / "field.gpkg"
 
 
@@ -244,7 +245,7 @@ def test_a_stop_at_any_moment_leaves_products_whole(plan: Path, kind: signal.Sig
         whole(plan)
         if kind != signal.SIGKILL:
             assert leftovers(plan.parent) == []
-    subprocess.run([GEOFIELD, "tracks", plan, "--spacing", "8", "-o", plan], check=True)
+    run_geofield("tracks", plan, "--spacing", 8, "-o", plan, check=True)
     assert leftovers(plan.parent) == []
 
 
@@ -264,12 +265,7 @@ def test_a_geopackage_that_another_program_edits_is_left_alone(plan: Path) -> No
     try:
         assert holder.stdout is not None
         holder.stdout.readline()
-        done = subprocess.run(
-            [GEOFIELD, "tracks", plan, "--spacing", "4", "-o", plan],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = run_geofield("tracks", plan, "--spacing", 4, "-o", plan)
     finally:
         kill(holder)
     assert done.returncode == 1

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import geopandas as gpd
 import pytest
 import shapely
+
+from geofield_command import run_geofield
 
 SAMPLE = Path(__file__).parents[1] / "sample_data"
 LAT, LON = 35.075373, 33.531142
@@ -16,8 +16,7 @@ LAT, LON = 35.075373, 33.531142
 
 def refused(*args: object) -> str:
     """Run the command as a process; what it said when it refused."""
-    command = [sys.executable, "-m", "geofield", *map(str, args)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_geofield(*args)
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stderr
     return " ".join(done.stderr.split())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ import pytest
 import geofield as gf
 import geofield.settings  # knows what its options are called
 from geofield.wording import in_python
+from geofield_command import run_geofield
 
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
 
@@ -35,9 +34,6 @@ def test_an_error_speaks_to_both() -> None:
         gf.plan_field(SAMPLE, lat=35.075373, lon=33.531142, spacing_m=6000)
     assert "--" not in str(caught.value)
     assert caught.value.hint.endswith("--spacing 3.")
-    done = subprocess.run(
-        [Path(sys.executable).with_name("geofield"), "tracks", SAMPLE.with_suffix(".gpkg"),
-         "--spacing", "6000", "-o", "never.gpkg"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    plan = SAMPLE.with_suffix(".gpkg")
+    done = run_geofield("tracks", plan, "--spacing", 6000, "-o", "never.gpkg")
     assert "--spacing 3." in done.stderr

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
@@ -13,14 +11,14 @@ import pandas as pd
 
 from geofield.plan import Plan, read_plan
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 Frame: TypeAlias = gpd.GeoDataFrame
 
 
 def geofield(*args: object) -> str:
     """Run the command as a process; returns what it told on stderr."""
-    command = [sys.executable, "-m", "geofield", *map(str, args)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_geofield(*args)
     assert done.returncode == 0, done.stderr
     return done.stderr
 

@@ -11,7 +11,7 @@ from changed_plans import run
 from geofield.simulate import SimulatedField, SimulationSettings, simulate_field
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def made() -> SimulatedField:
     """A field with eleven trees."""
     return simulate_field(
@@ -19,7 +19,7 @@ def made() -> SimulatedField:
     )
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def first(made: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the picture and a run's products."""
     from geofield.imagery import write_scene

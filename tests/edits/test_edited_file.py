@@ -16,6 +16,7 @@ import pytest
 from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run, shrunk
 
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 
 def test_one_generation_back(folder: Path, made: SimulatedField) -> None:
@@ -39,8 +40,7 @@ def test_one_generation_back(folder: Path, made: SimulatedField) -> None:
 
 
 def test_nothing_to_undo(folder: Path) -> None:
-    command = [sys.executable, "-m", "geofield", "undo", str(folder / "out/field.gpkg")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_geofield("undo", folder / "out/field.gpkg")
     assert done.returncode == 1
     assert "no earlier plan" in done.stderr
 
@@ -59,8 +59,7 @@ def test_a_layer_that_is_gone_is_no_word(folder: Path, made: SimulatedField) -> 
         ["obstacles", folder / "picture.tif", file, "-o", file],
         ["field", folder / "picture.tif", *where, "-o", file, "--overwrite"],
     ):
-        command = [sys.executable, "-m", "geofield", *map(str, stage)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = run_geofield(*stage)
         assert done.returncode == 1
         assert "The layer `obstacles`" in done.stderr
         assert "geofield undo" in done.stderr
@@ -229,24 +228,20 @@ def test_no_machine_is_steered_through_an_obstacle_drawn_since(folder: Path) -> 
     drawn = plan_in(folder).field.polygon.representative_point().buffer(8.0)
     rock = gpd.GeoDataFrame(geometry=[drawn], crs=plan_in(folder).field.crs)
     rewritten(file, "obstacles", lambda table: pd.concat([table, rock]))
-    command = [sys.executable, "-m", "geofield", "export", str(file), "--out", str(folder / "x")]
-    done = subprocess.run(
-        [*command, "-f", "geojson,isoxml"], capture_output=True, text=True, check=False
-    )
+    export = ("export", file, "--out", folder / "x")
+    done = run_geofield(*export, "-f", "geojson,isoxml")
     assert done.returncode == 1
     assert f"through obstacle {len(rows(plan_in(folder)))}" in done.stderr
     assert "`geofield tracks PLAN.gpkg -o PLAN.gpkg`" in done.stderr
     assert not (folder / "x").exists()
     # Who looks at a map may see it, and is told.
-    assert "plan the tracks again" in geofield(*command[3:], "-f", "geojson")
+    assert "plan the tracks again" in geofield(*export, "-f", "geojson")
     # So are tracks out of an outline that was drawn smaller.
     rewritten(file, "obstacles", lambda table: table[table["obstacle_no"].notna()])
     rewritten(file, "field", shrunk)
     (folder / "out/isoxml/TASKDATA").mkdir(parents=True)
     (folder / "out/isoxml/TASKDATA/TASKDATA.XML").touch()
-    done = subprocess.run(
-        [*command[:3], "refresh", str(file)], capture_output=True, text=True, check=False
-    )
+    done = run_geofield("refresh", file)
     assert done.returncode == 1
     assert "out of the field" in done.stderr
     geofield("tracks", file, "-o", file)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from shapely.affinity import translate
 
 from geofield.formats import validate_file
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 
 def test_a_drawn_outline_stands_above_the_boundary_given(
@@ -64,9 +63,8 @@ def test_an_outline_of_which_nobody_recorded_how_it_was_written(
 def test_a_region_does_not_change_a_drawn_outline(folder: Path, made: SimulatedField) -> None:
     file = folder / "out/field.gpkg"
     rewritten(file, "field", shrunk)
-    command = [sys.executable, "-m", "geofield", "field", str(folder / "picture.tif")]
-    command += ["--lat", str(made.lat), "--lon", str(made.lon), "-o", str(file), "--overwrite"]
-    done = subprocess.run([*command, "--region", "1"], capture_output=True, text=True, check=False)
+    where = ("--lat", made.lat, "--lon", made.lon, "-o", file, "--overwrite")
+    done = run_geofield("field", folder / "picture.tif", *where, "--region", 1)
     assert done.returncode == 1
     assert "no region changes it" in done.stderr
 

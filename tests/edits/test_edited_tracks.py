@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -32,6 +30,7 @@ from geofield.plan import Plan, read_plan
 from geofield.review.session import Session
 from geofield.simulate import SimulatedField
 from geofield.tracks import plan_route, plan_tracks
+from geofield_command import run_geofield
 
 KEPT = "tracks of yours kept: "
 
@@ -336,11 +335,9 @@ def test_a_run_for_another_field_does_not_forget_them(folder: Path, made: Simula
     written = file.read_bytes()
     picture = gpd.GeoSeries([plan_in(folder).field.polygon], crs=plan_in(folder).field.crs)
     west, south, *_ = picture.to_crs(4326).total_bounds
-    command = [sys.executable, "-m", "geofield", "field", folder / "picture.tif", "--overwrite"]
-    done = subprocess.run(
-        [*map(str, command), "--lat", f"{south}", "--lon", f"{west}", "-o", str(file)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = run_geofield(
+        "field", folder / "picture.tif", "--overwrite", "--lat", south, "--lon", west, "-o", file
+    )
     assert done.returncode == 1
     assert "holds 1 edited tracks, a name, columns of your own" in done.stderr
     assert "--fresh" in done.stderr

@@ -20,6 +20,7 @@ import shapely
 
 import geofield as gf
 from geofield.farm import read_farm
+from geofield_command import run_geofield
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 #: The command without the extra, as where it is not installed.
@@ -34,9 +35,19 @@ RECTANGLE = ((0, 0), (80, 0), (80, 60), (0, 60))
 
 
 def batch(*arguments: object, code: int = 0, plain: bool = True) -> str:
-    """Run the command; its messages."""
+    """Run the command, without the extra or with it; its messages."""
+    without = ["distributed"] if plain else []
+    return told_by(run_geofield("batch", *arguments, without=without, timeout_s=500), code)
+
+
+def batch_alone(*arguments: object, code: int = 0, plain: bool = True) -> str:
+    """The same as a process from the start: in another one, sets have another order."""
     line = [*(PLAIN if plain else [str(GEOFIELD)]), "batch", *map(str, arguments)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=500, check=False)
+    return told_by(done, code)
+
+
+def told_by(done: subprocess.CompletedProcess[str], code: int) -> str:
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stderr
@@ -73,8 +84,8 @@ def parcels(path: Path, count: int = 60, **columns: object) -> Path:
 def farm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A farm of parcels made by one worker, beside its places."""
     folder = tmp_path_factory.mktemp("batch")
-    batch(parcels(folder / "parcels.gpkg"), "--spacing", 5, "--out", folder / "farm",
-          "--workers", 1)  # fmt: skip
+    batch_alone(parcels(folder / "parcels.gpkg"), "--spacing", 5, "--out", folder / "farm",
+                "--workers", 1)  # fmt: skip
     return folder / "farm"
 
 
@@ -110,9 +121,9 @@ def test_a_restart_does_only_what_is_missing(farm: Path, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_dask_and_two_workers_give_the_same_bytes(farm: Path, tmp_path: Path) -> None:
-    said = batch(farm.parent / "parcels.gpkg", "--spacing", 5, "--out", tmp_path / "farm",
-                 "--workers", 2, plain=False)  # fmt: skip
-    assert "dashboard at http" in said
+    told = batch_alone(farm.parent / "parcels.gpkg", "--spacing", 5, "--out", tmp_path / "farm",
+                       "--workers", 2, plain=False)  # fmt: skip
+    assert "dashboard at http" in told
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
@@ -348,12 +359,12 @@ def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
     batch(places, "--spacing", 5, "--out", tmp_path / "farm")
     untouched = layers_of(tmp_path / "farm")
     mine = tmp_path / "p4.gpkg"
-    subprocess.run([GEOFIELD, "farm", "get", tmp_path / "farm", "p4", "-o", mine], check=True)
+    run_geofield("farm", "get", tmp_path / "farm", "p4", "-o", mine, check=True)
     outline = gpd.read_file(mine, layer="field")
     outline.geometry = outline.geometry.buffer(-3.0, join_style="mitre")
     outline.to_file(mine, layer="field", driver="GPKG")
-    subprocess.run([GEOFIELD, "tracks", mine, "--spacing", "5", "-o", mine], check=True)
-    subprocess.run([GEOFIELD, "farm", "put", mine, tmp_path / "farm"], check=True)
+    run_geofield("tracks", mine, "--spacing", 5, "-o", mine, check=True)
+    run_geofield("farm", "put", mine, tmp_path / "farm", check=True)
     edited = gf.read_plan(mine)
     whole = read_farm(tmp_path / "farm")
     assert whole["p4"] == edited

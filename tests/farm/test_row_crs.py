@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,8 @@ import pytest
 import shapely
 
 from geofield.farm import read_places
+from geofield_command import run_geofield
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
 SHAPES = [shapely.box(10.0 + i / 500, 50.0, 10.001 + i / 500, 50.001) for i in range(3)]
 PARCELS = gpd.GeoDataFrame({"id": [1, 2, 3]}, geometry=SHAPES, crs=4326)
 
@@ -24,8 +22,7 @@ PARCELS = gpd.GeoDataFrame({"id": [1, 2, 3]}, geometry=SHAPES, crs=4326)
 def said_of(path: Path) -> str:
     """What the command says; it writes nothing."""
     farm = path.parent / "farm"
-    line: list[str | Path] = [GEOFIELD, "batch", path, "--workers", "1", "--out", farm]
-    done = subprocess.run(line, capture_output=True, text=True, timeout=100, check=False)
+    done = run_geofield("batch", path, "--workers", 1, "--out", farm)
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stderr
     assert not farm.exists() or not list(farm.rglob("*"))

@@ -2,8 +2,6 @@
 
 import json
 import pickle
-import subprocess
-import sys
 import warnings
 from typing import Any
 
@@ -18,6 +16,7 @@ from geofield.field.points import obeying, obeys
 from geofield.imagery import write_scene
 from geofield.plan import read_plan
 from geofield.simulate import SimulationSettings, simulate_field
+from geofield_command import run_geofield
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +28,7 @@ def sample(tmp_path_factory):
 
 
 def command(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "geofield", "field", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_geofield("field", *arguments)
 
 
 def written(value):

@@ -7,8 +7,6 @@ IRIs of their own and GeoPackages a record of what was written: two trees, three
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,8 @@ import shapely
 
 from geofield.formats import read_dataset
 from geofield.plan import read_plan
+from geofield_command import run_geofield as geofield
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
 ARCHIVE = Path(__file__).parent / "earlier" / "plan_of_2026_11_22.zip"
 LINKED = ("field.rdf", "field.ttl", "field.jsonld", "field.nt")
 
@@ -27,11 +25,6 @@ LINKED = ("field.rdf", "field.ttl", "field.jsonld", "field.nt")
 def earlier(tmp_path: Path) -> Path:
     shutil.unpack_archive(ARCHIVE, tmp_path)
     return tmp_path
-
-
-def geofield(*words: object) -> subprocess.CompletedProcess[str]:
-    line = [str(word) for word in (GEOFIELD, *words)]
-    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=300)
 
 
 @pytest.mark.parametrize("product", ["geojson", *LINKED])

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-import sys
 
 import fiona
 import pandas as pd
@@ -15,6 +13,7 @@ from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats import FORMATS, write_dataset
 from geofield.formats.shapefile_profiles import PROFILES
+from geofield_command import run_geofield
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 PRODUCTS: list[tuple[str, dict[str, str]]] = [
@@ -81,12 +80,9 @@ def test_plans_with_round_obstacles_alone_and_with_none(tmp_path):
     write_dataset(without("obstacles"), tmp_path / "none", ["gpkg"])
     for plan in ("round", "none"):
         for profile in PROFILES:
-            done = subprocess.run(
-                [
-                    sys.executable, "-m", "geofield", "export", tmp_path / plan / "field.gpkg",
-                    "-f", "shapefile", "--profile", profile, "--out", tmp_path / plan / profile,
-                ],
-                capture_output=True, text=True, check=False,
+            done = run_geofield(
+                "export", tmp_path / plan / "field.gpkg", "-f", "shapefile", "--profile", profile,
+                "--out", tmp_path / plan / profile,
             )  # fmt: skip
             assert done.returncode == 0, done.stderr
             assert "room on the disk" not in done.stderr

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import subprocess
-import sys
 import zipfile
 from xml.etree import ElementTree as ET
 
@@ -23,18 +21,12 @@ from pyproj import CRS, Transformer
 from geofield import theme
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Provenance
+from geofield_command import run_geofield as geofield
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 GPX = "{http://www.topografix.com/GPX/1/1}"
 STATUSES = ["detected", "possible", "rejected", "added"]
 KML = "{http://www.opengis.net/kml/2.2}"
-
-
-def geofield(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, arguments)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

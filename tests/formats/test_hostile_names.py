@@ -9,8 +9,6 @@ import csv
 import json
 import re
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from html.parser import HTMLParser
 from pathlib import Path
@@ -20,8 +18,8 @@ import pyogrio
 import pytest
 
 from geofield.formats import FORMATS, read_dataset
+from geofield_command import run_geofield as geofield
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
 LON, LAT, SIDE = 15.0, 48.0, 0.0006
 NAMES = {
     "formula": "@SUM(A1)*cmd|' /C calc'!A0",
@@ -33,11 +31,6 @@ NAMES = {
 ALL = [name for name in FORMATS if name != "scene"]
 #: Two formats write the same files; these of them come second.
 SECOND = [name for name in ALL if name in ("rdf-study",)]
-
-
-def geofield(*words: object) -> subprocess.CompletedProcess[str]:
-    line = [str(word) for word in (GEOFIELD, *words)]
-    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=300)
 
 
 def plan_of(folder: Path, name: str) -> Path:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import geopandas as gpd
 import pytest
 import shapely
 
 from geofield.formats import read_dataset
+from geofield_command import run_geofield as geofield
 
 BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
 POND = shapely.box(500_050, 5_500_020, 500_070, 5_500_040)
@@ -21,13 +20,6 @@ LINES = [shapely.LineString([(500_000, 5_500_000 + y), (500_200, 5_500_000 + y)]
 def write(path, shapes, **columns):
     gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:32633").to_file(path)
     return path
-
-
-def geofield(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, arguments)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 def imported(folder, *files):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -22,6 +20,7 @@ from pyproj import CRS
 
 from geofield.formats import read_dataset, validate_file, write_dataset, write_datasets
 from geofield.formats.arrow import to_lonlat
+from geofield_command import run_geofield as geofield
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 KML = "{http://www.opengis.net/kml/2.2}"
@@ -29,13 +28,6 @@ FORMATS = [
     *("gpkg", "geojson", "shapefile", "geoparquet", "flatgeobuf", "kml", "gpx", "fiboa", "dxf"),
     *("isoxml", "isoxml-v3", "agopengps", "turtle", "ntriples", "jsonld", "rdf"),
 ]
-
-
-def geofield(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, arguments)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 def moved(number, name, zone, **own):

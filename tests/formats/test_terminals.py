@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import subprocess
-import sys
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,6 +20,7 @@ from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
+from geofield_command import run_geofield
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 GEOD = Geod(ellps="WGS84")
@@ -231,10 +230,7 @@ def test_water_buildings_roads_headings_and_pivots_of_other_programs(tmp_path, t
         turn=turn, radius=radius, ends=ends,
     )  # fmt: skip
     (tmp_path / "TASKDATA.XML").write_text(text, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", "import", tmp_path, "-o", tmp_path / "x.gpkg", "--json"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = run_geofield("import", tmp_path, "-o", tmp_path / "x.gpkg", "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["rows"] == {"field": 1, "obstacles": 3, "tracks": 2, "segments": 2}

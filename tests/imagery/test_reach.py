@@ -16,11 +16,11 @@ from affine import Affine
 from rasterio.control import GroundControlPoint
 
 from geofield.imagery import read_scene
+from geofield_command import run_geofield
 
 from .pictures import EAST, NORTH, UTM, ground
 from .tile_server import Handler, serving
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
 LAT, LON = 48.0, 15.0
 WMS = (
     '<GDAL_WMS><Service name="TMS"><ServerUrl>{url}/${{z}}/${{x}}/${{y}}.png</ServerUrl></Service>'
@@ -108,10 +108,7 @@ def vrt(source: str, *, relative: bool = False, band: str = "", more: str = "") 
 
 def cut(*args: object) -> subprocess.CompletedProcess[str]:
     """`geofield tiles` at the point of the pictures."""
-    line = [GEOFIELD, "tiles", *args, "--lat", LAT, "--lon", LON, "--size", 40]
-    return subprocess.run(
-        list(map(str, line)), capture_output=True, text=True, check=False, timeout=120
-    )
+    return run_geofield("tiles", *args, "--lat", LAT, "--lon", LON, "--size", 40, timeout_s=120)
 
 
 def refused(done: subprocess.CompletedProcess[str], out: Path) -> str:
@@ -289,9 +286,7 @@ def test_vectors_call_nobody_either(
         ("tracks", file, "--crs", "EPSG:4326", "-o", tmp_path / "new.gpkg"),
         ("evaluate", file, file),
     ):
-        done = subprocess.run(
-            [GEOFIELD, *map(str, line)], capture_output=True, text=True, check=False, timeout=120
-        )
+        done = run_geofield(*line, timeout_s=120)
         # GML is data: its point is read, but not the schema that it names.
         assert done.returncode in ((0, 1) if name == "a.gml" else (1,)), done.stdout
         assert "Traceback" not in done.stderr

@@ -8,7 +8,6 @@ import logging
 import pickle
 import shutil
 import subprocess
-import sys
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -54,6 +53,7 @@ from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile
 from geofield.settings import Settings
 from geofield.windows import open_scene
+from geofield_command import run_geofield
 
 from .pictures import EAST, NORTH, RESOLUTION, UTM, ground, write
 from .tile_server import Handler, TileServer, encode, serving, tile_pixels
@@ -594,9 +594,8 @@ def test_a_damaged_picture_of_a_folder_is_told(tmp_path: Path) -> None:
     lon, lat = whole.to_lonlat(30.5, 30.5)
 
     def field() -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "geofield", "field", str(folder), "--overwrite"]
-        command += ["--lat", str(lat), "--lon", str(lon), "--output", str(tmp_path / "out.gpkg")]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        where = ("--lat", lat, "--lon", lon, "--output", tmp_path / "out.gpkg")
+        return run_geofield("field", folder, "--overwrite", *where)
 
     assert "left out" not in field().stderr
     (folder / "sheet_100_120.tif").write_bytes(b"not a picture")

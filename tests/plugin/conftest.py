@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from geofield_command import run_geofield
 from real_qgis import asking, environment_in, mark_all
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -37,7 +36,8 @@ def qgis_environment(tmp_path_factory):
 @pytest.fixture(scope="session")
 def qgis(qgis_environment):
     """Ask QGIS something; see client.py for what."""
-    return asking(CLIENT, qgis_environment)
+    with asking(CLIENT, qgis_environment) as ask:
+        yield ask
 
 
 @pytest.fixture(scope="session")
@@ -45,14 +45,9 @@ def geofield():
     """Run the command itself, to compare with."""
 
     def call(*words, variables=None):
-        command = Path(sys.executable).with_name("geofield")
-        return subprocess.run(
-            [command, *map(str, words)],
-            cwd=ROOT,
-            check=True,
-            capture_output=True,
-            text=True,
-            env={**os.environ, **(variables or {})},
-        )
+        with pytest.MonkeyPatch.context() as own:
+            for name, value in (variables or {}).items():
+                own.setenv(name, value)
+            return run_geofield(*words, folder=ROOT, check=True)
 
     return call

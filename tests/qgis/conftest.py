@@ -33,7 +33,8 @@ def qgis_environment(tmp_path_factory):
 @pytest.fixture(scope="session")
 def qgis(qgis_environment):
     """Ask QGIS something; see client.py for what."""
-    return asking(CLIENT, qgis_environment)
+    with asking(CLIENT, qgis_environment) as ask:
+        yield ask
 
 
 @pytest.fixture(scope="session")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from geofield_command import run_geofield
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -16,9 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What `geofield run` leaves of the first sample field."""
     folder = tmp_path_factory.mktemp("run")
-    command = [sys.executable, "-m", "geofield", "run", str(ROOT / "sample_data" / "field_1.tif")]
+    picture = ROOT / "sample_data" / "field_1.tif"
     options = ["--lat", "35.075373", "--lon", "33.531142", "--spacing", "4", "--format", "gpkg"]
-    subprocess.run([*command, *options, "--out", str(folder)], check=True, capture_output=True)
+    run_geofield("run", picture, *options, "--out", folder, check=True)
     return folder
 
 

@@ -6,8 +6,6 @@ import contextlib
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -25,6 +23,7 @@ from geofield.farm.edits import put_edits
 from geofield.farm.put_back import put_back
 from geofield.review import Session
 from geofield.review.shelf import Shelf
+from geofield_command import run_geofield
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 
@@ -33,10 +32,10 @@ SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A farm of two fields, as `geofield batch` leaves it."""
     folder = tmp_path_factory.mktemp("farm")
-    command = [sys.executable, "-m", "geofield", "batch", str(SAMPLES / "seeds.csv")]
     options = ["--spacing", "4", "--workers", "1", "--out", str(folder / "farm")]
     picture = shutil.copy(SAMPLES / "field_1.tif", folder / "field_1.tif")
-    subprocess.run([*command, str(picture), *options], check=True, capture_output=True)
+    seeds = SAMPLES / "seeds.csv"
+    run_geofield("batch", seeds, picture, *options, without=["distributed"], check=True)
     return folder
 
 

@@ -6,8 +6,6 @@ import http.client
 import io
 import json
 import shutil
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +22,7 @@ from geofield.imagery.display import TILE_PX, TiledPicture
 from geofield.review.desk import Desk
 from geofield.review.server import MOST_BYTES, ReviewServer
 from geofield.review.shelf import Shelf
+from geofield_command import run_geofield
 
 
 class Visitor:
@@ -103,8 +102,7 @@ def test_a_plan_that_cannot_be_read_is_told_to_the_page(tmp_path: Path) -> None:
 
 def test_no_page_is_opened_on_a_folder_without_a_plan(tmp_path: Path) -> None:
     (tmp_path / "other.gpkg").write_bytes(b"no plan")
-    words = [sys.executable, "-m", "geofield", "review", str(tmp_path), "--no-browser"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    done = run_geofield("review", tmp_path, "--no-browser", timeout_s=60)
     assert done.returncode == 1
     assert "holds no plan of geofield" in done.stderr
     assert done.stdout == ""

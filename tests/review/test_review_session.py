@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -27,6 +25,7 @@ from geofield.review.plans import journal_path
 from geofield.review.session import planned
 from geofield.review.shelf import Shelf
 from geofield.settings import with_values
+from geofield_command import run_geofield
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -332,11 +331,9 @@ def test_settings_of_the_page_stand_in_later_runs(plan_path: Path) -> None:
     desk.edit({"do": "tracks", "settings": {"direction": "90.3"}})
     desk.save()
     sample = ROOT / "sample_data" / "field_1.tif"
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", "run", sample, "--lat", "35.075373",
-         "--lon", "33.531142", "--spacing", "4", "--format",
-         "gpkg", "--overwrite", "--out", plan_path.parent],
-        capture_output=True, text=True, check=True,
+    done = run_geofield(
+        "run", sample, "--lat", "35.075373", "--lon", "33.531142", "--spacing", 4, "--format",
+        "gpkg", "--overwrite", "--out", plan_path.parent, check=True,
     )  # fmt: skip
     again = read_plan(plan_path)
     assert again.tracks is not None

@@ -17,6 +17,7 @@ import pytest
 from geofield.plan import read_plan
 from geofield.simulate import SimulatedField
 from geofield.staging import claimed, staged_folder
+from geofield_command import run_geofield as geofield
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="claims need flock")
@@ -32,11 +33,6 @@ def planned(simulated_tif: Path, point: list[str], tmp_path: Path) -> Path:
     done = geofield("run", simulated_tif, *point, "--spacing", 8, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     return tmp_path / "out"
-
-
-def geofield(*words: object) -> subprocess.CompletedProcess[str]:
-    line = [str(word) for word in (GEOFIELD, *words)]
-    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=300)
 
 
 class Asleep(subprocess.Popen[str]):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -18,6 +16,7 @@ from pyproj import CRS, Geod, Transformer
 
 from geofield.crs import ground_areas_m2, ground_scale, metric_crs
 from geofield.tracks import plan_tracks
+from geofield_command import run_geofield
 
 GEOD = Geod(ellps="WGS84")
 MM = 1e-3
@@ -46,12 +45,7 @@ def parcel(place: tuple[float, float], width_m: float, height_m: float) -> shape
 
 
 def geofield(*arguments: str | Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "geofield", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_geofield(*arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

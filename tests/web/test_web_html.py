@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +17,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 import geofield as gf
 from geofield.web.view import place_table
+from geofield_command import run_geofield
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("review")]
@@ -28,14 +27,13 @@ pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("review")]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the main job, and the page exported from its plan."""
     folder = tmp_path_factory.mktemp("page")
-    geofield = [sys.executable, "-m", "geofield"]
     place = ["--lat", "35.075373", "--lon", "33.531142", "--spacing", "4", "--format", "gpkg"]
     picture = str(ROOT / "sample_data" / "field_1.tif")
     for command in (
         ["run", picture, *place, "--route", "shortest", "--turning-radius", "5"],
         ["export", str(folder / "field.gpkg"), "-f", "html"],
     ):
-        subprocess.run([*geofield, *command, "--out", str(folder)], check=True, capture_output=True)
+        run_geofield(*command, "--out", folder, check=True)
     return folder
 
 

@@ -1,0 +1,52 @@
+"""The command with all of geofield loaded, for `geofield_command`.
+
+It has one thread of Python and starts none before it forks. The other one that it has, of
+pyarrow's allocator, knows of forks.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import os
+import pkgutil
+import sys
+
+from fork_server import served
+
+#: What geofield loads when it needs it, for most commands.
+LIBRARIES = (
+    "pyarrow.compute", "pyarrow.pandas_compat", "pyarrow.parquet", "pyogrio.geopandas",
+    "rasterio.features", "rdflib", "skimage.draw", "skimage.filters", "skimage.measure",
+    "skimage.morphology", "skimage.segmentation", "PIL.PngImagePlugin",
+)  # fmt: skip
+
+
+def load() -> None:
+    """All modules of geofield and what most commands use."""
+    # As the command tells it before it loads NumPy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    import geofield
+
+    own = [each.name for each in pkgutil.walk_packages(geofield.__path__, "geofield.")]
+    for name in (*own, *LIBRARIES):
+        if not name.endswith("__main__"):
+            importlib.import_module(name)
+    # Neither looked through nor copied in each of the processes.
+    gc.collect()
+    gc.freeze()
+
+
+def main() -> None:
+    """Load, and run the command in a process of its own each time."""
+    load()
+    words = served()
+    if words is not None:
+        sys.argv[:] = ["geofield", *words]
+        from geofield.cli import main as command
+
+        command()
+
+
+if __name__ == "__main__":
+    main()
