@@ -2,9 +2,9 @@
 
     python benchmarks/obstacles_land.py [--part sites|areas|pictures|all] [--every 1]
 
-Prints Markdown tables and writes ``benchmarks/results/obstacles_land.md``: the sites left out of
-the training data, the areas of open land that nothing was chosen on, tracks planned around what
-was found there, and the same areas as other cameras and files show them. ``--every 3`` takes
+Prints Markdown tables: the sites left out of the training data, the areas of open land that nothing
+was chosen on, tracks planned around what was found there, and the same areas as other cameras and
+files show them. A whole run writes ``benchmarks/results/obstacles_land.md``; ``--every 3`` takes
 every third picture.
 """
 
@@ -402,7 +402,11 @@ def main() -> None:
     if given.part in ("pictures", "all"):
         lines += ["", "## The same areas as other cameras and files show them: F1 at 10 px", ""]
         lines += disturbance_rows(cases)
-    write_page("obstacles_land", "Obstacle detection: open land, drivers, any picture", lines)
+    title = "Obstacle detection: open land, drivers, any picture"
+    if (given.part, given.every) == ("all", 1):
+        write_page("obstacles_land", title, lines)
+    else:
+        print("\n".join([f"# {title}", "", *lines]))
 
 
 if __name__ == "__main__":

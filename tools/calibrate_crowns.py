@@ -187,7 +187,7 @@ def calibration_error(
 def figures(found: list[Circles], trees: list[np.ndarray]) -> dict[str, float]:
     """Return F1 at 6 and 10 px at the threshold that is best at 10 px."""
     best: dict[str, float] = {"f1_10px": -1}
-    for threshold in np.arange(0.6, 8.0, 0.2):
+    for threshold in np.arange(0.6, 16.0, 0.2):
         hits, detected = np.zeros(2), 0
         for crowns, truth in zip(found, trees, strict=True):
             xy = np.column_stack([crowns.x_px, crowns.y_px])[crowns.strength >= threshold]
@@ -223,7 +223,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("pictures", type=Path)
     parser.add_argument("--share", type=float, default=0.7)
-    parser.add_argument("--least-px", type=float, default=5.3)
+    parser.add_argument("--least-px", type=float, default=6.6)
     given = parser.parse_args()
     warnings.simplefilter("ignore", ObstacleWarning)  # simulated pictures are coarse on purpose
     pictures = Pictures.read(given.pictures)

@@ -53,6 +53,8 @@ class CrownNetwork(nn.Module):
         self.up2, self.join2 = step(c, b, 1), step(b, b)
         self.up1, self.join1 = step(b, a, 1), step(a, 32)
         self.head = nn.Conv2d(32, len(OUTPUTS), 1)
+        self.stands3, self.stands2, self.stands1 = step(c, b), step(b, a), step(a, 16)
+        self.stands = nn.Conv2d(16, 1, 1)
         self.encoder = Encoder(HANDED_ON, capped=False)
         self.known = nn.ModuleList(
             nn.Conv2d(taken, given, 1, bias=False)
@@ -67,6 +69,8 @@ class CrownNetwork(nn.Module):
             self.head.bias[0] = -4.0
             self.head.bias[3] = 1.4
             self.head.bias[5] = -4.0
+            self.stands.weight.zero_()
+            self.stands.bias.zero_()
 
     def forward(self, x: Tensor) -> Tensor:
         seen = [known(f) for known, f in zip(self.known, self.encoder(x[:, :3]), strict=True)]
@@ -74,10 +78,14 @@ class CrownNetwork(nn.Module):
         two = self.level2(self.down1(one) + seen[1])
         three = self.level3(self.down2(two) + seen[2])
         four = self.level4(self.down3(three) + seen[3])
-        y = self.join3(three + twice(self.up3(four)))
-        y = self.join2(two + twice(self.up2(y)))
-        y = self.join1(one + twice(self.up1(y)))
-        return self.head(y)
+        coarse = three + twice(self.up3(four))
+        middle = two + twice(self.up2(self.join3(coarse)))
+        fine = one + twice(self.up1(self.join2(middle)))
+        out = self.head(self.join1(fine))
+        # Things are larger than crowns, and what crowns need must not be lost to them.
+        z = self.stands2(middle + twice(self.stands3(coarse)))
+        z = self.stands(self.stands1(fine + twice(z)))
+        return torch.cat([out[:, :-1], out[:, -1:] + z], 1)
 
 
 def twice(x: Tensor) -> Tensor:

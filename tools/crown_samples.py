@@ -16,12 +16,16 @@ from lossy import through_jpeg
 from scipy.spatial.distance import cdist
 from standing_things import place_things
 
+from geofield.obstacles.picture import WORKING_RESOLUTION_M
+
 INPUTS = ("red", "green", "blue", "nir", "has_nir")
 OUTPUTS = ("centre", "dx", "dy", "log_radius", "cover", "other")
 CHIP_RESOLUTION_M = 0.6
 CROP_PX = 192
-ENLARGED = 1.4
+ENLARGED = 1.05 * CHIP_RESOLUTION_M / WORKING_RESOLUTION_M
 """Lessons show chips so much larger on average: a little more than the working grid does."""
+PAINTED = 0.5
+"""Share of the samples of open land that things are painted into."""
 SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
 BORDER_PX = 2.0
@@ -103,6 +107,11 @@ def calm(image: np.ndarray) -> np.ndarray:
     return spread < 7
 
 
+def water(image: np.ndarray) -> np.ndarray:
+    """Return what may be water: darker in near infrared than in green. It is calm, too."""
+    return image[..., 3] <= 0.8 * image[..., 1]
+
+
 def normalised(image: np.ndarray, low: float, high: float) -> np.ndarray:
     """Bring bands to about -1..1 by one gain and offset for all of them."""
     return np.clip((image - low) * (2 / max(high - low, 24.0)) - 1, -3, 3)
@@ -117,11 +126,12 @@ def levels(image: np.ndarray) -> tuple[float, float]:
 class Sampler:
     """Draw samples from a seed."""
 
-    def __init__(self, pictures: Pictures, seed: int) -> None:
+    def __init__(self, pictures: Pictures, seed: int, painted: float = PAINTED) -> None:
         self.pictures = pictures
         self.rng = np.random.default_rng(seed)
         self.p = pictures.weights()
         self.simulated = pictures.simulated
+        self.painted = painted
 
     def batch(self, size: int) -> dict[str, np.ndarray]:
         chosen = self.rng.choice(len(self.p), size, p=self.p)
@@ -135,8 +145,8 @@ class Sampler:
         simulated = bool(self.simulated[number])
         open_land = simulated or count_near <= 12
         other = np.zeros((CROP_PX, CROP_PX), np.float32)
-        known = (calm(image) | simulated).astype(np.float32)
-        if open_land and rng.random() < 0.5:
+        known = (calm(image) & ~water(image) | simulated).astype(np.float32)
+        if open_land and rng.random() < self.painted:
             image, other, touched = place_things(rng, image, trees, known)
             known = np.maximum(known, touched)
         if rng.random() < SPOILED:

@@ -21,6 +21,8 @@ from torch import Tensor, nn
 def take_over(net: nn.Module, file: Path, samples: Iterable[Tensor]) -> None:
     """Give a network the weights of an ONNX file that was written of one like it.
 
+    A file without the last convolutions will do: they stay as they begin.
+
     Parameters
     ----------
     net : nn.Module
@@ -39,10 +41,11 @@ def take_over(net: nn.Module, file: Path, samples: Iterable[Tensor]) -> None:
     ordered = convolutions(net, first)
     norms = normed(net)
     written = weights(onnx.load(file))
-    if [one.weight.shape for one in ordered] != [torch.Size(w.shape) for w, _ in written]:
+    shapes = [torch.Size(w.shape) for w, _ in written]
+    if [one.weight.shape for one in ordered[: len(shapes)]] != shapes:
         raise ValueError(f"{file.name} holds other convolutions")
     with torch.no_grad():
-        for conv, (weight, bias) in zip(ordered, written, strict=True):
+        for conv, (weight, bias) in zip(ordered, written, strict=False):
             conv.weight.copy_(torch.tensor(weight))
             norm = norms.get(conv)
             if norm is not None:

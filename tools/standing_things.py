@@ -11,7 +11,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-CLEAR_PX = 9.0
+CLEAR_PX, APART_PX = 11.0, 15.0
+"""Between a thing and a tree's or another's middle, and what the smaller ones add to it."""
+LARGEST = {"pond": 6.5, "heap": 2.5, "bush": 2.0, "hut": 2.0, "yard": 1.8, "truck": 1.3}
+"""Half of the things (ponds: all) are up to so much larger: a network sees sizes it learned."""
+TRIES = 4
+Thing = tuple[list[np.ndarray], float, str]
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
@@ -23,22 +28,35 @@ def place_things(
     cover = np.zeros((side, side), np.float32)
     sun = rng.uniform(0, 2 * np.pi)
     before, image = image, image.copy()
-    taken = [tuple(t[:2]) for t in trees]
-    for _ in range(int(rng.integers(3, 14))):
-        at = rng.uniform(10, side - 10, 2)
-        if not free[int(at[1]), int(at[0])]:
+    taken = [(x, y, APART_PX) for x, y in trees[:, :2]]
+    things = [None if rng.random() < 0.45 else outline(rng) for _ in range(rng.integers(3, 14))]
+    # What needs most room looks for it first.
+    for thing in sorted(things, key=reach_of, reverse=True):
+        reach = reach_of(thing)
+        for at in rng.uniform(10, side - 10, (TRIES, 2)):
+            apart = (np.hypot(at[0] - x, at[1] - y) - max(reach, r) for x, y, r in taken)
+            if free[int(at[1]), int(at[0])] and min(apart, default=np.inf) >= CLEAR_PX:
+                break
+        else:
             continue
-        if any(np.hypot(at[0] - x, at[1] - y) < CLEAR_PX + 12 for x, y in taken):
-            continue
-        taken.append((float(at[0]), float(at[1])))
+        taken.append((*at, reach))
         local = image[int(at[1]) - 6 : int(at[1]) + 7, int(at[0]) - 6 : int(at[0]) + 7]
         ground = local.mean(axis=(0, 1))
-        if rng.random() < 0.45:
-            mark(rng, image, at, ground)
+        if thing is None:
+            mark(rng, image, at)
         else:
-            stand(rng, image, cover, at, ground, sun)
+            shapes, height, kind = thing
+            placed = [shape + at for shape in shapes], height, kind
+            stand(rng, image, cover, at, placed, colours(rng, ground, kind), sun)
     changed = (np.abs(image - before).max(axis=2) > 2).astype(np.float32)
     return image, cover, np.maximum(cv2.dilate(changed, np.ones((9, 9))), cover)
+
+
+def reach_of(thing: Thing | None) -> float:
+    """Return how far a thing reaches from its middle, pixels; a mark on the ground is small."""
+    if thing is None:
+        return APART_PX
+    return max(APART_PX, *(float(np.hypot(*shape.T).max()) for shape in thing[0]))
 
 
 def drawn(side: int, polygons: list[np.ndarray], blur: float) -> np.ndarray:
@@ -50,9 +68,9 @@ def drawn(side: int, polygons: list[np.ndarray], blur: float) -> np.ndarray:
     return cv2.GaussianBlur(soft, (0, 0), blur) if blur > 0.2 else soft
 
 
-def outline(rng: np.random.Generator, at: np.ndarray) -> tuple[list[np.ndarray], float, str]:
-    """Return a thing's outline, in one part or several, its height in pixels and its kind."""
-    kind = str(rng.choice(["post", "wall", "yard", "hut", "truck", "heap", "pond", "bush"]))
+def outline(rng: np.random.Generator) -> Thing:
+    """Return a thing's outline around zero, in parts, its height in pixels and its kind."""
+    kind = str(rng.choice(["post", "wall", "yard", "hut", "truck", "heap", "pond", "pond", "bush"]))
     turn = rng.uniform(0, np.pi)
     if kind == "post":
         half, height = (rng.uniform(0.5, 1.3),) * 2, rng.uniform(4, 16)
@@ -66,13 +84,16 @@ def outline(rng: np.random.Generator, at: np.ndarray) -> tuple[list[np.ndarray],
         half, height = (rng.uniform(3.5, 9), rng.uniform(1.6, 2.4)), rng.uniform(3, 6)
     else:
         half, height = (rng.uniform(1.5, 8), rng.uniform(1.5, 6)), rng.uniform(1, 4)
+    larger = rng.uniform(0, np.log(LARGEST.get(kind, 1.3)))
+    larger *= kind == "pond" or rng.random() < 0.5
+    half = (half[0] * np.exp(larger), half[1] * (1 if kind == "wall" else np.exp(larger)))
     parts = [blob(rng) * half]
     if kind in ("post", "wall", "hut", "truck"):
         parts = [SQUARE * half]
     elif kind == "yard":
         parts = walls(half, rng.uniform(0.5, 1.2), int(rng.integers(2, 5)))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    return [p @ rotation.T + at for p in parts], 0.0 if kind == "pond" else height, kind
+    return [p @ rotation.T for p in parts], 0.0 if kind == "pond" else height, kind
 
 
 def walls(half: tuple[float, ...], thick: float, count: int) -> list[np.ndarray]:
@@ -101,12 +122,13 @@ def stand(
     image: np.ndarray,
     cover: np.ndarray,
     at: np.ndarray,
-    ground: np.ndarray,
+    thing: Thing,
+    colour: np.ndarray,
     sun: float,
 ) -> None:
     """Draw a thing that stands, its shadow first."""
     side = image.shape[0]
-    shapes, height, kind = outline(rng, at)
+    shapes, height, kind = thing
     blur = rng.uniform(0.3, 0.9)
     if height > 0 and rng.random() < 0.9:
         length = height * rng.uniform(0.4, 1.3)
@@ -116,7 +138,6 @@ def stand(
         dark = drawn(side, parts, blur)
         image *= (1 - dark * rng.uniform(0.35, 0.7))[..., None]
     body = drawn(side, shapes, blur)
-    colour = colours(rng, ground, kind)
     relief = np.ones((side, side), np.float32)
     if kind in ("heap", "bush"):
         y, x = np.mgrid[:side, :side].astype(np.float32)
@@ -126,7 +147,7 @@ def stand(
         relief += rough * rng.uniform(0.05, 0.3)
     elif kind in ("hut", "truck") and rng.random() < 0.6:
         # Half a roof lies in shade; a truck's cab has a colour of its own.
-        a, b, c, d = np.clip(shapes[0], at - 40, at + 40)
+        a, b, c, d = np.clip(shapes[0], at - 60, at + 60)
         cut = 0.5 if kind == "hut" else rng.uniform(0.2, 0.4)
         ends = [b + (a - b) * cut, b, c, c + (d - c) * cut]
         half = drawn(side, [np.vstack(ends)], 0.3)
@@ -156,7 +177,7 @@ def colours(rng: np.random.Generator, ground: np.ndarray, kind: str) -> np.ndarr
     return np.clip(colour, 0, 255).astype(np.float32)
 
 
-def mark(rng: np.random.Generator, image: np.ndarray, at: np.ndarray, ground: np.ndarray) -> None:
+def mark(rng: np.random.Generator, image: np.ndarray, at: np.ndarray) -> None:
     """Draw what only lies on the ground: wheel marks, wet spots, bare patches."""
     side = image.shape[0]
     kind = rng.random()
@@ -174,8 +195,9 @@ def mark(rng: np.random.Generator, image: np.ndarray, at: np.ndarray, ground: np
             soft = np.maximum(soft, drawn(side, [both], 0.6))
         strength = rng.uniform(0.05, 0.22)
     else:
-        shape = blob(rng) * rng.uniform(3, 16, 2) + at
-        soft = drawn(side, [shape], rng.uniform(1.5, 5))
+        larger = np.exp(rng.uniform(0, np.log(3)))
+        shape = blob(rng) * rng.uniform(3, 16, 2) * larger + at
+        soft = drawn(side, [shape], rng.uniform(1.5, 5) * larger)
         strength = rng.uniform(0.08, 0.3)
     change = strength * rng.choice([-1, 1]) * np.exp(rng.normal(0, 0.25, 4))
     image *= 1 + (soft[..., None] * change).astype(np.float32)

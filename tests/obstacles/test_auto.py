@@ -112,7 +112,7 @@ def test_results_do_not_depend_on_the_window(resolution_m, monkeypatch, core_px)
 @pytest.mark.parametrize("resolution_m", [0.036, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 1, 1.7, 3, 6, 10])
 def test_the_working_grid_is_near_what_the_network_learned(resolution_m):
     factor = working_factor(resolution_m)
-    assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.15
+    assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.16
     assert (WHOLE_PX * factor).is_integer()
     assert WHOLE_PX % ALIGN_PX == 0
 
@@ -227,16 +227,21 @@ def test_polarity_chooses(simulated):
     assert len(dark) > len(bright)
 
 
-def test_a_pond_becomes_a_polygon():
+@pytest.mark.parametrize(
+    "half_px", [(14, 6), (23, 10), (33, 13)], ids=["17x7m", "28x12m", "40x16m"]
+)
+@pytest.mark.parametrize("colour", [(40, 60, 90, 15), (15, 25, 25, 8)], ids=["dark", "black"])
+def test_a_pond_becomes_a_polygon(half_px, colour):
     field = simulate_field(
         33, SimulationSettings(width_px=360, height_px=360, obstacles=3, climate="temperate")
     )
     scene = field.scene
     x, y = (float(v) for v in scene.grid.from_lonlat(field.lon, field.lat))
     yy, xx = np.mgrid[:360, :360]
-    pond = (np.abs(xx - x) < 14) & (np.abs(yy - y) < 6)
+    wide, high = half_px
+    pond = (np.abs(xx - x) < wide) & (np.abs(yy - y) < high)
     bands = scene.bands.copy()
-    bands[:, pond] = np.array([40, 60, 90, 15], np.uint8)[:, None]
+    bands[:, pond] = np.array(colour, np.uint8)[:, None]
     found = gf.detect_obstacles(
         Scene(scene.grid, bands, scene.roles, scene.valid), field.field, buffer_m=0
     )
@@ -244,7 +249,8 @@ def test_a_pond_becomes_a_polygon():
     other = found[found["kind"] == "other"]
     assert len(other) == 1
     assert other["confidence"].iloc[0] > 0.5
-    truth = shapely.transform(shapely.box(x - 14, y - 6, x + 14, y + 6), scene.grid.to_metric_array)
+    box = shapely.box(x - wide, y - high, x + wide, y + high)
+    truth = shapely.transform(box, scene.grid.to_metric_array)
     shape = other.geometry.iloc[0]
     assert shape.intersection(truth).area / shape.union(truth).area > 0.7
     assert np.isnan(other["radius_m"].iloc[0])

@@ -26,13 +26,13 @@ OVERLAP_PX = 144
 """No answer depends on a pixel farther away than this."""
 LEAST = 0.01
 """Cells that answer less do not vote."""
-LEAST_VOTES = 0.3
+LEAST_VOTES = 0.47
 """Places with fewer votes are no candidates."""
-SPREAD_CELLS = 1.8
+SPREAD_CELLS = 2.25
 """How near to each other votes fall that mean one crown."""
-REACH_CELLS = 4.0
+REACH_CELLS = 5.0
 """No cell votes for a place farther from it."""
-RIM_CELLS = 8
+RIM_CELLS = 10
 
 
 def answers(bands: dict[str, Image | float]) -> dict[str, Image]:

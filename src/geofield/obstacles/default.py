@@ -42,7 +42,7 @@ Progress = Callable[[int, int, str], None]
 Polarity = Literal["dark", "bright", "both"]
 FloatArray = NDArray[np.float64]
 
-CORE_PX = 1408
+CORE_PX = 1728
 """Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
 _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""

@@ -14,8 +14,8 @@ from geofield.model.field import Field
 from geofield.model.scene import Scene
 from geofield.raster import Image, pixel_centres, resample
 
-WORKING_RESOLUTION_M = 0.45
-"""Ground size of a pixel of the working grid: three quarters of the pictures' that the network
+WORKING_RESOLUTION_M = 0.36
+"""Ground size of a pixel of the working grid: three fifths of the pictures' that the network
 learned from, for it sees more of what is enlarged."""
 WHOLE_PX = 64
 """Windows start at multiples of so many working pixels."""

@@ -29,7 +29,7 @@ BORDER_M, DEEP_M = 3.0, 9.0
 the neighbour's wall."""
 _EXPLAINED, _CROWN_REACH = 0.5, 1.2
 """Of a thing's cells within so many radii of a tree: then it is the tree, or its shade."""
-_CLEAR_CELLS = 5
+_CLEAR_CELLS = 8
 CELL_M = CELL_PX * WORKING_RESOLUTION_M
 
 
