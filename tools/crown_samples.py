@@ -30,6 +30,8 @@ SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
 BORDER_PX = 2.0
 """Crowns on the picture's border may be cut off, their centres outside."""
+UNMEASURED_PX, SHADED = 8.0, 0.72
+"""The radius of a tree without one; a shadow is darker than so much of the ground."""
 SAME_PX, UNSURE_PX = 10.0, 6
 """Nearer labels of two years are one tree; so far around one that is lacking nothing counts."""
 
@@ -112,6 +114,28 @@ def water(image: np.ndarray) -> np.ndarray:
     return image[..., 3] <= 0.8 * image[..., 1]
 
 
+def shadows(image: np.ndarray, trees: np.ndarray) -> np.ndarray:
+    """Return what hangs together with a tree on even ground and is darker: its shadow, no thing."""
+    grey = np.ascontiguousarray(image[..., :3].mean(axis=2))
+    even = calm(image)
+    found = np.zeros(grey.shape, bool)
+    for x, y, radius in trees:
+        reach = radius if np.isfinite(radius) else UNMEASURED_PX
+        wide, near, crown = (
+            cv2.circle(np.zeros(grey.shape, np.uint8), (int(x), int(y)), int(k * reach), 1, -1) > 0
+            for k in (4, 3, 1)
+        )
+        ground = wide & ~near
+        if not ground.any() or even[ground].mean() < 0.5:
+            continue
+        dark = near & (grey < SHADED * np.median(grey[ground]))
+        parts = cv2.connectedComponents((dark | crown).astype(np.uint8))[1]
+        own = (parts == parts[crown].max()) & ~crown if crown.any() else crown
+        if own.sum() < 0.35 * (near & ~crown).sum():
+            found |= own
+    return found
+
+
 def normalised(image: np.ndarray, low: float, high: float) -> np.ndarray:
     """Bring bands to about -1..1 by one gain and offset for all of them."""
     return np.clip((image - low) * (2 / max(high - low, 24.0)) - 1, -3, 3)
@@ -146,6 +170,8 @@ class Sampler:
         open_land = simulated or count_near <= 12
         other = np.zeros((CROP_PX, CROP_PX), np.float32)
         known = (calm(image) & ~water(image) | simulated).astype(np.float32)
+        if open_land and not simulated:
+            known = np.maximum(known, 2 * shadows(image, trees))
         if open_land and rng.random() < self.painted:
             image, other, touched = place_things(rng, image, trees, known)
             known = np.maximum(known, touched)
