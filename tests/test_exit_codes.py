@@ -228,3 +228,28 @@ def test_a_reader_that_goes_away(sample: Path) -> None:
     line = f"{GEOFIELD} info {sample / 'field_1.gpkg'} | true"
     done = subprocess.run(line, shell=True, capture_output=True, text=True, check=False)
     assert done.stderr == ""
+
+
+#: What C++ of a library does when it is taken apart while a thread of its own still runs, and what
+#: Python does at an exit.
+ABORTING = """
+import atexit, ctypes, pathlib
+libc = ctypes.CDLL(None)
+ended = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(lambda _: libc.abort())
+libc.__cxa_atexit(ended, None, None)
+atexit.register(pathlib.Path("ended").touch)
+"""
+
+
+@pytest.mark.parametrize(("line", "code"), [("formats", 0), ("info none.gpkg", 1), ("nope", 2)])
+def test_a_library_that_ends_badly_takes_no_exit_code_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, code: int
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(ABORTING)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    done = subprocess.run(
+        [GEOFIELD, *line.split()], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    assert "GeoPackage" in done.stdout if code == 0 else done.stderr
+    assert (tmp_path / "ended").exists()

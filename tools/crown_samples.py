@@ -171,6 +171,7 @@ class Sampler:
         other = np.zeros((CROP_PX, CROP_PX), np.float32)
         known = (calm(image) & ~water(image) | simulated).astype(np.float32)
         if open_land and not simulated:
+            # Of all that is known there is much else; shadows are what is mistaken for things.
             known = np.maximum(known, 2 * shadows(image, trees))
         if open_land and rng.random() < self.painted:
             image, other, touched = place_things(rng, image, trees, known)

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from geofield import schema
 from geofield.earlier import (
@@ -47,7 +46,14 @@ from geofield.model.tracks import Tracks
 from geofield.model.written import Written
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
-from geofield.windows import first_side_m, open_scene, shows_all, tell_guesses, wider
+from geofield.windows import (
+    first_side_m,
+    open_scene,
+    refuse_elsewhere,
+    shows_all,
+    tell_guesses,
+    wider,
+)
 
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
@@ -186,7 +192,7 @@ def run_field(
             field = field.choose(choose) if choose else field
         else:
             field = boundary
-            _refuse_elsewhere(boundary, scene)
+            refuse_elsewhere(boundary, scene)
         field = replace(
             field,
             imagery=scene.source.name,
@@ -352,7 +358,6 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
     from geofield.tracks import plan_with_settings
 
     field = plan.field
-    _refuse_too_wide(field, settings.tracks.spacing_m)
     tracks = plan_with_settings(
         field.polygon,
         plan.obstacles,
@@ -368,31 +373,6 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
             hint="Choose a smaller spacing or headland, or check the outline.",
         )
     return tracks
-
-
-def _refuse_elsewhere(boundary: Field, scene: Scene) -> None:
-    """A boundary that the picture does not show is a slip, often in the order of coordinates."""
-    frame = shapely.Polygon(scene.grid.corners_lonlat())
-    outline = boundary.polygon_lonlat
-    if frame.intersects(outline):
-        return
-    swapped = shapely.transform(outline, lambda xy: xy[:, ::-1])
-    raise FieldError(
-        f"The boundary {boundary.name} lies outside the picture."
-        + (" Its latitude and longitude look swapped." if frame.intersects(swapped) else ""),
-        hint="Check the file's CRS and the order of its coordinates (`ogrinfo -al FILE`).",
-    )
-
-
-def _refuse_too_wide(field: Field, spacing_m: float) -> None:
-    """A spacing beyond the field's whole length is a slip of the keyboard, not a plan."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(field.polygon))
-    longest_m = float(np.hypot(*np.diff(corners, axis=0).T).max())
-    if spacing_m > longest_m:
-        raise TrackError(
-            f"A spacing of {spacing_m:g} m is larger than the field ({longest_m:.0f} m long).",
-            hint="Give the distance between two tracks in metres, for instance --spacing 3.",
-        )
 
 
 def _with_section(old: Settings | None, new: Settings, section: str) -> Settings:

@@ -16,7 +16,7 @@ import shapely
 from pyproj import Geod
 
 from geofield.crs import LONLAT, transformer
-from geofield.errors import ImageryWarning, PointOutsideError
+from geofield.errors import FieldError, ImageryWarning, PointOutsideError
 
 if TYPE_CHECKING:
     from geofield.grid import Grid
@@ -51,6 +51,20 @@ def open_scene(
         scene = _read(path, *shown, settings, outline)
     tell_guesses(scene)
     return scene
+
+
+def refuse_elsewhere(boundary: Field, scene: Scene) -> None:
+    """Refuse an outline that the picture does not show: often its coordinates are swapped."""
+    frame = shapely.Polygon(scene.grid.corners_lonlat())
+    outline = boundary.polygon_lonlat
+    if frame.intersects(outline):
+        return
+    swapped = shapely.transform(outline, lambda xy: xy[:, ::-1])
+    raise FieldError(
+        f"The boundary {boundary.name} lies outside the picture."
+        + (" Its latitude and longitude look swapped." if frame.intersects(swapped) else ""),
+        hint="Check the file's CRS and the order of its coordinates (`ogrinfo -al FILE`).",
+    )
 
 
 def tell_guesses(scene: Scene, *, told: Sequence[str] = ()) -> None:

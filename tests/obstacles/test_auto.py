@@ -112,7 +112,7 @@ def test_results_do_not_depend_on_the_window(resolution_m, monkeypatch, core_px)
 @pytest.mark.parametrize("resolution_m", [0.036, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 1, 1.7, 3, 6, 10])
 def test_the_working_grid_is_near_what_the_network_learned(resolution_m):
     factor = working_factor(resolution_m)
-    assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.16
+    assert 0.87 <= WORKING_RESOLUTION_M / (resolution_m * factor) <= 1.15
     assert (WHOLE_PX * factor).is_integer()
     assert WHOLE_PX % ALIGN_PX == 0
 

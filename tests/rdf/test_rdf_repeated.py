@@ -79,6 +79,17 @@ def test_points_of_a_plan_with_a_headland_and_a_route_stand_last(tmp_path, profi
     assert told(graph) == parsed(path)
 
 
+def test_points_in_a_comment_are_none(tracks, tmp_path):
+    text, point = tracks["geosparql", ".rdf"].read_text(), "\n\t<gf:TrackPoint "
+    first, last, end = text.index(point), text.rindex(point), text.rindex("\n</rdf:RDF>")
+    # Twice in another notation: as many as a run leaves for the parser.
+    other = text[last:end].replace(point, f"{point} ")
+    path = tmp_path / "tracks.rdf"
+    path.write_text(f"{text[:first]}\n<!--{text[first:last]}\n-->{2 * other}{text[last:]}")
+    graph = by_pattern(path)
+    assert graph is None or told(graph) == parsed(path)
+
+
 POINT = '\t<gf:TrackPoint rdf:about="https://example.org/'
 CLASS = "<http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <https://w3id.org/geofield#TrackPoint>"
 #: What an editor or another program may make of one place in such a file.

@@ -156,8 +156,8 @@ def main(args: list[str] | None = None) -> None:
 def _leave(code: int) -> None:
     """End the process when all is done, without taking libraries apart.
 
-    Some have threads that still run then, and their C++ ends the process with an abort: one farm
-    in fifty, on a busy machine, was written and told so, and the exit code was 134.
+    A thread of one that still runs then makes its C++ abort the process: of 53 farms that were
+    planned on a busy machine one was written, told, and ended with 134.
     """
     try:
         atexit._run_exitfuncs()

@@ -90,9 +90,11 @@ def main_field(dataset: Dataset, field: shapely.Polygon) -> list[shapely.Polygon
 
 def are_bent(lines: NDArray[np.object_]) -> NDArray[np.bool_]:
     """Which lines, in a metric CRS and whole over their gaps, are not straight from end to end."""
-    ways = [shapely.get_coordinates(line) for line in lines]
-    whole = np.array([shapely.LineString(way) for way in ways], dtype=object)
-    straight = np.array([shapely.LineString(way[[0, -1]]) for way in ways], dtype=object)
+    places, number = shapely.get_coordinates(lines, return_index=True)
+    first = np.searchsorted(number, np.arange(len(lines)))
+    last = np.append(first[1:], len(places))[: len(lines)] - 1
+    whole = shapely.linestrings(places, indices=number)
+    straight = shapely.linestrings(np.stack([places[first], places[last]], axis=1))
     return np.asarray(shapely.hausdorff_distance(whole, straight) > _STRAIGHT_M)
 
 

@@ -14,9 +14,10 @@ from geofield.model.field import Field
 from geofield.model.scene import Scene
 from geofield.raster import Image, pixel_centres, resample
 
-WORKING_RESOLUTION_M = 0.36
-"""Ground size of a pixel of the working grid: three fifths of the pictures' that the network
-learned from, for it sees more of what is enlarged."""
+WORKING_RESOLUTION_M = 23 / 64
+"""Ground size of a pixel of the working grid, 0.36 m: three fifths of the pictures' that the
+network learned from, for it sees more of what is enlarged; in parts of `WHOLE_PX`, so that the
+rounding of `working_factor` brings no picture farther from it than `_AS_IT_IS`."""
 WHOLE_PX = 64
 """Windows start at multiples of so many working pixels."""
 _AS_IT_IS = (0.87, 1.15)

@@ -55,6 +55,7 @@ def plan_with_settings(
         Places in it are longitude and latitude.
     """
     metric_crs = metric(crs)
+    _refuse_too_wide(polygon, settings.spacing_m)
     direction: Any = settings.direction
     if settings.ab_lonlat is not None:
         a_b = settings.ab_lonlat
@@ -92,6 +93,17 @@ def plan_with_settings(
         **{name: getattr(settings, name) for name in _OF_ROUTE},
         start=None if start is None else _place(start, metric_crs, polygon, "start"),
     )
+
+
+def _refuse_too_wide(polygon: BaseGeometry, spacing_m: float) -> None:
+    """A spacing beyond the field's whole length is a slip of the keyboard, not a plan."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(polygon))
+    longest_m = float(np.hypot(*np.diff(corners, axis=0).T).max())
+    if spacing_m > longest_m:
+        raise TrackError(
+            f"A spacing of {spacing_m:g} m is larger than the field ({longest_m:.0f} m long).",
+            hint="Give the distance between two tracks in metres, for instance --spacing 3.",
+        )
 
 
 def _reaching_in(settings: TrackSettings, obstacles: Any) -> tuple[str, ...]:

@@ -108,7 +108,8 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
     box = _lonlat_bounds(shape, crs)
     if box is not None:
         bounds[iri] = box
-    if crs.is_geographic and (np.abs(shapely.bounds(shape)) > (180.0, 90.0, 180.0, 90.0)).any():
+    on_earth = np.abs(shapely.bounds(shape)) <= (180.0, 90.0, 180.0, 90.0)
+    if crs.is_geographic and not on_earth.all():
         pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
         message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
         hint = "Are they metres, or latitude before longitude?"

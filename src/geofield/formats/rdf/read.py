@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -216,14 +218,17 @@ class _Rows:
         """Texts as the values of a column."""
         if column.type in ("int", "float"):
             kind = int if column.type == "int" else float
-            values = [number(text, kind) for text in texts]
-            for text, value, subject in zip(texts, values, self.subjects, strict=True):
-                if value is None and text is not None:
+            # All at once: one by one takes a tenth longer to read a plan.
+            with suppress(ValueError, OverflowError):
+                values = [None if text is None else kind(text) for text in texts]
+                if all(map(math.isfinite, filter(None, values))):
+                    return values
+            for text, subject in zip(texts, self.subjects, strict=True):
+                if text is not None and number(text, kind) is None:
                     raise FormatError(
                         f"<{subject}>: {column.name} is {text[:40]!r}, not a finite number.",
                         hint="`geofield validate` lists everything that is wrong.",
                     )
-            return values
         meaning = {expand(value_iri(value)): value for value in column.values}
         if column.values == YES_NO:
             meaning = {"true": "yes", "false": "no", "1": "yes", "0": "no"}

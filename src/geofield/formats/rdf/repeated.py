@@ -46,6 +46,8 @@ _PLACE_NUMBER: Final = "718281828459045"
 _PLACES: Final = re.compile(rf"{_PLACE}(\d+)\.|{_PLACE_NUMBER}(\d{{3}})")
 #: Texts that stand in every syntax as they are, and in Turtle all with quotes or all without.
 _PLAIN: Final[dict[Any, str]] = {node(INTEGER): "[0-9\0]*", node(DOUBLE): "[0-9.+\0-]*"}
+#: In comments, long texts and what is read as it stands, nodes are none.
+_HIDING: Final = ("<!", '"""', "'''")
 _UNESCAPED: Final = r'[^"\\\x01-\x1f\x7f]*'
 _QUOTES: Final = {'"': "&quot;", "'": "&apos;"}
 
@@ -161,6 +163,8 @@ def repeated(path: Path, syntax: ox.RdfFormat) -> Graph | None:
     try:
         text = path.read_bytes().decode("utf-8") if path.stat().st_size <= _MAX_BYTES else ""
         short, runs, values, columns = _parted(form, text)
+        if any(each in short for each in _HIDING):
+            return None
         if syntax == ox.RdfFormat.JSON_LD:
             check_json(short, path.name)
         elif syntax == ox.RdfFormat.RDF_XML:
