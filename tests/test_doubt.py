@@ -41,7 +41,7 @@ def out(simulated: SimulatedField, tmp_path_factory: pytest.TempPathFactory) -> 
     write_scene(cut, folder / "half.tif")
     command = ["run", folder / "half.tif", "--lat", simulated.lat, "--lon", simulated.lon]
     command += ["--out", folder / "out", "--spacing", 6, "--route", "boustrophedon"]
-    command += ["--turning-radius", 8]
+    command += ["--turning-radius", 5]
     for name in ("gpkg", "geojson", "shapefile", "isoxml", "rdf", "kml"):
         command += ["--format", name]
     return folder / "out", _called(*command).stderr

@@ -41,6 +41,12 @@ class Window:
         x0, y0, x1, y1 = (math.ceil(edge - 0.5) for edge in self.core)
         return slice(y0 - self.row, y1 - self.row), slice(x0 - self.col, x1 - self.col)
 
+    def ends_at(self, shape: tuple[int, int]) -> tuple[bool, bool, bool, bool]:
+        """Return whether a picture ends with it at the left, upper, right and lower side."""
+        rows, cols = shape
+        right, lower = self.col + self.width >= cols, self.row + self.height >= rows
+        return self.col == 0, self.row == 0, right, lower
+
 
 def windows(
     shape: tuple[int, int], core_px: int, overlap_px: int, align_px: int, factor: float = 1.0

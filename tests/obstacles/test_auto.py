@@ -1,5 +1,6 @@
 """The default detector on simulated fields with known truth, and on bad input."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -334,3 +335,55 @@ def test_pixel_transform_is_that_of_the_grid(simulated, detected):
     row = detected.iloc[0]
     lon, lat = grid.to_lonlat(row["x_px"], row["y_px"])
     assert (row["lon"], row["lat"]) == pytest.approx((lon, lat))
+
+
+@pytest.fixture(scope="module")
+def cut_field():
+    """A field that fills its picture, with trees apart from each other."""
+    settings = SimulationSettings(width_px=360, height_px=360, obstacles=14, climate="temperate")
+    made = simulate_field(21, settings)
+    frame = shapely.box(0, 0, made.scene.grid.width_px, made.scene.grid.height_px)
+    to_metric = made.scene.grid.to_metric_array
+    return made, gf.Field(shapely.transform(frame, to_metric), made.field.crs)
+
+
+def ended(scene, x_px, y_px, slope):
+    """The picture with its data ending at a place, on a leaning line or with its frame."""
+    if not slope:
+        return scene.crop(0, 0, round(x_px), scene.grid.height_px)
+    row, col = np.indices(scene.valid.shape) + 0.5
+    return replace(scene, valid=scene.valid & (col - x_px < slope * (row - y_px)))
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+@pytest.mark.parametrize("shown", [-0.4, 0.0, 0.4])
+def test_a_crown_that_the_end_of_the_data_cuts_is_driven_around(cut_field, slope, shown):
+    made, field = cut_field
+    trees = made.obstacles.sort_values("radius_m").iloc[-8:]
+    for tree in trees.itertuples():
+        # So much of the radius is seen beyond the trunk, or not up to it.
+        end_px = tree.x_px + shown * tree.radius_px
+        half = ended(made.scene, end_px, tree.y_px, slope)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ObstacleWarning)
+            around = active(gf.detect_obstacles(half, field))
+        seen = shapely.box(0, 0, end_px, half.grid.height_px)
+        crown = shapely.Point(tree.x_px, tree.y_px).buffer(tree.radius_px).intersection(seen)
+        crown = shapely.transform(crown, half.grid.to_metric_array)
+        assert around.geometry.intersects(crown.centroid).any()
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_cut_crowns_do_not_depend_on_the_window(cut_field, monkeypatch, slope):
+    made, field = cut_field
+    half = ended(made.scene, made.obstacles["x_px"].median(), 180, slope)
+    with pytest.warns(ObstacleWarning, match="does not show"):
+        whole = gf.detect_obstacles(half, field)
+    monkeypatch.setattr("geofield.obstacles.default.CORE_PX", 96)
+    with pytest.warns(ObstacleWarning, match="does not show"):
+        parts = gf.detect_obstacles(half, field)
+    assert len(whole) == len(parts) > 5
+    for column in ("x_px", "y_px", "radius_px", "confidence"):
+        assert parts[column].to_numpy() == pytest.approx(
+            whole[column].to_numpy(), abs=1e-6, nan_ok=True
+        )

@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.grid import Grid
 from geofield.learned import network
 from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
@@ -24,6 +25,7 @@ from geofield.obstacles.crowns import (
     centres,
     once_each,
 )
+from geofield.obstacles.cut import cut_crowns, near_the_end, with_cut
 from geofield.obstacles.picture import (
     WHOLE_PX,
     Picture,
@@ -41,6 +43,7 @@ from geofield.raster import Window, windows
 Progress = Callable[[int, int, str], None]
 Polarity = Literal["dark", "bright", "both"]
 FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 CORE_PX = 1728
 """Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
@@ -109,15 +112,15 @@ def detect_by_default(
     tone = tone_of(picture)
     doubts = _doubts(tone, resolution, radius_m)
     facts = network(NETWORK).facts
-    ring = None if area is None else shapely.Polygon(area.polygon_px(picture.grid).exterior)
+    ring = None if area is None else _ring(area, picture.grid)
     standing = outline = None
     if others and ring is not None:
         outline = shapely.transform(ring, lambda c: c / factor)
         standing = StandingMap.over(*np.clip(outline.bounds, 0, None).tolist())
         if standing is None:
             doubts.append("The field is too large to search it for what is no tree.")
-    reach = None if ring is None else ring.buffer(radius_m[1] / resolution)
-    crowns, seen_px = _look(picture, area, reach, tone, factor, polarity, standing, progress)
+    far_px = radius_m[1] / resolution
+    crowns, seen_px = _look(picture, area, far_px, tone, factor, polarity, standing, progress)
     if ring is not None:
         doubts += _unseen(ring.area, seen_px)
     for doubt in doubts:
@@ -164,20 +167,21 @@ def calibrated(answer: FloatArray, curve: dict[str, list[float]]) -> FloatArray:
 def _look(
     picture: Picture,
     area: Field | None,
-    reach: shapely.Polygon | None,
+    far_px: float,
     tone: Tone,
     factor: float,
     polarity: Polarity,
     standing: StandingMap | None,
     progress: Progress | None,
 ) -> tuple[Circles, int]:
-    """Return the candidates of all windows that are within reach, and fill the map.
+    """Return the candidates of all windows that are near enough to the area, and fill the map.
 
-    The reach is in pixels of the picture, candidates are in working pixels. Told, too, is how
-    many pixels of the area have data.
+    How far is in pixels of the picture, candidates are in working pixels. Told, too, is how many
+    pixels of the area have data.
     """
     todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor))
-    if reach is not None:
+    if area is not None:
+        reach = _ring(area, picture.grid).buffer(far_px)
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns, seen_px = Circles(), 0
     for done, window in enumerate(todo):
@@ -185,12 +189,17 @@ def _look(
         if scene.valid.any():
             bands = working_bands(scene, tone, factor)
             named = answers(bands)
-            here = _candidates(named, bands, scene.valid, factor, polarity)
+            here = _of_polarity(centres(named), bands, polarity)
+            here = here.take(inside(here.scaled(factor), scene.valid))
             start = window.col / factor, window.row / factor
-            here = here.scaled(1.0, *start)
-            crowns = crowns.joined(here.take(_in_core(here, window, factor)))
             region = np.zeros(scene.valid.shape, dtype=bool)
             region[window.core_slices] = search_region(scene, area)[window.core_slices]
+            if area is not None:
+                ends = window.ends_at(picture.grid.shape)
+                cut = _cut(bands, scene.valid, region, ends, far_px, factor, polarity)
+                here = with_cut(here, cut, **network(NETWORK).facts["suppression"])
+            here = here.scaled(1.0, *start)
+            crowns = crowns.joined(here.take(_in_core(here, window, factor)))
             seen_px += int(region.sum())
             if standing is not None:
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
@@ -198,6 +207,35 @@ def _look(
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
     return crowns, seen_px
+
+
+def _ring(area: Field, grid: Grid) -> shapely.Polygon:
+    """Return a field with its holes filled, pixels."""
+    return shapely.Polygon(area.polygon_px(grid).exterior)
+
+
+def _cut(
+    bands: dict[str, Any],
+    valid: Mask,
+    region: Mask,
+    ends: tuple[bool, bool, bool, bool],
+    far_px: float,
+    factor: float,
+    polarity: Polarity,
+) -> Circles:
+    """Return the crowns of a window, working pixels, that the end of the data cuts."""
+    shape = bands["red"].shape
+    known, field = (on_working_grid(mask, shape, factor) for mask in (valid, region))
+    near = near_the_end(known, ends, far_px / factor)
+
+    def look(wide: dict[str, Any]) -> Circles:
+        return _of_polarity(centres(answers(wide)), wide, polarity)
+
+    crowns = cut_crowns(bands, known, field, near, look)
+    # The last working pixel reaches beyond the last one of the picture.
+    last = (n / factor * (1 - 1e-9) for n in valid.shape[::-1])
+    x, y = (np.minimum(v, most) for v, most in zip((crowns.x_px, crowns.y_px), last, strict=True))
+    return Circles(x, y, crowns.radius_px, crowns.strength)
 
 
 def _unseen(field_px: float, seen_px: int) -> list[str]:
@@ -213,16 +251,8 @@ def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_
     return window.in_core(crowns.x_px * factor, crowns.y_px * factor)
 
 
-def _candidates(
-    named: dict[str, Any],
-    bands: dict[str, Any],
-    valid: NDArray[np.bool_],
-    factor: float,
-    polarity: Polarity,
-) -> Circles:
-    """Return the candidates of one window that lie on the picture, working pixels."""
-    crowns = centres(named)
-    crowns = crowns.take(inside(crowns.scaled(factor), valid))
+def _of_polarity(crowns: Circles, bands: dict[str, Any], polarity: Polarity) -> Circles:
+    """Return the crowns, working pixels, that are dark or bright against the ring around them."""
     if polarity == "both" or not len(crowns):
         return crowns
     luma = (bands["red"] + bands["green"] + bands["blue"]) / 3
