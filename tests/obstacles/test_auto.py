@@ -11,12 +11,14 @@ from affine import Affine
 import geofield as gf
 from geofield import schema
 from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.model.circles import Circles
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.obstacles.costs import thresholds
-from geofield.obstacles.crowns import ALIGN_PX
+from geofield.obstacles.crowns import ALIGN_PX, CELL_PX
 from geofield.obstacles.detect import STRATEGIES
 from geofield.obstacles.picture import WHOLE_PX, WORKING_RESOLUTION_M, working_factor
+from geofield.obstacles.standing import StandingMap
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -387,3 +389,45 @@ def test_cut_crowns_do_not_depend_on_the_window(cut_field, monkeypatch, slope):
         assert parts[column].to_numpy() == pytest.approx(
             whole[column].to_numpy(), abs=1e-6, nan_ok=True
         )
+
+
+def standing_map(canopy):
+    """What the network told of a field of 60 by 60 cells in which nothing but canopy stands."""
+    cells = np.zeros((60, 60), np.uint8)
+    return StandingMap(cells, np.rint(255 * canopy).astype(np.uint8), 0, 0)
+
+
+FIELD_PX = shapely.box(0, 0, 60 * CELL_PX, 60 * CELL_PX)
+
+
+def one_tree(x_cells, y_cells, radius_cells):
+    values = (np.array([v * float(CELL_PX)]) for v in (x_cells, y_cells, radius_cells))
+    return Circles(*values, np.ones(1))
+
+
+def test_a_hedge_between_its_trees_is_driven_around():
+    canopy = np.zeros((60, 60))
+    canopy[28:32, 10:50] = 0.8
+    parts, p = standing_map(canopy).things(FIELD_PX, one_tree(20, 30, 3), 0.35)
+    assert len(parts) == 2
+    hedge = shapely.union_all(parts)
+    truth = shapely.box(10, 28, 50, 32)
+    uncovered = truth.difference(shapely.Point(20, 30).buffer(3))
+    found = shapely.transform(hedge, lambda c: c / CELL_PX)
+    assert found.intersection(uncovered).area > 0.95 * uncovered.area
+    assert found.difference(truth).area < 0.05 * truth.area
+    assert p == pytest.approx([0.8, 0.8], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("cells", "p"),
+    [
+        pytest.param(np.s_[28:32, 18:22], 0.9, id="under its tree"),
+        pytest.param(np.s_[28:31, 40:41], 0.9, id="a speck"),
+        pytest.param(np.s_[28:32, 30:50], 0.45, id="rather not"),
+    ],
+)
+def test_canopy_that_a_tree_explains_or_that_is_doubtful_adds_nothing(cells, p):
+    canopy = np.zeros((60, 60))
+    canopy[cells] = p
+    assert standing_map(canopy).things(FIELD_PX, one_tree(20, 30, 4), 0.35) == ([], [])

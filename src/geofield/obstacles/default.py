@@ -203,7 +203,7 @@ def _look(
             seen_px += int(region.sum())
             if standing is not None:
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
-                standing.fill(named["other"], cells, *(round(each / CELL_PX) for each in start))
+                standing.fill(named, cells, *(round(each / CELL_PX) for each in start))
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
     return crowns, seen_px

@@ -1,7 +1,8 @@
-"""What stands in a field and is no tree: posts, walls, huts, trucks, heaps, ponds.
+"""What stands in a field beside single trees: walls, barns, trucks, heaps, ponds, hedges, copses.
 
-The network says of each cell whether something stands there. Cells that hang together become
-one polygon, as probable as its clearest cells; what the trees explain is left to them.
+The network says of each cell whether something stands there, and whether it is under a crown. Cells
+that hang together become one polygon, as probable as its clearest cells; what the trees explain is
+left to them.
 """
 
 from __future__ import annotations
@@ -24,12 +25,16 @@ MAX_CELLS = 100e6
 """Larger fields are searched for trees alone, for their cells would not fit into memory."""
 RIM = 0.5
 """A thing reaches as far as its cells are at least this share of its clearest ones."""
+CANOPY, LEAST_CANOPY_CELLS = 0.5, 4
+"""What is a crown more likely than not, and reaches so many cells beyond all trees, stands there,
+too."""
 BORDER_M, DEEP_M = 3.0, 9.0
 """What begins so near to the field's border and ends so near is the border: a road's edge, a ditch,
 the neighbour's wall."""
 _EXPLAINED, _CROWN_REACH = 0.5, 1.2
 """Of a thing's cells within so many radii of a tree: then it is the tree, or its shade."""
 _CLEAR_CELLS = 8
+_ALL_AROUND = np.ones((3, 3), bool)
 CELL_M = CELL_PX * WORKING_RESOLUTION_M
 
 
@@ -40,11 +45,15 @@ class StandingMap:
     Attributes
     ----------
     cells : uint8 array (rows, cols)
+        Of what is no tree.
+    canopy : uint8 array (rows, cols)
+        Of crowns.
     col, row : int
         Of its first cell, counted in cells from the picture's corner.
     """
 
     cells: NDArray[np.uint8]
+    canopy: NDArray[np.uint8]
     col: int
     row: int
 
@@ -55,19 +64,21 @@ class StandingMap:
         shape = (int(bottom // CELL_PX) + 1 - r0, int(right // CELL_PX) + 1 - c0)
         if shape[0] * shape[1] > MAX_CELLS:
             return None
-        return cls(np.zeros(shape, np.uint8), c0, r0)
+        return cls(np.zeros(shape, np.uint8), np.zeros(shape, np.uint8), c0, r0)
 
-    def fill(self, other: Image, region: NDArray[np.bool_], col: int, row: int) -> None:
+    def fill(self, named: dict[str, Image], region: NDArray[np.bool_], col: int, row: int) -> None:
         """Enter a window's answers where its region is, its first cell at (col, row)."""
-        values = np.where(region, np.rint(255 * other), 0).astype(np.uint8)
         c0, r0 = max(self.col - col, 0), max(self.row - row, 0)
-        c1 = min(self.col + self.cells.shape[1] - col, values.shape[1])
-        r1 = min(self.row + self.cells.shape[0] - row, values.shape[0])
-        if c0 < c1 and r0 < r1:
-            part = np.s_[row + r0 - self.row : row + r1 - self.row,
-                         col + c0 - self.col : col + c1 - self.col]  # fmt: skip
+        c1 = min(self.col + self.cells.shape[1] - col, region.shape[1])
+        r1 = min(self.row + self.cells.shape[0] - row, region.shape[0])
+        if c0 >= c1 or r0 >= r1:
+            return
+        part = np.s_[row + r0 - self.row : row + r1 - self.row,
+                     col + c0 - self.col : col + c1 - self.col]  # fmt: skip
+        for cells, answer in ((self.cells, named["other"]), (self.canopy, named["cover"])):
+            values = np.where(region, np.rint(255 * answer), 0).astype(np.uint8)
             # Regions do not overlap; elsewhere a window has nothing to say.
-            np.maximum(self.cells[part], values[r0:r1, c0:c1], out=self.cells[part])
+            np.maximum(cells[part], values[r0:r1, c0:c1], out=cells[part])
 
     def things(
         self, field: shapely.Polygon, trees: Circles, least: float
@@ -89,12 +100,14 @@ class StandingMap:
             Working pixels from the corner of the picture.
         probabilities : list of float
         """
-        p = self.cells.astype(np.float32) / 255
+        known = self._discs(trees, _CROWN_REACH)
+        beyond = self._canopy_beyond(self._discs(trees, 1.0), known)
+        p = np.maximum(self.cells, np.where(beyond, self.canopy, 0)).astype(np.float32) / 255
         mask = apply_hysteresis_threshold(p, RIM * least, least)
-        labels, count = ndimage.label(mask, structure=np.ones((3, 3), bool))
+        labels, count = ndimage.label(mask, structure=_ALL_AROUND)
         if not count:
             return [], []
-        known = self._discs(trees)
+        known &= ~beyond
         depth = self._depth(field)
         polygons, probabilities = [], []
         for number, where in enumerate(ndimage.find_objects(labels), start=1):
@@ -113,6 +126,16 @@ class StandingMap:
             probabilities.append(float(clearest.mean()))
         return polygons, probabilities
 
+    def _canopy_beyond(
+        self, crowns: NDArray[np.bool_], near: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Return canopy outside of crowns that reaches farther: hedges, copses, odd crowns."""
+        beyond = (self.canopy >= CANOPY * 255) & ~crowns
+        parts, count = ndimage.label(beyond, structure=_ALL_AROUND)
+        wide = np.bincount(parts[~near], minlength=count + 1) >= LEAST_CANOPY_CELLS
+        wide[0] = False
+        return np.asarray(wide[parts], dtype=bool)
+
     def _depth(self, field: shapely.Polygon) -> Image:
         """Return how many cells each lies inside the field."""
         ring = shapely.get_coordinates(field.exterior) / CELL_PX - [self.col, self.row]
@@ -121,14 +144,14 @@ class StandingMap:
         depth = cv2.distanceTransform(inside, cv2.DIST_L2, 5)[1:-1, 1:-1]
         return np.asarray(depth, dtype=np.float32)
 
-    def _discs(self, trees: Circles) -> NDArray[np.bool_]:
+    def _discs(self, trees: Circles, radii: float) -> NDArray[np.bool_]:
         mask = np.zeros(self.cells.shape, np.uint8)
         for x, y, radius in zip(trees.x_px, trees.y_px, trees.radius_px, strict=True):
             # A sixteenth of a cell is what OpenCV can place.
             centre = [
                 round(16 * (v / CELL_PX - o - 0.5)) for v, o in ((x, self.col), (y, self.row))
             ]
-            reach = round(16 * _CROWN_REACH * radius / CELL_PX)
+            reach = round(16 * radii * radius / CELL_PX)
             cv2.circle(mask, centre, reach, 1, -1, cv2.LINE_8, 4)
         return mask.astype(bool)
 
