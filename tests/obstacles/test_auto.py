@@ -401,8 +401,8 @@ FIELD_PX = shapely.box(0, 0, 60 * CELL_PX, 60 * CELL_PX)
 
 
 def one_tree(x_cells, y_cells, radius_cells):
-    values = (np.array([v * float(CELL_PX)]) for v in (x_cells, y_cells, radius_cells))
-    return Circles(*values, np.ones(1))
+    x, y, radius = (np.array([v * float(CELL_PX)]) for v in (x_cells, y_cells, radius_cells))
+    return Circles(x, y, radius, np.ones(1))
 
 
 def test_a_hedge_between_its_trees_is_driven_around():

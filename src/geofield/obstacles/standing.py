@@ -1,4 +1,4 @@
-"""What stands in a field beside single trees: walls, barns, trucks, heaps, ponds, hedges, copses.
+"""What stands in a field beside single trees: walls, huts, trucks, heaps, ponds, hedges, copses.
 
 The network says of each cell whether something stands there, and whether it is under a crown. Cells
 that hang together become one polygon, as probable as its clearest cells; what the trees explain is
