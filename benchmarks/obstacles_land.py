@@ -177,11 +177,16 @@ def calibration_rows(cases: list[Case]) -> list[str]:
     return rows
 
 
+def field_of(polygon_px: shapely.Polygon, scene: Scene) -> gf.Field:
+    grid = scene.grid
+    return gf.Field(shapely.transform(polygon_px, grid.to_metric_array), grid.metric_crs)
+
+
 def driven(case: Case, **options: Any) -> tuple[Driving, int, int]:
     """What a driver loses in a case's area; trees seen at all, and false alarms."""
     grid = case.scene.grid
-    polygon = shapely.transform(case.area, grid.to_metric_array)
-    field = gf.Field(polygon, grid.metric_crs)
+    field = field_of(case.area, case.scene)
+    polygon = field.polygon
     found = gf.detect_obstacles(case.scene, field, **options)
     tracks = gf.plan_tracks(polygon, found, crs=grid.metric_crs, spacing_m=SPACING_M)
     true = trees_of(case)
@@ -274,10 +279,7 @@ def cut_rows(cases: list[Case]) -> list[str]:
             for end in range(CUT_EVERY_PX, scene.grid.width_px, CUT_EVERY_PX):
                 part = scene.crop(0, 0, end, scene.grid.height_px)
                 frame = shapely.box(0, 0, end, scene.grid.height_px)
-                field = gf.Field(
-                    shapely.transform(frame, part.grid.to_metric_array), part.grid.metric_crs
-                )
-                table = gf.detect_obstacles(part, field)
+                table = gf.detect_obstacles(part, field_of(frame, part))
                 table = table[(table["kind"] == "tree") & (table["status"] == "detected")]
                 xy = table[["x_px", "y_px"]].to_numpy(float)
                 match = match_points(xy, case.trees, 10)

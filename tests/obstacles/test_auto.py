@@ -368,7 +368,7 @@ def test_a_crown_that_the_end_of_the_data_cuts_is_driven_around(cut_field, slope
         half = ended(made.scene, end_px, tree.y_px, slope)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ObstacleWarning)
-            around = active(gf.detect_obstacles(half, field))
+            around = active(gf.detect_obstacles(half, field, others=False))
         seen = shapely.box(0, 0, end_px, half.grid.height_px)
         crown = shapely.Point(tree.x_px, tree.y_px).buffer(tree.radius_px).intersection(seen)
         crown = shapely.transform(crown, half.grid.to_metric_array)
@@ -378,12 +378,16 @@ def test_a_crown_that_the_end_of_the_data_cuts_is_driven_around(cut_field, slope
 @pytest.mark.parametrize("slope", [0.0, 0.3])
 def test_cut_crowns_do_not_depend_on_the_window(cut_field, monkeypatch, slope):
     made, field = cut_field
-    half = ended(made.scene, made.obstacles["x_px"].median(), 180, slope)
+    tree = made.obstacles.sort_values("radius_m").iloc[-3]
+    # Seen up to the trunk, and less of it, which only its mirror image makes a crown.
+    half = ended(made.scene, tree["x_px"] - 0.1 * tree["radius_px"], tree["y_px"], slope)
     with pytest.warns(ObstacleWarning, match="does not show"):
-        whole = gf.detect_obstacles(half, field)
+        whole = gf.detect_obstacles(half, field, others=False)
     monkeypatch.setattr("geofield.obstacles.default.CORE_PX", 96)
     with pytest.warns(ObstacleWarning, match="does not show"):
-        parts = gf.detect_obstacles(half, field)
+        parts = gf.detect_obstacles(half, field, others=False)
+    apart = np.hypot(whole["x_px"] - tree["x_px"], whole["y_px"] - tree["y_px"])
+    assert apart.min() < 0.5 * tree["radius_px"]
     assert len(whole) == len(parts) > 5
     for column in ("x_px", "y_px", "radius_px", "confidence"):
         assert parts[column].to_numpy() == pytest.approx(

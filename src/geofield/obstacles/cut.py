@@ -1,6 +1,6 @@
 """Crowns that the end of the data cuts, at the picture's frame or inside it.
 
-Half a crown is none to the network: of trees within 1.2 m of a cut it told a quarter. Beside its
+Half a crown is none to the network: of trees within 1.2 m of a cut it told a third. Beside its
 mirror image it is whole, so where a field comes near to the end of the data that ground is looked
 at once more, mirrored. Where such a tree stands, before the end or behind it, no picture tells: it
 is placed where it is seen. All is in working pixels.

@@ -12,7 +12,6 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield.errors import ObstacleError, ObstacleWarning
-from geofield.grid import Grid
 from geofield.learned import network
 from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
@@ -25,7 +24,7 @@ from geofield.obstacles.crowns import (
     centres,
     once_each,
 )
-from geofield.obstacles.cut import cut_crowns, near_the_end, with_cut
+from geofield.obstacles.cut import Mask, cut_crowns, near_the_end, with_cut
 from geofield.obstacles.picture import (
     WHOLE_PX,
     Picture,
@@ -43,7 +42,6 @@ from geofield.raster import Window, windows
 Progress = Callable[[int, int, str], None]
 Polarity = Literal["dark", "bright", "both"]
 FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 CORE_PX = 1728
 """Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
@@ -112,7 +110,7 @@ def detect_by_default(
     tone = tone_of(picture)
     doubts = _doubts(tone, resolution, radius_m)
     facts = network(NETWORK).facts
-    ring = None if area is None else _ring(area, picture.grid)
+    ring = None if area is None else shapely.Polygon(area.polygon_px(picture.grid).exterior)
     standing = outline = None
     if others and ring is not None:
         outline = shapely.transform(ring, lambda c: c / factor)
@@ -120,7 +118,10 @@ def detect_by_default(
         if standing is None:
             doubts.append("The field is too large to search it for what is no tree.")
     far_px = radius_m[1] / resolution
-    crowns, seen_px = _look(picture, area, far_px, tone, factor, polarity, standing, progress)
+    reach = None if ring is None else ring.buffer(far_px)
+    crowns, seen_px = _look(
+        picture, area, reach, far_px, tone, factor, polarity, standing, progress
+    )
     if ring is not None:
         doubts += _unseen(ring.area, seen_px)
     for doubt in doubts:
@@ -167,6 +168,7 @@ def calibrated(answer: FloatArray, curve: dict[str, list[float]]) -> FloatArray:
 def _look(
     picture: Picture,
     area: Field | None,
+    reach: shapely.Polygon | None,
     far_px: float,
     tone: Tone,
     factor: float,
@@ -174,14 +176,13 @@ def _look(
     standing: StandingMap | None,
     progress: Progress | None,
 ) -> tuple[Circles, int]:
-    """Return the candidates of all windows that are near enough to the area, and fill the map.
+    """Return the candidates of all windows that are within reach, and fill the map.
 
-    How far is in pixels of the picture, candidates are in working pixels. Told, too, is how many
-    pixels of the area have data.
+    The reach and how far it is are in pixels of the picture, candidates are in working pixels.
+    Told, too, is how many pixels of the area have data.
     """
     todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor))
-    if area is not None:
-        reach = _ring(area, picture.grid).buffer(far_px)
+    if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns, seen_px = Circles(), 0
     for done, window in enumerate(todo):
@@ -207,11 +208,6 @@ def _look(
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
     return crowns, seen_px
-
-
-def _ring(area: Field, grid: Grid) -> shapely.Polygon:
-    """Return a field with its holes filled, pixels."""
-    return shapely.Polygon(area.polygon_px(grid).exterior)
 
 
 def _cut(

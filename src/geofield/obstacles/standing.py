@@ -75,10 +75,11 @@ class StandingMap:
             return
         part = np.s_[row + r0 - self.row : row + r1 - self.row,
                      col + c0 - self.col : col + c1 - self.col]  # fmt: skip
+        here = np.s_[r0:r1, c0:c1]
         for cells, answer in ((self.cells, named["other"]), (self.canopy, named["cover"])):
-            values = np.where(region, np.rint(255 * answer), 0).astype(np.uint8)
+            values = np.where(region[here], np.rint(255 * answer[here]), 0).astype(np.uint8)
             # Regions do not overlap; elsewhere a window has nothing to say.
-            np.maximum(cells[part], values[r0:r1, c0:c1], out=cells[part])
+            np.maximum(cells[part], values, out=cells[part])
 
     def things(
         self, field: shapely.Polygon, trees: Circles, least: float
