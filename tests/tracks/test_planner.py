@@ -340,6 +340,35 @@ def test_headland() -> None:
     assert tracks.statistics.coverage_percent > 98.0
 
 
+@pytest.mark.parametrize("last_strip", ["leave", "shift", "spread"])
+@pytest.mark.parametrize("spacing_m", [5.0, 7.0])
+def test_a_machine_whose_passes_overlap_stays_within_the_border(
+    last_strip: Any, spacing_m: float
+) -> None:
+    field = box(0, 0, 200, 121)
+    how: Any = {"crs": CRS, "spacing_m": spacing_m, "width_m": 6.0}
+    plain = plan_tracks(field, last_strip=last_strip, **how)
+    around = plan_tracks(field, headland_m=2.0 * spacing_m, **how)
+    assert around.headland_tracks is not None
+    rings = around.headland_tracks
+    assert rings["offset_m"].tolist() == [3.0, 3.0 + spacing_m]
+    for lines in (plain.segments.geometry, rings.geometry):
+        worked = shapely.buffer(lines.to_numpy(), 3.0, cap_style="flat", join_style="mitre")
+        assert shapely.covers(shapely.buffer(field, 1e-6), worked).all()
+    across = np.sort(plain.segments.geometry.bounds["miny"].to_numpy()) - Y
+    assert np.diff(across).max() <= spacing_m + 1e-6
+    kept = across[0], 121.0 - across[-1]
+    assert min(kept) == pytest.approx(3.0)
+    assert max(kept) < 3.0 + spacing_m if last_strip == "leave" else max(kept) == pytest.approx(3.0)
+
+
+def test_a_headland_is_told_to_be_worked_as_far_as_its_passes_reach() -> None:
+    how: Any = {"crs": CRS, "spacing_m": 5.0, "width_m": 6.0}
+    assert not plan_tracks(box(0, 0, 200, 120), headland_m=11.0, **how).notes
+    with pytest.warns(TrackWarning, match=r"strip of 1\.00 m"):
+        plan_tracks(box(0, 0, 200, 120), headland_m=12.0, **how)
+
+
 def test_short_segments_join_the_gap() -> None:
     obstacles = [box(40, -1, 45, 41), box(47, -1, 52, 41)]
     tracks = plan_tracks(box(0, 0, 100, 40), obstacles, crs=CRS, spacing_m=4.0, min_segment_m=3.0)

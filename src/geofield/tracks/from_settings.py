@@ -25,8 +25,8 @@ from geofield.tracks.planner import plan_tracks
 
 #: Settings that are arguments of the same name.
 _OF_TRACKS = (
-    "spacing_m", "last_strip", "headland_m", "headland_holes", "min_segment_m", "clearance_m",
-    "step_m", "straight_tolerance_m",
+    "spacing_m", "width_m", "offset_m", "last_strip", "headland_m", "headland_holes",
+    "min_segment_m", "clearance_m", "step_m", "straight_tolerance_m",
 )  # fmt: skip
 _OF_ROUTE = ("skip", "turning_radius_m", "curve", "margin_m")
 #: A place given for a field is not farther from it, metres.
@@ -60,16 +60,12 @@ def plan_with_settings(
     if settings.ab_lonlat is not None:
         a_b = settings.ab_lonlat
         direction = [_place(end, metric_crs, polygon, "A-B line") for end in (a_b[:2], a_b[2:])]
-    through, offset_m = settings.through_lonlat, settings.offset_m
-    if offset_m is None and settings.width_m and through is None and settings.ab_lonlat is None:
-        # The machine's edge runs along the border, however far passes overlap.
-        offset_m = settings.width_m / 2.0
+    through = settings.through_lonlat
     tracks = plan_tracks(
         polygon,
         obstacles,
         crs=metric_crs,
         direction=direction,
-        offset_m=offset_m,
         through=None
         if through is None
         else _place(through, metric_crs, polygon, "place to pass through"),
@@ -81,7 +77,7 @@ def plan_with_settings(
     told = _reaching_in(settings, obstacles)
     for note in told:
         warnings.warn(note, TrackWarning, stacklevel=2)
-    tracks = replace(tracks, width_m=settings.width_m, notes=(*tracks.notes, *told))
+    tracks = replace(tracks, notes=(*tracks.notes, *told))
     if settings.route == "none":
         return tracks
     start = settings.start_lonlat

@@ -88,17 +88,18 @@ def headland_track_table(
     *,
     width_m: float,
     spacing_m: float,
+    first_m: float,
     crs: CRS,
     scale: float,
     holes: bool = False,
 ) -> Rows:
-    """Layer `headland_tracks`: rings half a spacing from the border and every spacing inwards.
+    """Layer `headland_tracks`: rings `first_m` from the border and every spacing inwards.
 
     As many as fit the headland (at least one), cut where obstacles stand. A ring that nothing
     cuts stays closed.
     """
     passes = _passes(width_m, spacing_m)
-    offsets_m = [min((index + 0.5) * spacing_m, width_m) for index in range(passes)]
+    offsets_m = [min(first_m + index * spacing_m, width_m) for index in range(passes)]
     areas = [inset(outline, offset_m * scale, holes=holes) for offset_m in offsets_m]
     blocked = _blocked(shapes, shapely.union_all(shapely.boundary(areas)))
     rows: list[tuple[int, int, float]] = []
@@ -134,10 +135,10 @@ def headland_track_table(
     )
 
 
-def unworked_note(width_m: float, spacing_m: float) -> tuple[str, ...]:
+def unworked_note(width_m: float, spacing_m: float, overlap_m: float) -> tuple[str, ...]:
     """That a strip between the last pass and the straight tracks stays unworked, where one does."""
     passes = _passes(width_m, spacing_m)
-    rest_m = width_m - passes * spacing_m
+    rest_m = width_m - passes * spacing_m - max(0.0, overlap_m)
     if rest_m < _REST_M:
         return ()
     many = f"{passes} passes" if passes > 1 else "one pass"

@@ -26,28 +26,50 @@ class Strips:
     """How a field is divided into strips, whatever their direction; metres on the ground."""
 
     spacing_m: float
-    #: From the border to the first track; half a spacing if None.
+    #: From the border to the first track; half a width if None.
     offset_m: float | None = None
     last_strip: LastStrip = "overrun"
+    #: Of the machine; a spacing if None. Passes that overlap are closer together than it is wide.
+    width_m: float | None = None
+
+    @property
+    def half_m(self) -> float:
+        """How far the machine reaches beside its track."""
+        return (self.spacing_m if self.width_m is None else self.width_m) / 2.0
+
+    @property
+    def overlap_m(self) -> float:
+        """Of neighbouring passes; below 0 a gap between them."""
+        return 2.0 * self.half_m - self.spacing_m
 
     @property
     def first_m(self) -> float:
         """From the border to the first track."""
-        return self.spacing_m / 2.0 if self.offset_m is None else float(self.offset_m)
+        return self.half_m if self.offset_m is None else float(self.offset_m)
 
     def across(self, edges: Edges, first_m: float | None = None) -> FloatArray:
         """Places of the tracks across an area, one of them at `first_m` if that is given."""
         near, far = float(edges.va.min()), float(edges.va.max())
         first_m = near + self.first_m if first_m is None else first_m
         positions = track_positions(
-            near, far, self.spacing_m, first_m=first_m, last_strip=self.last_strip
+            near,
+            far,
+            self.spacing_m,
+            first_m=first_m,
+            last_strip=self.last_strip,
+            width_m=self.width_m,
         )
         return on_the_border(positions, edges)
 
     def count(self, width_m: float) -> int:
         """How many tracks an area needs that is so wide across them; one if none fits."""
         positions = track_positions(
-            0.0, width_m, self.spacing_m, first_m=self.first_m, last_strip=self.last_strip
+            0.0,
+            width_m,
+            self.spacing_m,
+            first_m=self.first_m,
+            last_strip=self.last_strip,
+            width_m=self.width_m,
         )
         return max(1, len(positions))
 
@@ -77,27 +99,35 @@ def track_positions(
     *,
     first_m: float,
     last_strip: LastStrip = "overrun",
+    width_m: float | None = None,
 ) -> FloatArray:
     """Places of the tracks across the field, increasing; the n-th is track n + 1, if any fits.
 
-    The field reaches from `near_m` to `far_m` across them. The spacing is also the width of the
-    strip that each one works; one track is at `first_m`, all others whole spacings away from it.
+    The field reaches from `near_m` to `far_m` across them. Each works a strip of `width_m`, or of a
+    spacing where none is given; one track is at `first_m`, all others whole spacings away from it.
 
     `last_strip` is what becomes of the rest at the far side. ``overrun``: tracks as far as the
     field goes (the study's rule), so that the last strip may reach beyond the border by up to half
     a spacing, or a rest narrower than that stays unworked; ``leave``: only strips that lie wholly
     inside; ``shift``: one more track, moved back until its strip ends at the far side; ``spread``:
-    the spacing shrinks evenly until strips fill the field exactly.
+    the spacing shrinks evenly until strips fill the field exactly, those of a given width from
+    border to border.
     """
     if last_strip not in LAST_STRIPS:
         raise TrackError(
             f"Unknown last_strip {last_strip!r}.", hint=f"Choose one of {', '.join(LAST_STRIPS)}."
         )
-    half = spacing_m / 2.0
+    half = (width_m or spacing_m) / 2.0
     index = np.ceil((near_m - _EPS_M - first_m) / spacing_m)
     start = first_m + index * spacing_m
     if last_strip == "spread":
         edge = max(start - half, near_m)
+        if width_m is not None:
+            steps = int(np.ceil((far_m - edge - width_m) / spacing_m - 1e-9))
+            middle = [(edge + far_m) / 2.0]
+            return np.array(
+                middle if steps < 1 else np.linspace(edge + half, far_m - half, steps + 1)
+            )
         count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
         width = (far_m - edge) / count
         return np.asarray(edge + (np.arange(count) + 0.5) * width)

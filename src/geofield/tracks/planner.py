@@ -56,6 +56,7 @@ def plan_tracks(
     *,
     crs: Any = None,
     spacing_m: float,
+    width_m: float | None = None,
     direction: Any = "dominant",
     offset_m: float | None = None,
     through: Any = None,
@@ -90,12 +91,14 @@ def plan_tracks(
         Of the polygon; projected, in metres (usually the UTM zone). A Field has its own.
     spacing_m : float
         Between neighbouring tracks. This and all other lengths are metres on the ground.
+    width_m : float, optional
+        Working width of the machine, half of which is kept from the border; a spacing by default.
     direction : str, float, LineString or pair of points
         ``dominant`` (the way most of the border runs), ``longest_edge`` (of the outer ring),
         ``hough`` (the study's way to it), ``fewest`` (tracks) or ``fewest_turns`` (pieces), a
         heading in degrees clockwise from true north, or an A-B line in `crs`.
     offset_m : float, optional
-        Of the first track from the edge it is counted from; half a spacing when not given.
+        Of the first track from the edge it is counted from; half the width when not given.
     through : (x, y) or shapely.Point, optional
         A place in `crs` that one track passes through, instead of an offset. An A-B line passes
         through its A by itself.
@@ -143,14 +146,14 @@ def plan_tracks(
             )
         crs, polygon = polygon.crs, polygon.polygon
     metric_crs = metric(crs)
-    _check_lengths(spacing_m=spacing_m, step_m=step_m)
+    strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
+    _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=2.0 * strips.half_m)
     _check_limits(min_segment_m=min_segment_m, straight_tolerance_m=straight_tolerance_m)
     if offset_m is not None and not np.isfinite(offset_m):
         raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
-    wanted_m = spacing_m
     shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
@@ -158,7 +161,6 @@ def plan_tracks(
     inner: BaseGeometry = outline
     if headland_m != 0.0:
         inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
-    strips = Strips(spacing_m, offset_m, last_strip)
     place = None if through is None else _place(through)
     baseline = find_baseline(
         outline,
@@ -192,7 +194,7 @@ def plan_tracks(
         told += (_other_layout(len(said.edits.apart)),)
     optional: dict[str, Any] = {}
     if headland_m > 0.0:
-        told = (*unworked_note(headland_m, wanted_m), *told)
+        told = (*unworked_note(headland_m, strips.spacing_m, strips.overlap_m), *told)
         optional["headland"] = headland_table(
             outline, inner, headland_m, crs=metric_crs, scale=scale
         )
@@ -200,7 +202,8 @@ def plan_tracks(
             outline,
             shapes,
             width_m=headland_m,
-            spacing_m=float(wanted_m),
+            spacing_m=strips.spacing_m,
+            first_m=strips.half_m,
             crs=metric_crs,
             scale=scale,
             holes=headland_holes,
@@ -223,6 +226,7 @@ def plan_tracks(
         notes=(*notes, *more, *told),
         direction_why=_why(baseline, fewest_tracks(inner, strips, scale), len(positions)),
         edits=said.edits,
+        width_m=width_m,
         **optional,
     )
     tracks = with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
@@ -307,12 +311,7 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, s
 
 
 def _positions(
-    edges: Edges,
-    frame: TrackFrame,
-    baseline: Baseline,
-    strips: Strips,
-    *,
-    inset_m: float,
+    edges: Edges, frame: TrackFrame, baseline: Baseline, strips: Strips, *, inset_m: float
 ) -> tuple[FloatArray, float, tuple[str, ...]]:
     """Places of the tracks, and the spacing that they have."""
     near, far = float(edges.va.min()), float(edges.va.max())
