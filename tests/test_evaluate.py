@@ -130,6 +130,22 @@ def test_reliability_of_honest_and_boastful_confidences(tmp_path):
         assert picture.size == (580, 580)
 
 
+def test_false_ones_that_are_no_trees_are_told(tmp_path, capsys):
+    from geofield.cli import main
+
+    base = (500_000, 4_000_000)
+    places = [base, (base[0] + 40, base[1]), (base[0] + 80, base[1]), (base[0] + 120, base[1])]
+    found = table(places).assign(kind=["tree", "tree", "other", "other"])
+    truth = table([base, places[3]])
+    assert gf.evaluate(found, truth).false_kinds == {"tree": 1, "other": 1}
+    assert gf.evaluate(table(places), truth).false_kinds == {}
+    found.to_file(tmp_path / "found.gpkg", layer="obstacles")
+    truth.to_file(tmp_path / "truth.gpkg")
+    with pytest.raises(SystemExit, match="0"):
+        main(["evaluate", str(tmp_path / "found.gpkg"), str(tmp_path / "truth.gpkg")])
+    assert "1 of 2 false ones are of kind other" in capsys.readouterr().err
+
+
 def test_a_reviewed_plan_is_a_truth(tmp_path, capsys):
     """Of its layers the obstacles are meant, and what a person rejected is none."""
     from geofield.cli import main

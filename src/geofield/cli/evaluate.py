@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.files import FILE, OLD_FILE
 from geofield.errors import ObstacleError
+
+if TYPE_CHECKING:
+    from geofield.evaluation import Evaluation
 
 
 @click.command(
@@ -94,12 +97,23 @@ def evaluate(
         draw_matches(found, true, result, picture, scene_file, area=options.get("area"))
         say(f"Drawn to {picture}: hits green, missed blue, false red.")
     if as_json:
-        figures = {"distance_m": distance_m, **score.as_dict()}
+        figures = {"distance_m": distance_m, **score.as_dict(), "false_kinds": result.false_kinds}
         if result.driving is not None:
             figures["driving"] = result.driving.as_dict()
         echo_json(figures)
         return
+    _tell(result)
+
+
+def _tell(result: Evaluation) -> None:
+    score = result.pooled
     say(f"{score.hits} hits of {score.detected} detected and {score.truth} true obstacles")
+    others = result.false_kinds.get("other", 0)
+    if others:
+        say(
+            f"  {others} of {score.detected - score.hits} false ones are of kind other: "
+            "they are wrong only if TRUTH holds more than trees"
+        )
     for name in ("precision", "recall", "f1", "radius_bias"):
         low, high = score.interval.get(name, (float("nan"), float("nan")))
         unit = " m" if name == "radius_bias" else ""

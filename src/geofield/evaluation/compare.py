@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +37,9 @@ class Evaluation:
         Within which a detection counts.
     driving : Driving or None
         What a driver loses, where tracks were given.
+    false_kinds : dict of kind to int
+        Of the false detections, where they have a column ``kind``: a truth of trees alone has
+        none of kind ``other``.
     """
 
     pooled: Score
@@ -43,6 +47,7 @@ class Evaluation:
     matches: dict[str, Matches]
     distance_m: float
     driving: Driving | None = None
+    false_kinds: Mapping[str, int] = field(default_factory=dict)
 
 
 def evaluate(
@@ -95,6 +100,7 @@ def evaluate(
         raise ObstacleError(f"Picture {missing[0]!r} has detections or a truth, but not both.")
     matches: dict[str, Matches] = {}
     rows: dict[str, Counts] = {}
+    false_kinds: Counter[str] = Counter()
     for name in found:
         within = area.get(name) if isinstance(area, Mapping) else area
         a, b = compared(found[name], true[name], within)
@@ -103,6 +109,8 @@ def evaluate(
         scale = _scale(np.vstack([centre_a, centre_b]), a.crs)
         match = match_points(centre_a / scale, centre_b / scale, distance_m)
         matches[name] = match
+        if "kind" in a.columns:
+            false_kinds.update(a["kind"].iloc[match.false_index].dropna())
         difference = radius_a[match.detected_index] - radius_b[match.truth_index]
         if not has_radius:
             difference = np.full(difference.shape, np.nan)
@@ -116,9 +124,9 @@ def evaluate(
         lost = Driving()
         for name in found:
             lines = segments[name] if isinstance(segments, Mapping) else segments
-            field = area[name] if isinstance(area, Mapping) else area
-            lost += driving(lines, found[name], active(true[name]), field)
-    return Evaluation(pooled, images, matches, distance_m, lost)
+            ground = area[name] if isinstance(area, Mapping) else area
+            lost += driving(lines, found[name], active(true[name]), ground)
+    return Evaluation(pooled, images, matches, distance_m, lost, dict(false_kinds))
 
 
 def compared(
