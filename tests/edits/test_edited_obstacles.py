@@ -324,3 +324,40 @@ def test_a_size_typed_for_a_copy_or_beside_another_shape_counts(folder: Path) ->
     grown = shapely.box(0, 0, 5, 4).buffer(2 * ground_scale_of(shape, table.crs), quad_segs=8)
     assert after.geometry.area[3] == pytest.approx(grown.area, rel=0.01)
     assert np.isnan(after["radius_m"][3])
+
+
+def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) -> None:
+    """Of another program, whose table takes any shape: none is lost, each has a width."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    middle = plan_in(folder).field.polygon.representative_point()
+    x, y = middle.x, middle.y
+    fence = shapely.LineString([(x - 30, y - 12), (x + 20, y + 9)])
+    flat = shapely.Polygon([(x, y - 20), (x + 8, y - 12), (x + 4, y - 16)])
+    drawn = [middle, translate(middle, 20, -20), fence, translate(fence, 0, 9), flat]
+
+    def draw(table: Frame) -> Frame:
+        table.loc[at(table, 1), "geometry"] = translate(before.geometry[1].centroid, 3)
+        table.loc[at(table, 2), "geometry"] = before.geometry[2].centroid
+        more = {"radius_m": [4.0, None, None, None, None], "buffer_m": [1.0, None, None, 2.0, None]}
+        return pd.concat([table, gpd.GeoDataFrame(more, geometry=drawn, crs=table.crs)])
+
+    rewritten(file, "obstacles", draw)
+    told = geofield("tracks", file, "-o", file)
+    assert "1 points among the obstacles have no radius_m; they are circles of 2 m now" in told
+    assert "lines among the obstacles have no buffer_m; they are strips of 0.1 m now" in told
+    plan = plan_in(folder)
+    after = rows(plan)
+    assert after["status"][[1, 2]].tolist() == ["confirmed", "detected"]
+    assert after.geometry[1].equals_exact(translate(before.geometry[1], 3), 0.01)
+    new = after[after.index > len(before)]
+    assert set(new["status"]) == {"added"}
+    assert new["radius_m"].tolist()[:2] == [4.0, 2.0]
+    size = float(ground_scale_of(fence, new.crs))
+    assert new.geometry.area.iloc[0] == pytest.approx(np.pi * (5 * size) ** 2, rel=0.01)
+    strip = translate(fence, 0, 9).buffer(2.05 * size)
+    assert new.geometry.iloc[3].hausdorff_distance(strip) < 0.02
+    assert plan.tracks is not None
+    driven = shapely.union_all(plan.tracks.segments.geometry)
+    assert all(new.geometry.intersects(shape).any() for shape in drawn)
+    assert not any(driven.intersects(shape) for shape in drawn)

@@ -18,7 +18,7 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
     Of one field the stage itself tells of points without a radius.
     """
     from geofield.farm.standing import WITHOUT_SHAPE, obstacles_of, unsized_points
-    from geofield.formats.foreign_tables import POINT_RADIUS_M
+    from geofield.model.obstacles import POINT_RADIUS_M
 
     if job.obstacles is None:
         return

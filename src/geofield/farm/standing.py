@@ -18,7 +18,7 @@ from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import unwrapped
-from geofield.model.obstacles import next_number
+from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
 from geofield.model.review import reconcile
 from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
 from geofield.plan import Plan
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Outlines, in an array or a list.
 Shapes = Sequence[shapely.Geometry] | np.ndarray
-LINE_HALF_WIDTH_M = 0.05
-"""A fence or wire drawn as a line becomes a strip of this half width."""
 #: What a plan was given of such a file, in its evidence.
 _GIVEN = "given"
 #: Shapes of a file that differ by less are the same, metres.
@@ -175,7 +173,6 @@ def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
     """How far each row reaches beyond its own shape."""
     from geofield.formats.foreign_tables import (
         BUFFER_COLUMNS,
-        POINT_RADIUS_M,
         RADIUS_COLUMNS,
         numbers_like,
     )

@@ -90,10 +90,11 @@ def _driven(dataset: Dataset) -> Dataset:
 
 def _understood(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
     shapes = np.asarray(obstacles.geometry.to_numpy(), dtype=object)
-    if (shapely.get_dimensions(shapes) != 2).any() or shapely.is_empty(shapes).any():
+    if shapely.is_missing(shapes).any() or shapely.is_empty(shapes).any():
         return obstacles  # writers refuse it, with the row
     written = Evidence.from_json(dataset.provenance.evidence).written
-    if written is None and _is_whole(obstacles, dataset):
+    areal = (shapely.get_dimensions(shapes) == 2).all()
+    if written is None and areal and _is_whole(obstacles, dataset):
         return obstacles
     whole = reconcile(obstacles, written, dataset.grid)[0]
     return whole.assign(kind=whole["kind"].where(whole["kind"].notna(), "other"))

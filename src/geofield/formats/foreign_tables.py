@@ -16,13 +16,10 @@ from geofield import schema
 from geofield.crs import LONLAT, grid_north_deg, ground_lengths_m, transformer
 from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
-from geofield.model.obstacles import circle_polygons
+from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons
 
 if TYPE_CHECKING:
     import geopandas as gpd
-
-#: Radius of an obstacle point that has none, metres: the smallest tree of METHOD.md, section 3.
-POINT_RADIUS_M = 2.0
 
 #: What others call the columns that say this, the likeliest first.
 NAME_COLUMNS = (

@@ -26,6 +26,10 @@ FloatArray = NDArray[np.float64]
 
 #: Straight pieces per quarter circle in the polygon that stands for a circle.
 QUARTER_SEGMENTS = 16
+#: Radius of an obstacle point that has none, metres: the smallest tree of METHOD.md, section 3.
+POINT_RADIUS_M = 2.0
+#: A fence or wire drawn as a line becomes a strip of this half width, metres.
+LINE_HALF_WIDTH_M = 0.05
 #: A polygon with a vertex farther than this from its row's circle was redrawn by a person:
 #: metres (formats round to about a centimetre) and share of the radius (other UTM zones).
 _CIRCLE_TOLERANCE = (0.02, 0.002)

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import warnings
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
 from geofield.crs import ground_scale_of
-from geofield.errors import ObstacleError
-from geofield.model.obstacles import FloatArray, circle_polygons, still_round
+from geofield.errors import FormatWarning, ObstacleError
+from geofield.model.obstacles import (
+    LINE_HALF_WIDTH_M,
+    POINT_RADIUS_M,
+    QUARTER_SEGMENTS,
+    FloatArray,
+    circle_polygons,
+    floats,
+    still_round,
+)
 from geofield.model.written import fitted_circles, same_shapes
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 #: A typed length that differs by more than this from the written one, metres.
 _TYPED_M = 1e-4
@@ -76,3 +90,53 @@ def grown(shape: shapely.Polygon, buffer_m: float, was_m: float, scale: float) -
             hint="Draw the obstacle anew, or choose another buffer_m.",
         )
     return result
+
+
+def widened(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """A table of which points are circles and lines are strips, as in a file of obstacles.
+
+    A point is as large as `radius_m` and `buffer_m` say. A line reaches `radius_m` to both sides;
+    a strip is no circle and has no radius. Those that say no size are told.
+    """
+    shapes = np.array(obstacles.geometry.array, dtype=object)
+    if (shapely.get_type_id(shapes) == shapely.GeometryType.GEOMETRYCOLLECTION).any():
+        obstacles = obstacles.explode(ignore_index=True)
+        shapes = np.array(obstacles.geometry.array, dtype=object)
+    dimension = shapely.get_dimensions(shapes)
+    point, line = dimension == 0, dimension == 1
+    if not (point | line).any():
+        return obstacles
+    radius = floats(obstacles, "radius_m").copy()
+    margin = np.nan_to_num(floats(obstacles, "buffer_m"))
+    unsized = point & ~(radius > 0)
+    radius[unsized] = POINT_RADIUS_M
+    thin = line & ~(radius > 0) & ~(margin > 0)
+    _tell_unsized(int(unsized.sum()), int(thin.sum()))
+    # The margin of a line grows it where that of a drawn shape does.
+    half = np.where(point, radius + margin, np.fmax(radius, LINE_HALF_WIDTH_M))
+    half[~(point | line)] = 0.0
+    wide = shapely.buffer(
+        shapely.force_2d(shapes),
+        half * ground_scale_of(shapes, CRS(obstacles.crs)),
+        quad_segs=QUARTER_SEGMENTS,
+    )
+    radius[line] = np.nan
+    shapes = np.where(point | line, wide, shapes)
+    return obstacles.assign(radius_m=radius).set_geometry(shapes, crs=obstacles.crs)
+
+
+def _tell_unsized(points: int, lines: int) -> None:
+    if points:
+        warnings.warn(
+            f"{points} points among the obstacles have no radius_m; they are circles of "
+            f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
+            FormatWarning,
+            stacklevel=5,
+        )
+    if lines:
+        warnings.warn(
+            f"{lines} lines among the obstacles have no buffer_m; they are strips of "
+            f"{2 * LINE_HALF_WIDTH_M:g} m now. Give them the margin that they need.",
+            FormatWarning,
+            stacklevel=5,
+        )

@@ -29,7 +29,7 @@ from geofield.model.obstacles import (
     next_number,
     still_round,
 )
-from geofield.model.resized import circles, differ, grown, shape_now
+from geofield.model.resized import circles, differ, grown, shape_now, widened
 from geofield.model.written import (
     MOVED_M,
     PlainShape,
@@ -59,8 +59,8 @@ def reconcile(
 
     A row without a number, or with a number that another row has (a copy of that one), was drawn:
     it becomes `added` (unless another status was chosen) and gets the next free number; a safety
-    margin typed for it grows what was drawn, a radius makes it a circle. Rows without a shape are
-    dropped.
+    margin typed for it grows what was drawn, a radius makes it a circle. Points and lines become
+    areas (`geofield.model.resized.widened`). Rows without a shape are dropped.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class _Rows:
 
 
 def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """The rows that have a shape, their numbers as numbers."""
+    """The rows that have a shape, all of them areas, their numbers as numbers."""
     shapes = np.asarray(obstacles.geometry.array, dtype=object)
     missing = shapely.is_missing(shapes) | shapely.is_empty(shapes)
     table = obstacles[~missing] if missing.any() else obstacles
@@ -164,9 +164,9 @@ def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         table = _repaired(table, crossed)
     kinds = table.dtypes
     names = [each.name for each in schema.OBSTACLES.columns if each.type in ("int", "float")]
-    if all(name in kinds and kinds[name].kind in "if" for name in names):
-        return table
-    return schema.conform(schema.OBSTACLES, table, extras=True)
+    if not all(name in kinds and kinds[name].kind in "if" for name in names):
+        table = schema.conform(schema.OBSTACLES, table, extras=True)
+    return widened(table)
 
 
 def _repaired(obstacles: gpd.GeoDataFrame, crossed: NDArray[np.bool_]) -> gpd.GeoDataFrame:
@@ -175,8 +175,8 @@ def _repaired(obstacles: gpd.GeoDataFrame, crossed: NDArray[np.bool_]) -> gpd.Ge
     for row in np.flatnonzero(crossed):
         parts = shapely.get_parts(shapely.make_valid(shapes[row]))
         areas = [part for part in parts if isinstance(part, shapely.Polygon)]
-        # What has no area at all stays as it is: nobody took it away.
-        shapes[row] = shapely.MultiPolygon(areas) if areas else shapes[row]
+        # What has no area at all is the line or point that it is: nobody took it away.
+        shapes[row] = shapely.MultiPolygon(areas) if areas else shapely.union_all(parts)
     return obstacles.set_geometry(shapes, crs=obstacles.crs).explode(ignore_index=True)
 
 
