@@ -353,6 +353,62 @@ def test_sizes_of_points_are_taken_as_they_are_meant(tmp_path: Path) -> None:
     assert found["radius_m"].tolist() == [6.5, 150.0]
 
 
+def test_all_layers_of_a_file_of_obstacles_are_avoided(tmp_path: Path) -> None:
+    """Only the first was: of a KML with folders, or trees beside fences, the rest was lost."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    trees = tmp_path / "mine.gpkg"
+    here = shapely.Point(500050, 5600030)
+    for layer, shape in (
+        ("fences", shapely.LineString([(500020, 5600020), (500070, 5600020)])),
+        ("trees", here),
+    ):
+        table = gpd.GeoDataFrame({"radius_m": [3.0]}, geometry=[shape], crs=CRS)
+        (table if layer == "fences" else table.to_crs(4326)).to_file(trees, layer=layer)
+    said = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "plan.gpkg")
+    assert "what all its layers hold is avoided: fences, trees" in said
+    found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
+    assert len(found) == 2
+    assert found.contains(here).any()
+    # A plan in which nothing stands is no file of obstacles: its tracks would be.
+    run(tmp_path / "parcel.gpkg", "-o", tmp_path / "bare.gpkg", "--spacing", "6")
+    told = planned_around(tmp_path / "parcel.gpkg", tmp_path / "bare.gpkg", tmp_path / "no.gpkg", 1)
+    assert "is a plan in which no obstacle stands" in told
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_trees_in_a_table_of_latitudes_and_longitudes(tmp_path: Path, mark: str) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    here = gpd.GeoSeries([shapely.Point(500050, 5600030)], crs=CRS).to_crs(4326)[0]
+    rows = [["name", "Lat", "Lon", "radius_m"], ["oak", f"{here.y}", f"{here.x}", "3.5"]]
+    if mark == ";":
+        rows[1] = [each.replace(".", ",") for each in rows[1]]
+    trees = tmp_path / "trees.csv"
+    trees.write_text("\n".join(mark.join(row) for row in rows), encoding="utf-8-sig")
+    planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "plan.gpkg")
+    found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
+    assert found["radius_m"].tolist() == [3.5]
+    assert found.geometry[0].centroid.distance(shapely.Point(500050, 5600030)) < 0.01
+    trees.write_text("name,north,east\noak,1,2\n")
+    told = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "no.gpkg", 1)
+    assert "no columns lat and lon" in told
+
+
+def test_geoparquet_is_a_vector_file(tmp_path: Path) -> None:
+    """GDAL as pyogrio brings it reads none: "Is the file whole?"."""
+    from geofield.cli.parcels import parcel_and_point
+
+    parcel = outlines(1).to_crs(4326)
+    parcel.to_parquet(tmp_path / "parcel.parquet")
+    field, lat, lon = parcel_and_point(tmp_path / "parcel.parquet", None, None, None, None)
+    assert field is not None
+    assert parcel.geometry.iloc[0].contains(shapely.Point(lon, lat))
+    tree = gpd.GeoDataFrame({"radius_m": [3.0]}, geometry=[shapely.Point(lon, lat)], crs=4326)
+    tree.to_parquet(tmp_path / "trees.parquet")
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    planned_around(tmp_path / "parcel.gpkg", tmp_path / "trees.parquet", tmp_path / "plan.gpkg")
+    assert len(gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")) == 1
+
+
 @pytest.mark.parametrize("several", [1, 2])
 def test_obstacles_that_are_not_avoided_are_told(tmp_path: Path, several: int) -> None:
     outlines(several).to_file(tmp_path / "parcels.gpkg")

@@ -17,12 +17,14 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
 
     Of one field the stage itself tells of points without a radius.
     """
-    from geofield.farm.standing import WITHOUT_SHAPE, obstacles_of, unsized_points
+    from geofield.farm.standing import LAYERS, WITHOUT_SHAPE, obstacles_of, unsized_points
     from geofield.model.obstacles import POINT_RADIUS_M
 
     if job.obstacles is None:
         return
     standing = obstacles_of(job.obstacles, job.obstacles_crs)
+    if layers := standing.attrs[LAYERS]:
+        say_note(f"{job.obstacles.name}: what all its layers hold is avoided: {', '.join(layers)}.")
     lost = standing.attrs[WITHOUT_SHAPE]
     if lost:
         rows = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")

@@ -13,13 +13,14 @@ import shapely
 
 from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
+from geofield.formats.foreign import PARQUET
 from geofield.strangers import check_vector
 from geofield.wording import nearest
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_CSV = (".csv", ".tsv", ".txt")
+CSV = (".csv", ".tsv", ".txt")
 _ROWS = "Give one row per field."
 _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
 
@@ -56,9 +57,9 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         raise FormatError(
             f"There is no file {path}.", hint="PLACES is a file with a row per field."
         )
-    if path.suffix.lower() in _CSV:
+    if path.suffix.lower() in CSV:
         return _csv(path, {text.lower() for text in texts if text})
-    if path.suffix.lower() in (".parquet", ".geoparquet", ".pq"):
+    if path.suffix.lower() in PARQUET:
         return _parquet(path)
     return _vector(path, layer)
 

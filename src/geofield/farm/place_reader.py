@@ -27,6 +27,7 @@ from geofield.settings import Settings
 from geofield.wording import nearest
 
 if TYPE_CHECKING:
+    import geopandas as gpd
     import pyarrow as pa
 
 _LAT = ("lat", "latitude")
@@ -102,6 +103,33 @@ def read_places(
         own.rename_columns(_unlike_ours(own.column_names)),
         said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip
+
+
+def read_points(path: Path) -> gpd.GeoDataFrame | None:
+    """The rows of a CSV table as points, by its columns lat and lon; None where it has shapes.
+
+    Raises
+    ------
+    FormatError
+        When there are no such columns, or positions are no positions.
+    """
+    import geopandas as gpd
+
+    raw = read_raw(path, layer=None, texts=())
+    if raw.geometry is not None:
+        return None
+    names = _found(raw, None, _LAT), _found(raw, None, _LON)
+    if None in names:
+        raise FormatError(
+            f"{raw.name} has no columns lat and lon and no geometry.",
+            hint=f"It has {', '.join(raw.table.column_names)}; rename them to lat and lon.",
+        )
+    lat, lon = (_numbers(raw, str(name)) for name in names)
+    _check_positions(raw, lat, lon)
+    known = np.isfinite(lat) & np.isfinite(lon)
+    points = np.full(len(lat), None)
+    points[known] = shapely.points(lon[known], lat[known])
+    return gpd.GeoDataFrame(raw.table.to_pandas(), geometry=points, crs=LONLAT)
 
 
 def _without_ours(raw: RawPlaces) -> RawPlaces:

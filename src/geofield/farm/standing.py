@@ -16,6 +16,8 @@ from geofield.crs import LONLAT
 from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
+from geofield.farm.place_files import CSV
+from geofield.farm.place_reader import read_points
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import unwrapped
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
@@ -36,28 +38,38 @@ _SAME_M = 0.05
 _NEAR_M = 100.0
 #: Rows of a file that have no shape, by their numbers from 1.
 WITHOUT_SHAPE = "without_shape"
+#: The layers that rows are of, where a file has several.
+LAYERS = "layers"
 _DEGREE_M = 111_000.0
 #: A longitude of -179.9 degrees is one of 180.1, too.
 _TURNS: tuple[float, ...] = (-360.0, 0.0, 360.0)
 
 
-@lru_cache(maxsize=2)
 def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
     """What to avoid, from any file: its rows, numbered as in the file; longitude and latitude.
 
-    Of a plan, or several in one GeoPackage, their obstacles as they stand. Read once per process,
-    however many fields there are. Rows without a shape are left out, and named in its attributes.
+    Of a plan, or several in one GeoPackage, their obstacles as they stand; of another file all its
+    layers, which its attributes name where they are several. Read once per process, however many
+    fields there are, until the file changes. Rows without a shape are left out, and named in its
+    attributes.
 
     Raises
     ------
     FormatError
         For a point whose radius or margin is there and cannot be understood.
     """
+    # What a Shapefile says of sizes lies beside it, as does what a GeoPackage took last.
+    parts = (path, path.with_suffix(".dbf"), path.with_name(f"{path.name}-wal"))
+    stats = [part.stat() for part in parts if part.is_file()]
+    return _read(path, crs, tuple((one.st_mtime_ns, one.st_size) for one in stats))
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> gpd.GeoDataFrame:
     from geofield.crs import parse_crs
-    from geofield.formats.foreign import read_vector
     from geofield.formats.foreign_tables import NUMBER_COLUMNS, column_like
 
-    frame = read_vector(path, schema.OBSTACLES.name if _holds_obstacles(path) else None)
+    frame, layers = _rows_and_layers(path)
     if frame.crs is None:
         if crs is None:
             raise CRSError(
@@ -71,7 +83,36 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
     _understand_lengths(rows, path)
     rows = rows.reset_index(drop=True)
     rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in frame.index[empty]]
+    rows.attrs[LAYERS] = layers
     return rows
+
+
+def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
+    """The rows of a file, and of which of several layers they are."""
+    import pandas as pd
+
+    from geofield.formats.foreign import layer_names, read_vector
+    from geofield.formats.gpkg_read import is_own
+
+    if _holds_obstacles(path):
+        return read_vector(path, schema.OBSTACLES.name), []
+    if path.suffix.lower() in CSV and (points := read_points(path)) is not None:
+        return points, []
+    # The points of a GPX file's lines are told by the lines.
+    names = [name for name in layer_names(path) if name not in ("route_points", "track_points")]
+    if path.suffix.lower() == ".gpkg" and is_own(path):
+        raise FormatError(
+            f"{path} is a plan in which no obstacle stands.",
+            hint="Leave it out, or search or draw some in it: geofield obstacles, geofield review.",
+        )
+    if len(names) < 2:
+        return read_vector(path), []
+    tables = {name: table for name in names if len(table := read_vector(path, name))}
+    if not tables:
+        return read_vector(path), []
+    crs = next(iter(tables.values())).crs
+    alike = [each if each.crs == crs else each.to_crs(crs) for each in tables.values()]
+    return pd.concat(alike, ignore_index=True), list(tables) if len(tables) > 1 else []
 
 
 def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:

@@ -17,7 +17,7 @@ from pyproj import CRS
 from pyproj.exceptions import ProjError
 
 from geofield import schema
-from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
 from geofield.errors import EmptyFileError, FormatError, FormatWarning
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
@@ -27,9 +27,11 @@ from geofield.strangers import check_vector
 if TYPE_CHECKING:
     import geopandas as gpd
 
-__all__ = ["RawLayer", "files_in", "layer_names", "read_foreign", "read_vector"]
+__all__ = ["RawLayer", "files_in", "layer_names", "read_foreign", "read_parquet", "read_vector"]
 
 
+#: Endings of GeoParquet.
+PARQUET = (".parquet", ".geoparquet", ".pq")
 #: Of GDAL's opening a file that has no layer, of dates that are none, of systems in pieces.
 _DAMAGED = (IndexError, ValueError, ProjError)
 #: No coordinate of a metric CRS is larger.
@@ -37,7 +39,7 @@ _FAR_M = 1e8
 
 
 def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
-    """A layer of a file that GDAL reads, without its empty rows.
+    """A layer of a file that GDAL reads, or a GeoParquet file.
 
     Raises
     ------
@@ -49,6 +51,8 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
     from shapely.errors import GEOSException
 
+    if path.suffix.lower() in PARQUET:
+        return read_parquet(path)
     _look_at(path)
     try:
         with warnings.catch_warnings():
@@ -68,6 +72,27 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
     return frame
+
+
+def read_parquet(path: Path) -> gpd.GeoDataFrame:
+    """A GeoParquet file, which not every GDAL reads.
+
+    Raises
+    ------
+    FormatError
+        When it is damaged or has no geometry.
+    """
+    import geopandas as gpd
+    import pyarrow as pa
+
+    try:
+        frame = gpd.read_parquet(path)
+        if frame.crs is not None:  # only now is it looked at
+            parse_crs(frame.crs)
+    except (pa.ArrowInvalid, ValueError, OSError, ProjError) as error:
+        reason = f"{error}"[:200]
+        raise FormatError(f"{path} cannot be read: {reason}.", hint="Is it whole?") from error
+    return frame.drop(columns="bbox", errors="ignore")
 
 
 def _look_at(path: Path) -> None:
@@ -110,6 +135,8 @@ def layer_names(path: Path) -> list[str]:
     import pyogrio
     from pyogrio.errors import DataSourceError
 
+    if path.suffix.lower() in PARQUET:
+        return [path.stem]
     _look_at(path)
     try:
         return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]

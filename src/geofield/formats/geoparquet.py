@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from pyproj import CRS
-from pyproj.exceptions import ProjError
 
-from geofield.crs import parse_crs
 from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.arrow import layer_batches
-from geofield.formats.foreign import RawLayer, files_in, read_foreign
+from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_parquet
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -101,7 +99,6 @@ def write_geoparquet(
 
 def read(path: Path) -> Dataset:
     """The dataset in a GeoParquet file, or in all of a folder."""
-    import geopandas as gpd
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -109,13 +106,10 @@ def read(path: Path) -> Dataset:
     for file in files_in(path, ".parquet"):
         try:
             text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
-            frame = gpd.read_parquet(file)
-            if frame.crs is not None:  # only now is it looked at
-                parse_crs(frame.crs)
             if text is not None:
                 record = origin.from_json(text.decode())
-        except (pa.ArrowInvalid, ValueError, OSError, ProjError) as error:
+        except (pa.ArrowInvalid, ValueError, OSError) as error:
             reason = f"{error}"[:200]
             raise FormatError(f"{file} cannot be read: {reason}.", hint="Is it whole?") from error
-        layers.append(RawLayer(file.stem, frame.drop(columns="bbox", errors="ignore")))
+        layers.append(RawLayer(file.stem, read_parquet(file)))
     return origin.restored(read_foreign(layers, path), record)
