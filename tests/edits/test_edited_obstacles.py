@@ -361,3 +361,31 @@ def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) ->
     driven = shapely.union_all(plan.tracks.segments.geometry)
     assert all(new.geometry.intersects(shape).any() for shape in drawn)
     assert not any(driven.intersects(shape) for shape in drawn)
+
+
+def test_a_table_that_lost_its_columns_is_known_by_its_shapes(
+    folder: Path, made: SimulatedField
+) -> None:
+    """Every row was new, and what was deleted was found again; a status of before was no word."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+
+    def bare(table: Frame) -> Frame:
+        table.loc[at(table, 1), "status"] = "rejected"
+        table.loc[at(table, 2), "geometry"] = before.geometry[2].buffer(3)
+        return table[~at(table, 6)][["status", "geometry"]]
+
+    rewritten(file, "obstacles", bare)
+    told = run(folder, made, "--overwrite")
+    assert "has no column obstacle_no, kind, radius_m, buffer_m any more" in told
+    after = rows(plan_in(folder))
+    kept = [number for number in before.index if number != 6]
+    assert sorted(after.index) == kept
+    assert after["status"][[1, 2]].tolist() == ["rejected", "confirmed"]
+    assert set(after["status"][kept[2:]]) == set(before["status"][kept[2:]])
+    same = ["kind", "radius_m", "buffer_m"]
+    assert after.loc[kept[2:], same].equals(before.loc[kept[2:], same])
+
+    rewritten(file, "obstacles", lambda table: table.rename(columns={"status": "state"}))
+    assert "no column status any more" in geofield("tracks", file, "-o", file)
+    assert rows(plan_in(folder))["status"][1] == "rejected"

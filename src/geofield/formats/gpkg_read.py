@@ -187,8 +187,22 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
         )
         frame = frame[~absent]
     if of is schema.OBSTACLES:
+        _tell_lost_columns(frame, path)
         frame = _parts_apart(frame)
     return schema.conform(of, frame, extras=True)
+
+
+def _tell_lost_columns(frame: gpd.GeoDataFrame, path: Path) -> None:
+    """Tell which columns of a person's word another program dropped or renamed."""
+    words = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
+    lost = [name for name in words if name not in frame.columns]
+    if lost:
+        warnings.warn(
+            f"{path.name}: layer 'obstacles' has no column {', '.join(lost)} any more: there each "
+            "row counts as it was written, and what stands in a column of another name does not.",
+            FormatWarning,
+            stacklevel=4,
+        )
 
 
 def _as_spelled(of: schema.Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:

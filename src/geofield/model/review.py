@@ -86,6 +86,7 @@ def reconcile(
     table = _with_shapes(obstacles)
     rows = _Rows.of(table)
     record = (from_earlier_version(table) if written is None else written).by_number
+    _find_lost_numbers(rows, list(record.values()))
     known, before = _known(rows, record)
     _spell(rows, known, before)
     _refuse_sizes(rows)
@@ -186,6 +187,32 @@ def _plain_polygons(geometry: Any) -> NDArray[np.object_]:
     alone = shapely.get_num_geometries(shapes) == 1
     shapes[alone] = shapely.get_geometry(shapes[alone], 0)
     return np.asarray(shapely.orient_polygons(shapes), dtype=object)
+
+
+def _find_lost_numbers(rows: _Rows, record: list[WrittenRow]) -> None:
+    """Numbers and radii of a table that lost the column of its numbers in another program.
+
+    Its rows are known by where they stand: without that they all were new, and what was deleted
+    would be found again. Some must stand just as they were written, or it is a table drawn anew.
+    """
+    if not len(rows) or not record or not np.isnan(rows.at["obstacle_no"]).all():
+        return
+    shapes = shapes_of_plain([row.shape for row in record])
+    of = matches(rows.shapes, shapes)
+    same = of >= 0
+    same[same] = same_shapes(rows.shapes[same], shapes[of[same]])
+    if not same.any():
+        return
+    taken: set[int] = set()
+    # Of several rows on one place the first that is as it was written; others were drawn.
+    for row in np.argsort(~same, kind="stable").tolist():
+        if of[row] < 0 or of[row] in taken:
+            continue
+        taken.add(of[row])
+        one = record[of[row]]
+        rows.at["obstacle_no"][row] = one.obstacle_no
+        if np.isnan(rows.at["radius_m"][row]) and same[row] and one.radius_m is not None:
+            rows.at["radius_m"][row] = one.radius_m
 
 
 def _known(
