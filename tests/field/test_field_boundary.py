@@ -97,3 +97,17 @@ def test_holes_and_parts_are_kept():
     table = gpd.GeoDataFrame({"name": ["x"]}, geometry=[shapely.MultiPolygon([ring, B])], crs=4326)
     field = field_from_boundary(table, lat=50.0005, lon=10.0005)
     assert len(list(field.polygon.interiors)) == 1
+
+
+def test_that_only_the_first_of_several_layers_has_the_parcels_is_told(tmp_path, capsys):
+    from geofield.cli.parcels import parcel_and_point
+
+    file = tmp_path / "mine.gpkg"
+    for layer, east in (("winter", 500_000), ("summer", 501_000)):
+        shape = shapely.box(east, 5_200_000, east + 100, 5_200_100)
+        gpd.GeoDataFrame({"name": [layer]}, geometry=[shape], crs=32633).to_file(file, layer=layer)
+    assert parcel_and_point(file, None, None, None, None)[0].name == "winter"
+    told = "of its layers winter, summer the first is taken"
+    assert told in " ".join(capsys.readouterr().err.split())
+    assert parcel_and_point(file, "summer", None, None, None)[0].name == "summer"
+    assert told not in " ".join(capsys.readouterr().err.split())

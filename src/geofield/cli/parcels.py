@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from geofield.cli.console import say_note
 from geofield.cli.files import OLD_PATH
 from geofield.errors import FieldError, FormatError
 
@@ -47,9 +48,17 @@ def parcel_and_point(
     if (lat is None) != (lon is None):
         raise _missing(lat)
     from geofield.field import field_from_boundary
-    from geofield.formats.foreign import read_vector
+    from geofield.formats.foreign import layer_names, read_vector
+    from geofield.formats.gpkg_read import is_own
 
     try:
+        layers = layer_names(path) if layer is None and not is_own(path) else []
+        if len(layers) > 1:
+            say_note(
+                f"{path.name}: of its layers {', '.join(layers)} the first is taken for the "
+                "parcels; name another with --boundary-layer."
+            )
+            layer = layers[0]
         table = read_vector(path, layer)
     except FormatError as error:
         raise FieldError(
