@@ -116,6 +116,8 @@ def test_bad_input_is_refused():
         gf.evaluate(table([], crs=None), table([]))
     with pytest.raises(ObstacleError, match="not both"):
         gf.evaluate({"a": table([])}, {"b": table([])})
+    with pytest.raises(ObstacleError, match="`truth` must be a GeoDataFrame, not str"):
+        gf.evaluate(table([]), "truth.gpkg")
 
 
 def test_reliability_of_honest_and_boastful_confidences(tmp_path):

@@ -133,6 +133,14 @@ def compared(
     detected: gpd.GeoDataFrame, truth: gpd.GeoDataFrame, area: Any = None
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
     """The rows of one picture that count, in the order of its matches, both in one CRS."""
+    import geopandas as gpd
+
+    for what, table in (("detected", detected), ("truth", truth)):
+        if not isinstance(table, gpd.GeoDataFrame):
+            raise ObstacleError(
+                f"`{what}` must be a GeoDataFrame, not {type(table).__name__}.",
+                hint="Of a plan give plan.obstacles, of its file gf.read_plan(path).obstacles.",
+            )
     if detected.crs is None or truth.crs is None:
         raise CRSError("Detections and truth need a CRS.", hint="Set it with set_crs.")
     if not is_metric(detected.crs):
