@@ -26,6 +26,8 @@ ENLARGED = 1.05 * CHIP_RESOLUTION_M / WORKING_RESOLUTION_M
 """Lessons show chips so much larger on average: a little more than the working grid does."""
 PAINTED = 0.5
 """Share of the samples of open land that things are painted into."""
+CALM, HARD, ROOF_PX = 7.0, 14.0, 9000
+"""Grey differs by less on calm ground, by more at hard edges; so many pixels may be a roof."""
 SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
 BORDER_PX = 2.0
@@ -69,7 +71,7 @@ class Pictures:
         weight = np.where(count < 40, 1.6, 1.0)
         green = zip(self.bands, self.trees, strict=True)
         weight += 2 * np.array([green_ground(bands, trees) for bands, trees in green])
-        weight[self.simulated] = 0.5
+        weight[self.simulated] = 2.0
         weight[self.left_out] = 0
         return weight / weight.sum()
 
@@ -101,12 +103,30 @@ def green_ground(bands: np.ndarray, trees: np.ndarray) -> float:
     return float(((nir - red > 0.15 * (nir + red)) & (free > 0)).mean())
 
 
-def calm(image: np.ndarray) -> np.ndarray:
-    """Return where hardly anything can stand: no edges within a few pixels."""
+def spread(image: np.ndarray) -> np.ndarray:
+    """Return how much grey differs within a few pixels."""
     grey = image[..., :3].mean(axis=2)
     mean = cv2.blur(grey, (9, 9))
-    spread = np.sqrt(np.maximum(cv2.blur(grey * grey, (9, 9)) - mean * mean, 0))
-    return spread < 7
+    return np.sqrt(np.maximum(cv2.blur(grey * grey, (9, 9)) - mean * mean, 0))
+
+
+def calm(image: np.ndarray) -> np.ndarray:
+    """Return where hardly anything can stand: no edges within a few pixels."""
+    return spread(image) < CALM
+
+
+def ground(image: np.ndarray) -> np.ndarray:
+    """Return calm pixels without small pieces of them that have hard edges: those may be roofs."""
+    edges = spread(image)
+    _, parts, found, _ = cv2.connectedComponentsWithStats((edges < CALM).astype(np.uint8))
+    around = np.where(parts > 0, 0, cv2.dilate(parts.astype(np.float32), np.ones((7, 7))))
+    around = around.astype(np.intp).ravel()
+    hard = np.bincount(around, edges.ravel(), len(found)) > HARD * np.bincount(
+        around, minlength=len(found)
+    )
+    roofs = hard & (found[:, cv2.CC_STAT_AREA] < ROOF_PX)
+    roofs[0] = True
+    return ~roofs[parts]
 
 
 def water(image: np.ndarray) -> np.ndarray:
@@ -169,7 +189,7 @@ class Sampler:
         simulated = bool(self.simulated[number])
         open_land = simulated or count_near <= 12
         other = np.zeros((CROP_PX, CROP_PX), np.float32)
-        known = (calm(image) & ~water(image) | simulated).astype(np.float32)
+        known = (ground(image) & ~water(image) | simulated).astype(np.float32)
         if open_land and not simulated:
             # Of all that is known there is much else; shadows are what is mistaken for things.
             known = np.maximum(known, 2 * shadows(image, trees))
