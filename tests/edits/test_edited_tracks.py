@@ -623,3 +623,67 @@ def test_values_beside_lines_of_several_parts_and_none_at_all() -> None:
     assert again.dropna().to_dict() == {1: "a", 2: "b", 5: "e"}
     assert TrackEdits.from_json(json.loads(json.dumps(edits.to_json()))) == edits
     assert TrackEdits.from_json({"edits": [], "apart": []}) == TrackEdits()
+
+
+def other_program(kind: str, table: Frame) -> Frame:
+    """A layer as programs write it that do not know what its columns are for."""
+    if kind == "reversed":
+        return table.iloc[::-1][["geometry"]]
+    if kind == "renamed":
+        return table.rename(columns={name: f"{name}_1" for name in table if name != "geometry"})
+    if kind == "with heights":
+        return table.set_geometry(shapely.force_3d(table.geometry, 2.0))[["geometry"]]
+    if kind == "dissolved":
+        return table.dissolve().reset_index(drop=True)
+    if kind == "turned and dissolved":
+        return table.set_geometry(shapely.reverse(table.geometry)).dissolve()[["geometry"]]
+    lost = {"bare": [name for name in table if name != "geometry"]}.get(kind, [kind])
+    return table.drop(columns=lost)
+
+
+LOSSES = ("bare", "track_no", "segment_no", "reversed", "renamed", "with heights")
+DISSOLVED = ("dissolved", "turned and dissolved")
+
+
+@pytest.mark.filterwarnings("ignore:field.gpkg. layer:geofield.errors.FormatWarning")
+@pytest.mark.parametrize("kind", [*LOSSES, *DISSOLVED])
+def test_segments_that_lost_their_numbers_are_known_by_their_shapes(
+    folder: Path, kind: str
+) -> None:
+    """All counted as drawn by a person, and the planned ones came back beside them."""
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+    rewritten(file, "segments", lambda table: other_program(kind, without(5)(table)))
+    assert [one.track_no for one in plan_in(folder).track_edits.edits if one.away] == [5]
+    left = set(before.lines["track_no"]) - {5}
+    assert exported(folder, file)["segments"] == left
+    told = geofield("tracks", file, "-o", file)
+    assert KEPT + "5 taken away" in told
+    assert ("layer 'segments'" in told) == (kind != "segment_no")
+    after = tracks_in(folder)
+    whole(after)
+    assert set(after.lines["track_no"]) == left
+    assert len(after.segments) == (before.segments["track_no"] != 5).sum()
+
+
+@pytest.mark.filterwarnings("ignore:field.gpkg. layer:geofield.errors.FormatWarning")
+@pytest.mark.parametrize("kind", ["bare", "dissolved"])
+def test_tracks_that_lost_their_numbers_are_known_by_their_shapes(folder: Path, kind: str) -> None:
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+    rewritten(file, "tracks", lambda table: other_program(kind, table))
+    assert not plan_in(folder).track_edits.edits
+    assert exported(folder, file)["tracks"] == set(before.lines["track_no"])
+
+
+@pytest.mark.filterwarnings("ignore:field.gpkg. layer:geofield.errors.FormatWarning")
+def test_a_moved_track_without_its_number_stands_for_the_one_that_was_there(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+
+    def moved(table: Frame) -> Frame:
+        shapes = table.geometry.where(table["track_no"] != 6, table.translate(0.8, 0.8))
+        return gpd.GeoDataFrame(geometry=shapes, crs=table.crs)
+
+    rewritten(file, "segments", moved)
+    edits = plan_in(folder).track_edits
+    assert [one.track_no for one in edits.edits if one.drawn] == [6]

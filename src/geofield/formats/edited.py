@@ -64,7 +64,8 @@ def _driven(dataset: Dataset) -> Dataset:
     if not Tracks.lie_in(dataset.tables, evidence):
         return dataset
     tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
-    if tracks.edits_since(known) == known:
+    of_before = tracks.edits_since(known) == known
+    if of_before and not tracks.partial:
         return dataset
     from geofield.tracks.blocks import obstacle_shapes
     from geofield.tracks.by_hand import as_edited
@@ -76,7 +77,7 @@ def _driven(dataset: Dataset) -> Dataset:
     whole = as_edited(tracks, known)
     if whole is tracks:
         return dataset  # columns alone
-    if tracks.route is not None:
+    if tracks.route is not None and not of_before:
         warnings.warn(
             "Tracks were edited since their route was planned: it is of before. Plan it again "
             "(geofield tracks).",

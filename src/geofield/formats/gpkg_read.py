@@ -186,19 +186,30 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             stacklevel=3,
         )
         frame = frame[~absent]
+    _tell_lost_columns(of, frame, path)
+    if of is schema.SEGMENTS and (frame.count_geometries() > 1).any():
+        warnings.warn(
+            f"{path.name}: layer 'segments' has rows of several lines: each line counts as the "
+            "track on which it was written.",
+            FormatWarning,
+            stacklevel=3,
+        )
     if of is schema.OBSTACLES:
-        _tell_lost_columns(frame, path)
         frame = _parts_apart(frame)
     return schema.conform(of, frame, extras=True)
 
 
-def _tell_lost_columns(frame: gpd.GeoDataFrame, path: Path) -> None:
-    """Tell which columns of a person's word another program dropped or renamed."""
-    words = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
-    lost = [name for name in words if name not in frame.columns]
+def _tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> None:
+    """Tell which columns by which rows are known another program dropped or renamed."""
+    words = {
+        schema.OBSTACLES.name: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
+        schema.TRACKS.name: ("track_no",),
+        schema.SEGMENTS.name: ("track_no",),
+    }
+    lost = [name for name in words.get(of.name, ()) if name not in frame.columns]
     if lost:
         warnings.warn(
-            f"{path.name}: layer 'obstacles' has no column {', '.join(lost)} any more: there each "
+            f"{path.name}: layer {of.name!r} has no column {', '.join(lost)} any more: there each "
             "row counts as it was written, and what stands in a column of another name does not.",
             FormatWarning,
             stacklevel=4,

@@ -16,6 +16,7 @@ from geofield import schema
 from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, tracks_drawn, words
+from geofield.model.lost_numbers import known_by_shape
 from geofield.model.map_words import heading_in_words
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.rows import Rows, rows_of, tables_when_asked
@@ -158,6 +159,14 @@ class Tracks:
         return tuple(name for name, rows in layers.items() if not any(track_numbers(rows)))
 
     @property
+    def partial(self) -> set[int]:
+        """The planned tracks of which another program lost what stood in columns."""
+        found: set[int] = set()
+        for of, rows in ((schema.TRACKS, self.lines), (schema.SEGMENTS, self.segments)):
+            found.update(track_numbers(rows[rows[of.column_names].isna().any(axis=1)]))
+        return found if self.written is None else found & set(self.written.segments)
+
+    @property
     def changed_twice(self) -> tuple[int, ...]:
         """The tracks that a person changed in both layers, in each another way."""
         if self.written is None or self.written.are(self.lines, self.segments):
@@ -218,10 +227,14 @@ class Tracks:
 
         `grid` gives the points their pixels, `outline` (metric CRS) the field for the figures.
         """
-        written = evidence.get("written")
+        written = TracksWritten.from_json(evidence["written"]) if evidence.get("written") else None
+        lines, segments = tables[schema.TRACKS.name], tables[schema.SEGMENTS.name]
+        if written is not None:
+            lines = known_by_shape(schema.TRACKS, lines, written)
+            segments = known_by_shape(schema.SEGMENTS, segments, written)
         return cls(
-            lines=tables[schema.TRACKS.name],
-            segments=tables[schema.SEGMENTS.name],
+            lines=lines,
+            segments=segments,
             gaps=tables[schema.GAPS.name],
             heading_deg=float(evidence["heading_deg"]),
             spacing_m=float(evidence["spacing_m"]),
@@ -232,7 +245,7 @@ class Tracks:
             outline=outline,
             blocked_count=int(evidence.get("blocked_count", 0)),
             losses=tuple(ObstacleLoss(*loss) for loss in evidence.get("losses", ())),
-            written=None if written is None else TracksWritten.from_json(written),
+            written=written,
             headland=tables.get(schema.HEADLAND.name),
             headland_tracks=tables.get(schema.HEADLAND_TRACKS.name),
             route=tables.get(schema.ROUTE.name),

@@ -174,12 +174,16 @@ def as_edited(tracks: Tracks, known: TrackEdits) -> Tracks:
     edits = tracks.edits_since(known)
     before, now = known.by_number, edits.by_number
     changed = {no for no in {*before, *now} if _shape(before.get(no)) != _shape(now.get(no))}
+    partial = tracks.partial - changed
+    changed |= partial
     if not changed or tracks.written is None or tracks.emptied:
         return tracks
     written = tracks.written.segments
     told = []
-    for no in sorted(changed & set(now)):
-        one = now[no]
+    for no in sorted(changed & {*now, *partial}):
+        one = now.get(no, TrackEdit(no))
+        if no in partial:
+            one = one._replace(drawn=as_text(shapely.MultiLineString(written[no])), cut=None)
         if one.cut is not None:
             cut = [shapely.get_coordinates(part) for part in parts_of(one.cut)]
             left = [line for line in written.get(no, ()) if not among(line, cut)]

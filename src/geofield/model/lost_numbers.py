@@ -1,0 +1,90 @@
+"""Rows of tracks and segments whose numbers another program lost, known by where they lie."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from geofield import schema
+from geofield.model.tracks_written import SAME_M, TracksWritten, track_numbers
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+#: A line without a number is that of the track beside which it lies so near, of the spacing.
+_NEAR = 0.25
+
+
+def known_by_shape(
+    of: schema.Layer, rows: gpd.GeoDataFrame, written: TracksWritten
+) -> gpd.GeoDataFrame:
+    """The rows of a layer, each with the number of the track on which it was written.
+
+    That is so where no row has a number, and where one has more lines than its track: a layer
+    dissolved into one row. The layer's other columns of such rows are empty.
+
+    Parameters
+    ----------
+    of : Layer
+        `tracks` or `segments`.
+    rows : GeoDataFrame
+    written : TracksWritten
+    """
+    import pandas as pd
+
+    numbers, shapes = np.array(track_numbers(rows)), rows.geometry.to_numpy()
+    most = [len(written.segments.get(no, ())) if of is schema.TRACKS else 1 for no in numbers]
+    lost = shapely.get_num_geometries(shapes) > np.maximum(most, 1)
+    unnumbered = not numbers.any()
+    lost |= unnumbered
+    if not lost.any() or not written.rows:
+        return rows
+    lines, row = shapely.get_parts(shapely.force_2d(shapes[lost]), return_index=True)
+    row = np.flatnonzero(lost)[row]
+    near_m = _NEAR * written.spacing_m if unnumbered else 0.0
+    number, lines = _numbered(lines, numbers[row], written, near_m)
+    if unnumbered and not number.any():
+        return rows  # all drawn anew
+    group = np.arange(len(lines))
+    if of is schema.TRACKS:
+        group = np.unique(np.where(number > 0, number, -1 - row), return_inverse=True)[1]
+    first = np.unique(group, return_index=True)[1]
+    whole = [shapely.MultiLineString(list(lines[group == one])) for one in range(len(first))]
+    names = schema.own_columns(of, rows)
+    found = schema.table(
+        of,
+        {"track_no": [int(no) or None for no in number[first]]},
+        np.array([*whole, None], dtype=object)[:-1] if of is schema.TRACKS else lines,
+        rows.crs,
+        {name: rows[name].array[row[first]] for name in names},
+    )
+    return schema.conform(of, pd.concat([rows[~lost], found]), extras=True)
+
+
+def _numbered(
+    lines: NDArray[np.object_], numbers: NDArray[np.int64], written: TracksWritten, near_m: float
+) -> tuple[NDArray[np.int64], NDArray[np.object_]]:
+    """Numbers of lines, and the lines in the direction in which they were written."""
+    numbers, lines = numbers.copy(), lines.copy()
+    every: Any = [(no, one) for no, some in written.segments.items() for one in some]
+    before = np.array([*map(shapely.LineString, (one for _, one in every)), None], object)[:-1]
+    line, other = shapely.STRtree(before).query(lines, "dwithin", max(near_m, SAME_M))
+    same = shapely.equals_exact(lines[line], before[other], SAME_M)
+    same |= shapely.equals_exact(shapely.reverse(lines[line]), before[other], SAME_M)
+    middle = shapely.line_interpolate_point(lines[line], 0.5, normalized=True)
+    away = np.where(same, -1.0, shapely.distance(middle, before[other]))
+    found: set[int] = set()
+    taken: set[int] = set()
+    # What is as it was written comes first: a line beside it was drawn.
+    for at in np.argsort(away, kind="stable")[: int((away <= near_m).sum())].tolist():
+        if line[at] in found or other[at] in taken:
+            continue
+        found.add(line[at])
+        taken.add(other[at])
+        numbers[line[at]] = every[other[at]][0]
+        if same[at]:
+            lines[line[at]] = before[other[at]]
+    return numbers, lines
