@@ -24,6 +24,8 @@ from geofield.errors import CRSError
 
 LONLAT = CRS.from_epsg(4326)
 WEB_MERCATOR = CRS.from_epsg(3857)
+#: One map of all fields (PDC Mercator): its seam runs through the Atlantic, not along 180 degrees.
+PACIFIC = CRS.from_epsg(3832)
 
 _GEOD = Geod(ellps="WGS84")
 #: Arms of the cross that the scale is measured with: long against the digits of a coordinate,

@@ -22,7 +22,7 @@ from geofield import schema
 from geofield.crs import LONLAT, parse_crs, reproject
 from geofield.errors import FormatError
 from geofield.formats import origin
-from geofield.formats.antimeridian import split
+from geofield.formats.antimeridian import joined, seamless, split
 from geofield.formats.arrow import arrow_type, arrow_values
 from geofield.model import Dataset
 from geofield.model.dataset import refuse_other_crs
@@ -283,16 +283,25 @@ def _of_kind(table: pa.Table, name: str, kind: pa.DataType) -> pa.Table:
 def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
     """A layer of many fields as people use it.
 
-    In the metric CRS where all its fields share one, else in WGS 84; lengths and areas are true
-    metres and hectares in their columns either way.
+    In the metric CRS where all its fields share one, else in WGS 84, or in Pacific Mercator where
+    some are near 180 degrees; lengths and areas are true metres and hectares in their columns.
     """
     import geopandas as gpd
-    import pyarrow.compute as pc
 
-    zones = pc.unique(table[EPSG].combine_chunks() if table.num_rows else table[EPSG])
-    shared = len(zones) == 1 and zones[0].is_valid
-    column, crs = (EXACT, CRS.from_epsg(zones[0].as_py())) if shared else (GEOMETRY, LONLAT)
-    shapes = shapely.from_wkb(table[column].to_numpy(zero_copy_only=False))
+    exact, shapes = (
+        shapely.from_wkb(table[name].to_numpy(zero_copy_only=False)) for name in (EXACT, GEOMETRY)
+    )
+    zones = table[EPSG].to_pandas()
+    shared = zones.nunique(dropna=False) == 1 and zones.notna().all()
+    crs = CRS.from_epsg(int(zones.iloc[0])) if shared else seamless(shapes)
+    if shared:
+        shapes = exact
+    elif crs != LONLAT:
+        shapes = reproject(joined(shapes, LONLAT), LONLAT, crs)
+        for zone in zones.dropna().unique():
+            # As they were, not joined again behind a cut.
+            mine = (zones == zone).to_numpy()
+            shapes[mine] = reproject(exact[mine], CRS.from_epsg(int(zone)), crs)
     rest = table.drop_columns(
         [each for each in (GEOMETRY, EXACT, "bbox") if each in table.column_names]
     )

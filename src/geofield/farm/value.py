@@ -54,7 +54,8 @@ class Farm:
     >>> farm["7"].write("one/")                                       # doctest: +SKIP
 
     Tables are GeoDataFrames with `field_id` and `utm_epsg` in every row: in the metric CRS where
-    all fields share one, else in WGS 84. Lengths (m) and areas (ha) in their columns are true.
+    all fields share one, else in WGS 84, or, of fields near 180 degrees, in Pacific Mercator
+    (EPSG:3832), where none is cut. Lengths (m) and areas (ha) in their columns are true.
 
     Parameters
     ----------

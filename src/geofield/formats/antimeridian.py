@@ -14,10 +14,13 @@ import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from geofield.crs import LONLAT, PACIFIC
 from geofield.errors import FormatError
 
 #: No field is wider: what seems to be, jumps from one side of the map to the other.
 _WIDEST_DEG = 180.0
+#: What stands in a field or is driven beside it is no farther from it.
+_BESIDE_DEG = 1.0
 _EAST = shapely.box(0.0, -90.0, 180.0, 90.0)
 _WEST = shapely.box(180.0, -90.0, 360.0, 90.0)
 #: Cut edges may differ in their last digits, degrees: by a centimetre, as of seven decimals.
@@ -68,6 +71,16 @@ def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
         shapes = shapes.copy()
         shapes[jumps] = [_joined(shape) for shape in unwrapped(shapes[jumps])]
     return shapes
+
+
+def seamless(shapes: NDArray[np.object_]) -> CRS:
+    """The CRS in which shapes of several zones (here in degrees) are one table, none of them cut.
+
+    That is degrees where none is near 180: a layer of polygons takes none in two parts, and a
+    person who edits one sees it at both ends of the map.
+    """
+    bounds = np.abs(shapely.bounds(shapes).reshape(-1, 4)[:, ::2])
+    return PACIFIC if (bounds > 180.0 - _BESIDE_DEG).any() else LONLAT
 
 
 def extent(shapes: NDArray[np.object_]) -> tuple[float, float, float, float]:

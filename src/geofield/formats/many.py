@@ -10,12 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, metric_crs
+from geofield.crs import LONLAT, PACIFIC, metric_crs, reproject, transformer
 from geofield.errors import FormatError
+from geofield.formats.antimeridian import seamless
 from geofield.formats.names import safe_name, unlike
 from geofield.formats.origin import imagery_day
 from geofield.model import Dataset, Provenance
@@ -88,13 +90,18 @@ def field_ids(datasets: Sequence[Dataset]) -> list[str]:
 def joined(datasets: Sequence[Dataset]) -> Joined:
     """The tables of several fields as one dataset, ``field_id`` in every row.
 
-    In the CRS that all share, else in WGS 84; lengths and areas stand in columns and are true
-    either way. Rows keep their field's order; track points are left to each field.
+    In the CRS that all share, else in one without a seam near them; lengths and areas stand in
+    columns and are true either way. Rows keep their field's order; track points are left to each
+    field.
     """
     ids = field_ids(datasets)
     crs = datasets[0].crs
     if any(each.crs != crs for each in datasets):
-        crs = LONLAT
+        outlines = [
+            reproject(each.table(schema.FIELD.name).geometry.to_numpy(), each.crs, LONLAT)
+            for each in datasets
+        ]
+        crs = seamless(np.concatenate(outlines))
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in schema.LAYERS:
         parts = [
@@ -139,8 +146,9 @@ def _one_of(dataset: Dataset, tables: Mapping[str, Any], row: Mapping[str, Any])
     epsg, field_id, crs = row.get(UTM_EPSG), row[FIELD_ID], dataset.crs
     if epsg is not None and not pd.isna(epsg):
         crs = CRS.from_epsg(int(epsg))
-    elif crs.is_geographic:
-        crs = metric_crs(*row["geometry"].representative_point().coords[0])
+    elif crs in (LONLAT, PACIFIC):
+        inside = row["geometry"].representative_point()
+        crs = metric_crs(*transformer(crs, LONLAT).transform(inside.x, inside.y))
     found = {}
     for name, table in tables.items():
         layer = schema.layer(name)
