@@ -593,3 +593,18 @@ def test_a_headland_that_passes_do_not_fill_is_told() -> None:
     assert tracks.statistics.coverage_percent < 95.0
     for headland_m in (2.0, 3.0, 15.0):  # narrower than one pass, one, five
         assert not plan_tracks(field, crs=CRS, spacing_m=3.0, headland_m=headland_m).notes
+
+
+@pytest.mark.parametrize("offset_m", [-1.0, np.nan, 121.0])
+def test_an_offset_outside_the_field_is_refused(offset_m):
+    """It was taken modulo the spacing: the first track lay where nobody had said."""
+    with pytest.raises(TrackError, match="offset"):
+        plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, offset_m=offset_m)
+
+
+def test_a_step_that_fills_the_disk_is_refused_with_one_that_does_not():
+    with pytest.raises(TrackError, match="10,000,000 are the most") as refused:
+        plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, step_m=1e-4)
+    step_m = float(refused.value.hint.split()[-2])
+    tracks = plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, step_m=step_m)
+    assert len(tracks.lines) == 20

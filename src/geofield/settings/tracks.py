@@ -74,7 +74,7 @@ class TrackSettings(Section):
     through_lonlat: tuple[float, float] | None = Field(
         None, description="Longitude and latitude of a place that a track passes through."
     )
-    offset_m: float | None = Field(
+    offset_m: NonNegative | None = Field(
         None,
         description="Of the first track from its edge, metres; half the working width, or half "
         "the spacing, by default.",

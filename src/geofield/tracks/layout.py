@@ -61,6 +61,15 @@ class Strips:
         )
         return on_the_border(positions, edges)
 
+    def refuse_beyond(self, across_m: float) -> None:
+        """Refuse an offset that lies beyond a field so wide across the tracks."""
+        if self.offset_m is not None and self.offset_m > across_m:
+            raise TrackError(
+                f"An offset of {self.offset_m:g} m lies beyond the field, which is "
+                f"{across_m:.1f} m wide across the tracks.",
+                hint="Give the distance of the first track from its edge, or leave the offset out.",
+            )
+
     def count(self, width_m: float) -> int:
         """How many tracks an area needs that is so wide across them; one if none fits."""
         positions = track_positions(

@@ -47,7 +47,7 @@ from geofield.tracks.tables import (
 )
 
 MOST_PIECES = 10_000_000
-MOST_POINTS = 100_000_000
+MOST_POINTS = 10_000_000
 
 
 def plan_tracks(
@@ -149,8 +149,8 @@ def plan_tracks(
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
     _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=2.0 * strips.half_m)
     _check_limits(min_segment_m=min_segment_m, straight_tolerance_m=straight_tolerance_m)
-    if offset_m is not None and not np.isfinite(offset_m):
-        raise TrackError(f"offset_m is {offset_m}; it must be a number of metres.")
+    if offset_m is not None:
+        _check_limits(offset_m=offset_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
@@ -306,7 +306,7 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, s
         raise TrackError(
             f"So short a step would give about {points:.1g} track points; "
             f"{MOST_POINTS:,} are the most.",
-            hint="Give the step in metres, for instance 1.",
+            hint=f"The shortest step here is {1.1 * outline.area / (spacing * MOST_POINTS):.2g} m.",
         )
 
 
@@ -315,6 +315,7 @@ def _positions(
 ) -> tuple[FloatArray, float, tuple[str, ...]]:
     """Places of the tracks, and the spacing that they have."""
     near, far = float(edges.va.min()), float(edges.va.max())
+    strips.refuse_beyond(far - near)
     spacing_m, run, first = strips.spacing_m, baseline.edge, None
     if baseline.through is not None and strips.offset_m is not None:
         raise TrackError(
