@@ -3,6 +3,7 @@
 from typing import Any
 
 import geopandas as gpd
+import pandas as pd
 import pytest
 import shapely
 
@@ -81,6 +82,19 @@ def test_clear_refusals():
     points = gpd.GeoDataFrame(geometry=[shapely.Point(LON, LAT)], crs=4326)
     with pytest.raises(FieldError, match="no polygon"):
         field_from_boundary(points, lat=LAT, lon=LON)
+
+
+def test_a_closed_line_is_an_outline_where_there_is_no_polygon():
+    lines = parcels().set_geometry(parcels().boundary)
+    field = field_from_boundary(lines, lat=LAT, lon=LON)
+    assert field.polygon.equals(field_from_boundary(parcels(), lat=LAT, lon=LON).polygon)
+    opened = lines.set_geometry([shapely.LineString(list(x.coords)[:-1]) for x in lines.geometry])
+    with pytest.raises(FieldError, match="no closed line") as refused:
+        field_from_boundary(opened.set_crs(4326), lat=LAT, lon=LON)
+    assert "Lines to polygons" in refused.value.hint
+    mixed = gpd.GeoDataFrame(pd.concat([parcels().iloc[1:], lines.iloc[:1]]), crs=4326)
+    with pytest.raises(FieldError, match="contains lat"):
+        field_from_boundary(mixed, lat=LAT, lon=LON)
 
 
 def test_an_invalid_parcel_is_repaired_and_flagged():

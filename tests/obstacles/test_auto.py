@@ -10,7 +10,7 @@ from affine import Affine
 
 import geofield as gf
 from geofield import schema
-from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.errors import FieldError, ObstacleError, ObstacleWarning
 from geofield.model.circles import Circles
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
@@ -435,3 +435,9 @@ def test_canopy_that_a_tree_explains_or_that_is_doubtful_adds_nothing(cells, p):
     canopy = np.zeros((60, 60))
     canopy[cells] = p
     assert standing_map(canopy).things(FIELD_PX, one_tree(20, 30, 4), 0.35) == ([], [])
+
+
+def test_a_shape_without_a_crs_is_no_field():
+    field = simulate_field(3)
+    with pytest.raises(FieldError, match="must be a Field, not Polygon"):
+        gf.detect_obstacles(field.scene, field.field.polygon)  # type: ignore[arg-type]

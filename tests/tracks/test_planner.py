@@ -602,6 +602,45 @@ def test_an_offset_outside_the_field_is_refused(offset_m):
         plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, offset_m=offset_m)
 
 
+@pytest.mark.parametrize("name", ["spacing_m", "width_m", "offset_m", "step_m", "min_segment_m"])
+def test_words_for_lengths_are_refused_by_name(name):
+    lengths: Any = {"spacing_m": 6.0, name: "6"}
+    with pytest.raises(TrackError, match=f"{name} is 6; it must be"):
+        plan_tracks(box(0, 0, 200, 120), crs=CRS, **lengths)
+
+
+def test_words_for_a_radius_are_refused():
+    trees = gpd.GeoDataFrame(
+        {"radius_m": ["3", "4,5"]}, geometry=[box(9, 9, 10, 10), box(50, 50, 51, 51)], crs=CRS
+    )
+    with pytest.raises(ObstacleError, match="radius_m holds words, as '4,5'"):
+        plan_tracks(box(0, 0, 200, 120), trees, crs=CRS, spacing_m=6.0)
+
+
+def test_passes_that_overlap_by_more_than_half_stay_inside():
+    """One more track lay 1 m from the border: a machine of 6 m reached 2 m beyond it."""
+    tracks = plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=2.0, width_m=6.0)
+    across = np.sort(tracks.lines.bounds.miny.to_numpy()) - Y
+    assert across == pytest.approx(np.arange(3.0, 118.0, 2.0))
+
+
+@pytest.mark.parametrize(("first_m", "nearest_m"), [(1.0, 1.0), (3.0, 3.0), (5.0, 3.0)])
+def test_a_given_first_track_is_there_however_passes_overlap(first_m, nearest_m):
+    tracks = plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=2.0, width_m=6.0, offset_m=first_m)
+    # The longest edge, from which the first is counted, is the upper one.
+    across = np.sort(Y + 120.0 - tracks.lines.bounds.miny.to_numpy())
+    assert np.isclose(across, first_m).any()
+    assert across[0] == pytest.approx(nearest_m)
+    assert across[-1] == pytest.approx(117.0)
+
+
+def test_a_place_to_pass_through_is_passed_however_passes_overlap():
+    tracks = plan_tracks(
+        box(0, 0, 200, 120), crs=CRS, spacing_m=2.0, width_m=6.0, through=(X + 50, Y + 119.5)
+    )
+    assert (np.abs(tracks.lines.bounds.maxy - Y - 119.5) < 1e-6).any()
+
+
 def test_a_step_that_fills_the_disk_is_refused_with_one_that_does_not():
     with pytest.raises(TrackError, match="10,000,000 are the most") as refused:
         plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, step_m=1e-4)

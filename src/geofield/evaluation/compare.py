@@ -16,7 +16,7 @@ from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
 from geofield.evaluation.scores import Counts, Score, score
-from geofield.model.obstacles import active
+from geofield.model.obstacles import active, floats
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -174,13 +174,7 @@ def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
     xy = np.column_stack([shapely.get_x(centre), shapely.get_y(centre)]).reshape(-1, 2)
     radius = np.full(len(geometry), np.nan)
     if "radius_m" in frame.columns:
-        try:
-            radius = frame["radius_m"].to_numpy(dtype="float64", na_value=np.nan)
-        except ValueError:
-            first = frame["radius_m"].dropna().iloc[0]
-            raise ObstacleError(
-                f"The column radius_m holds words, as {first!r}.", hint="Give numbers, metres."
-            ) from None
+        radius = floats(frame, "radius_m")
     else:
         area = ground_areas_m2(geometry, CRS(frame.crs))
         radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)

@@ -33,7 +33,8 @@ def field_from_boundary(
     Parameters
     ----------
     parcels : GeoDataFrame
-        Polygons in any CRS; other geometries are passed over.
+        Polygons in any CRS, or, where there are none, closed lines; other geometries are passed
+        over.
     lat, lon : float, optional
         A point in the field, degrees, WGS 84; not needed for one parcel, or with its name.
     name : str, optional
@@ -59,9 +60,12 @@ def field_from_boundary(
         )
     own = CRS(parcels.crs)
     rows = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)].explode()
-    rows = rows[rows.geometry.geom_type == "Polygon"]
+    rows = _outlines(rows)
     if rows.empty:
-        raise FieldError("The boundary file holds no polygon.")
+        raise FieldError(
+            "The boundary file holds no polygon and no closed line.",
+            hint="Close the outline where it begins (QGIS: Lines to polygons).",
+        )
     if name is not None:
         chosen = _of_name(rows, own, name, lat, lon)
     elif lat is not None and lon is not None:
@@ -72,6 +76,15 @@ def field_from_boundary(
         inside = chosen.geometry.iloc[0].representative_point()
         lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
     return _field(chosen, own, lat, lon)
+
+
+def _outlines(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The polygons; where there are none those that closed lines enclose, as CAD writes them."""
+    polygons = rows[rows.geometry.geom_type == "Polygon"]
+    if len(polygons):
+        return polygons
+    rings = rows[rows.geometry.is_ring]
+    return rings.set_geometry([Polygon(line) for line in rings.geometry], crs=rows.crs)
 
 
 def _of_name(

@@ -252,7 +252,27 @@ def still_round(geometry: NDArray[np.object_], radius: FloatArray) -> NDArray[np
 
 
 def floats(frame: gpd.GeoDataFrame, column: str) -> FloatArray:
-    """A column's numbers; NaN where they are missing, as all are without the column."""
+    """A column's numbers; NaN where they are missing, as all are without the column.
+
+    Raises
+    ------
+    ObstacleError
+        Where it holds words.
+    """
     if column not in frame.columns:
         return np.full(len(frame), np.nan)
-    return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))
+    try:
+        return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))
+    except (TypeError, ValueError):
+        first = next(value for value in frame[column].dropna() if not _is_number(value))
+        raise ObstacleError(
+            f"The column {column} holds words, as {first!r}.", hint="Give numbers, metres."
+        ) from None
+
+
+def _is_number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+    return True

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.errors import ObstacleError
+from geofield.errors import FieldError, ObstacleError
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, Strategy, method
 from geofield.model.circles import Circles, checked_range
@@ -120,12 +120,19 @@ def detect_obstacles(
     ------
     ObstacleError
         For an impossible radius range, margin, strategy or method.
+    FieldError
+        When `field` is a shape without a CRS.
     """
     if not (np.isfinite(buffer_m) and buffer_m >= 0):
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
     if strategy not in STRATEGIES:
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
+        )
+    if field is not None and not isinstance(field, Field):
+        raise FieldError(
+            f"`field` must be a Field, not {type(field).__name__}.",
+            hint="Of a polygon in a metric CRS make one: gf.Field(polygon, crs).",
         )
     low_m, high_m = checked_range(radius_m or (RADIUS_M if strategy == "auto" else STUDY_RADIUS_M))
     crs = scene.grid.metric_crs if field is None else field.crs

@@ -127,7 +127,13 @@ def track_positions(
             f"Unknown last_strip {last_strip!r}.", hint=f"Choose one of {', '.join(LAST_STRIPS)}."
         )
     half = (width_m or spacing_m) / 2.0
-    index = np.ceil((near_m - _EPS_M - first_m) / spacing_m)
+    # Of passes that overlap by more than half, none beyond those that reach the borders: their
+    # machine would drive outside for nothing. What was asked for stays.
+    idle = half - spacing_m + _EPS_M if half > spacing_m else -_EPS_M
+    low, high = near_m + idle, far_m - idle
+    if near_m - _EPS_M <= first_m <= far_m + _EPS_M:
+        low, high = min(low, first_m), max(high, first_m)
+    index = np.ceil((low - first_m) / spacing_m)
     start = first_m + index * spacing_m
     if last_strip == "spread":
         edge = max(start - half, near_m)
@@ -140,7 +146,7 @@ def track_positions(
         count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
         width = (far_m - edge) / count
         return np.asarray(edge + (np.arange(count) + 0.5) * width)
-    limit = (far_m if last_strip == "overrun" else far_m - half) + _EPS_M
+    limit = high if last_strip == "overrun" else far_m - half + _EPS_M
     count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
     # Multiples of the spacing from the one place, so that numbers far away do not drift.
     positions = first_m + (index + np.arange(count)) * spacing_m

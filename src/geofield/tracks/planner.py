@@ -146,11 +146,11 @@ def plan_tracks(
             )
         crs, polygon = polygon.crs, polygon.polygon
     metric_crs = metric(crs)
+    wide_m = spacing_m if width_m is None else width_m
+    _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
+    limits = {"min_segment_m": min_segment_m, "straight_tolerance_m": straight_tolerance_m}
+    _check_lengths(**limits, offset_m=offset_m or 0.0, none_too=True)
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
-    _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=2.0 * strips.half_m)
-    _check_limits(min_segment_m=min_segment_m, straight_tolerance_m=straight_tolerance_m)
-    if offset_m is not None:
-        _check_limits(offset_m=offset_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
@@ -253,16 +253,12 @@ def clip_shapes(
     return clip_tracks(positions, edges, discs, min_length_m=min_segment_m)
 
 
-def _check_lengths(**lengths: float) -> None:
-    for name, value in lengths.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise TrackError(f"{name} is {value}; it must be more than 0 metres.")
-
-
-def _check_limits(**limits: float) -> None:
-    for name, value in limits.items():
-        if not (np.isfinite(value) and value >= 0.0):
-            raise TrackError(f"{name} is {value}; it must be 0 or more metres.")
+def _check_lengths(*, none_too: bool = False, **lengths_m: float) -> None:
+    for name, value in lengths_m.items():
+        known = isinstance(value, (int, float, np.number)) and np.isfinite(value)
+        if not known or value < 0.0 or (value == 0.0 and not none_too):
+            least = "0 or more" if none_too else "more than 0"
+            raise TrackError(f"{name} is {value}; it must be {least} metres.")
 
 
 def _nothing_left(min_segment_m: float) -> str:
