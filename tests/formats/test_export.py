@@ -173,10 +173,10 @@ def test_what_is_dropped_is_said_once_and_only_if_it_is_there(dataset, tmp_path)
 
 
 def test_mixed_geometries_are_refused(dataset, tmp_path):
-    mixed = dataset.tables["obstacles"].copy()
+    mixed = dataset.tables["gaps"].copy()
     mixed.loc[1, "geometry"] = shapely.Point(0, 0)
-    broken = dataclasses.replace(dataset, tables={**dataset.tables, "obstacles": mixed})
-    with pytest.raises(FormatError, match=r"holds Polygon geometries; row 2 has Point"):
+    broken = dataclasses.replace(dataset, tables={**dataset.tables, "gaps": mixed})
+    with pytest.raises(FormatError, match=r"holds LineString geometries; row 2 has Point"):
         write_dataset(broken, tmp_path, ["gpkg"])
 
 
