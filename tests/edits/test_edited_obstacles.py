@@ -344,8 +344,8 @@ def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) ->
 
     rewritten(file, "obstacles", draw)
     told = geofield("tracks", file, "-o", file)
-    assert "1 points among the obstacles have no radius_m; they are circles of 2 m now" in told
-    assert "lines among the obstacles have no buffer_m; they are strips of 0.1 m now" in told
+    assert "One point among the obstacles without radius_m: taken for circles of 2 m" in told
+    assert "among the obstacles without buffer_m: taken for strips of 0.1 m" in told
     plan = plan_in(folder)
     after = rows(plan)
     assert after["status"][[1, 2]].tolist() == ["confirmed", "detected"]

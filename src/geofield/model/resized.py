@@ -127,16 +127,18 @@ def widened(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
 def _tell_unsized(points: int, lines: int) -> None:
     if points:
+        many = "One point" if points == 1 else f"{points} points"
         warnings.warn(
-            f"{points} points among the obstacles have no radius_m; they are circles of "
-            f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
+            f"{many} among the obstacles without radius_m: taken for circles of "
+            f"{POINT_RADIUS_M:g} m. Correct them if the trees are larger.",
             FormatWarning,
             stacklevel=5,
         )
     if lines:
+        many = "One line" if lines == 1 else f"{lines} lines"
         warnings.warn(
-            f"{lines} lines among the obstacles have no buffer_m; they are strips of "
-            f"{2 * LINE_HALF_WIDTH_M:g} m now. Give them the margin that they need.",
+            f"{many} among the obstacles without buffer_m: taken for strips of "
+            f"{2 * LINE_HALF_WIDTH_M:g} m. Give them the margin that they need.",
             FormatWarning,
             stacklevel=5,
         )
