@@ -375,6 +375,26 @@ def test_all_layers_of_a_file_of_obstacles_are_avoided(tmp_path: Path) -> None:
     assert "is a plan in which no obstacle stands" in told
 
 
+def test_a_fence_in_a_file_is_as_wide_as_it_says(tmp_path: Path) -> None:
+    """A margin beside a line was written down, and the tracks came to within 5 cm of the wire."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    y = np.array([20.0, 30.0, 40.0, 50.0]) + 5600000
+    fences = gpd.GeoDataFrame(
+        {"radius": [None, None, "1,5", "0,5"], "buffer_m": [None, 2.0, None, 1.0]},
+        geometry=[shapely.LineString([(500020, v), (500070, v)]) for v in y],
+        crs=CRS,
+    )
+    fences.to_file(tmp_path / "fences.gpkg")
+    planned_around(tmp_path / "parcel.gpkg", tmp_path / "fences.gpkg", tmp_path / "plan.gpkg")
+    found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
+    high = found.bounds["maxy"] - found.bounds["miny"]
+    assert high.tolist() == pytest.approx([0.1, 4.1, 3.0, 3.0], rel=0.001)
+    assert found["radius_m"].isna().all()
+    fences.assign(buffer_m="wide").to_file(tmp_path / "words.gpkg")
+    told = planned_around(tmp_path / "parcel.gpkg", tmp_path / "words.gpkg", tmp_path / "no", 1)
+    assert "'wide' is no length" in told
+
+
 @pytest.mark.parametrize("mark", [",", ";", "\t"])
 def test_trees_in_a_table_of_latitudes_and_longitudes(tmp_path: Path, mark: str) -> None:
     outlines(1).to_file(tmp_path / "parcel.gpkg")

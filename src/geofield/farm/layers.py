@@ -288,15 +288,12 @@ def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
     """
     import geopandas as gpd
 
-    exact, shapes = (
-        shapely.from_wkb(table[name].to_numpy(zero_copy_only=False)) for name in (EXACT, GEOMETRY)
-    )
     zones = table[EPSG].to_pandas()
     shared = zones.nunique(dropna=False) == 1 and zones.notna().all()
+    shapes = shapely.from_wkb(table[EXACT if shared else GEOMETRY].to_numpy(zero_copy_only=False))
     crs = CRS.from_epsg(int(zones.iloc[0])) if shared else seamless(shapes)
-    if shared:
-        shapes = exact
-    elif crs != LONLAT:
+    if not shared and crs != LONLAT:
+        exact = shapely.from_wkb(table[EXACT].to_numpy(zero_copy_only=False))
         shapes = reproject(joined(shapes, LONLAT), LONLAT, crs)
         for zone in zones.dropna().unique():
             # As they were, not joined again behind a cut.

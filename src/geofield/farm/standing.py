@@ -21,6 +21,7 @@ from geofield.farm.place_reader import read_points
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import unwrapped
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
+from geofield.model.resized import strips
 from geofield.model.review import reconcile
 from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
 from geofield.plan import Plan
@@ -40,6 +41,7 @@ _NEAR_M = 100.0
 WITHOUT_SHAPE = "without_shape"
 #: The layers that rows are of, where a file has several.
 LAYERS = "layers"
+_LINES = ("LineString", "LinearRing")
 _DEGREE_M = 111_000.0
 #: A longitude of -179.9 degrees is one of 180.1, too.
 _TURNS: tuple[float, ...] = (-360.0, 0.0, 360.0)
@@ -116,7 +118,7 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
 
 
 def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
-    """Make radius and margin of points numbers; refuse what would become a smaller thing."""
+    """Make radius and margin of points and lines numbers; refuse what would become smaller."""
     from geofield.formats.foreign_tables import (
         BUFFER_COLUMNS,
         RADIUS_COLUMNS,
@@ -130,7 +132,8 @@ def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
             continue
         lengths_m = numbers_like(rows, names)
         blank = said.isna() | (said.astype(str).str.strip() == "")
-        wrong = ~blank & (rows.geom_type == "Point") & ~((lengths_m >= 0) & np.isfinite(lengths_m))
+        thin = rows.geom_type.isin(["Point", *_LINES])
+        wrong = ~blank & thin & ~((lengths_m >= 0) & np.isfinite(lengths_m))
         if wrong.any():
             row, text = rows.index[wrong][0] + 1, str(said[wrong].iloc[0])
             raise FormatError(
@@ -168,7 +171,7 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     TrackError
         When the plan has obstacles already.
     """
-    from geofield.formats.foreign_tables import obstacle_table
+    from geofield.formats.foreign_tables import RADIUS_COLUMNS, column_like, obstacle_table
 
     if plan.obstacles is not None and len(plan.obstacles):
         raise TrackError(
@@ -177,10 +180,14 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
         )
     around = _around(plan, standing)
     mine = standing.iloc[around].to_crs(plan.field.crs)
-    line = mine.geometry.geom_type.isin(["LineString", "LinearRing"])
+    line = mine.geometry.geom_type.isin(_LINES).to_numpy()
     if line.any():
-        strips = mine.geometry.where(~line, mine.geometry.buffer(LINE_HALF_WIDTH_M))
-        mine = mine.set_geometry(strips)
+        shapes = mine.geometry.to_numpy().copy()
+        shapes[line] = strips(shapes[line], _reach_m(mine)[line], plan.field.crs)
+        mine = mine.set_geometry(shapes, crs=plan.field.crs)
+        sized = column_like(mine, RADIUS_COLUMNS)
+        if sized is not None:  # a strip is no circle
+            mine[sized.name] = sized.mask(line)
     near = mine.geometry.intersects(plan.field.polygon.buffer(_near_m(standing)))
     if not near.any() and _swapped_here(standing, plan):
         raise TrackError(
@@ -218,12 +225,15 @@ def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
         numbers_like,
     )
 
-    radius_m = np.nan_to_num(numbers_like(standing, RADIUS_COLUMNS), nan=POINT_RADIUS_M)
-    return np.where(
-        standing.geom_type == "Point",
-        radius_m + np.nan_to_num(numbers_like(standing, BUFFER_COLUMNS)),
-        LINE_HALF_WIDTH_M,
+    radius_m = numbers_like(standing, RADIUS_COLUMNS)
+    margin_m = np.nan_to_num(numbers_like(standing, BUFFER_COLUMNS))
+    point, line = standing.geom_type == "Point", standing.geom_type.isin(_LINES)
+    half_m = np.where(
+        point,
+        np.nan_to_num(radius_m, nan=POINT_RADIUS_M),
+        np.fmax(radius_m, LINE_HALF_WIDTH_M),
     )
+    return np.where(point | line, half_m + margin_m, LINE_HALF_WIDTH_M)
 
 
 def unsized_points(standing: gpd.GeoDataFrame) -> int:

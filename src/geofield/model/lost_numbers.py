@@ -48,16 +48,18 @@ def known_by_shape(
     number, lines = _numbered(lines, numbers[row], written, near_m)
     if unnumbered and not number.any():
         return rows  # all drawn anew
-    group = np.arange(len(lines))
+    first: NDArray[np.intp] = np.arange(len(lines))
+    whole: Any = lines
     if of is schema.TRACKS:
         group = np.unique(np.where(number > 0, number, -1 - row), return_inverse=True)[1]
-    first = np.unique(group, return_index=True)[1]
-    whole = [shapely.MultiLineString(list(lines[group == one])) for one in range(len(first))]
+        first = np.unique(group, return_index=True)[1]
+        order = np.argsort(group, kind="stable")
+        whole = shapely.multilinestrings(lines[order], indices=group[order])
     names = schema.own_columns(of, rows)
     found = schema.table(
         of,
         {"track_no": [int(no) or None for no in number[first]]},
-        np.array([*whole, None], dtype=object)[:-1] if of is schema.TRACKS else lines,
+        whole,
         rows.crs,
         {name: rows[name].array[row[first]] for name in names},
     )

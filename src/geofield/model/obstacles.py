@@ -261,18 +261,13 @@ def floats(frame: gpd.GeoDataFrame, column: str) -> FloatArray:
     """
     if column not in frame.columns:
         return np.full(len(frame), np.nan)
+    import pandas as pd
+
     try:
         return np.asarray(frame[column].to_numpy(dtype="float64", na_value=np.nan))
     except (TypeError, ValueError):
-        first = next(value for value in frame[column].dropna() if not _is_number(value))
+        said = frame[column].dropna()
+        words = said[pd.to_numeric(said, errors="coerce").isna()]
         raise ObstacleError(
-            f"The column {column} holds words, as {first!r}.", hint="Give numbers, metres."
+            f"The column {column} holds words, as {words.iloc[0]!r}.", hint="Give numbers, metres."
         ) from None
-
-
-def _is_number(value: object) -> bool:
-    try:
-        float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return False
-    return True

@@ -110,35 +110,33 @@ def widened(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     margin = np.nan_to_num(floats(obstacles, "buffer_m"))
     unsized = point & ~(radius > 0)
     radius[unsized] = POINT_RADIUS_M
-    thin = line & ~(radius > 0) & ~(margin > 0)
-    _tell_unsized(int(unsized.sum()), int(thin.sum()))
+    bare = line & ~(radius > 0) & ~(margin > 0)
+    _tell_unsized(int(unsized.sum()), int(bare.sum()))
     # The margin of a line grows it where that of a drawn shape does.
-    half = np.where(point, radius + margin, np.fmax(radius, LINE_HALF_WIDTH_M))
-    half[~(point | line)] = 0.0
-    wide = shapely.buffer(
-        shapely.force_2d(shapes),
-        half * ground_scale_of(shapes, CRS(obstacles.crs)),
-        quad_segs=QUARTER_SEGMENTS,
-    )
+    half_m = np.where(point, radius + margin, np.fmax(radius, LINE_HALF_WIDTH_M))
+    thin = point | line
+    shapes[thin] = strips(shapes[thin], half_m[thin], CRS(obstacles.crs))
     radius[line] = np.nan
-    shapes = np.where(point | line, wide, shapes)
     return obstacles.assign(radius_m=radius).set_geometry(shapes, crs=obstacles.crs)
 
 
+def strips(lines: NDArray[np.object_], half_m: ArrayLike, crs: CRS) -> NDArray[np.object_]:
+    """Points and lines in a CRS as what reaches so many metres to all sides of them."""
+    lines = shapely.force_2d(lines)
+    wide = np.asarray(half_m) * ground_scale_of(lines, crs)
+    return np.asarray(shapely.buffer(lines, wide, quad_segs=QUARTER_SEGMENTS), dtype=object)
+
+
 def _tell_unsized(points: int, lines: int) -> None:
-    if points:
-        many = "One point" if points == 1 else f"{points} points"
-        warnings.warn(
-            f"{many} among the obstacles without radius_m: taken for circles of "
-            f"{POINT_RADIUS_M:g} m. Correct them if the trees are larger.",
-            FormatWarning,
-            stacklevel=5,
-        )
-    if lines:
-        many = "One line" if lines == 1 else f"{lines} lines"
-        warnings.warn(
-            f"{many} among the obstacles without buffer_m: taken for strips of "
-            f"{2 * LINE_HALF_WIDTH_M:g} m. Give them the margin that they need.",
-            FormatWarning,
-            stacklevel=5,
-        )
+    for count, what, column, taken in (
+        (points, "point", "radius_m", f"circles of {POINT_RADIUS_M:g} m"),
+        (lines, "line", "buffer_m", f"strips of {2 * LINE_HALF_WIDTH_M:g} m"),
+    ):
+        if count:
+            many = f"One {what}" if count == 1 else f"{count} {what}s"
+            warnings.warn(
+                f"{many} among the obstacles without {column}: taken for {taken}. Correct the "
+                "sizes that are others.",
+                FormatWarning,
+                stacklevel=5,
+            )
