@@ -28,9 +28,9 @@ class Forks:
         self.environment = dict(environment)
         self._folder = tempfile.TemporaryDirectory(prefix="forks-")
         #: Where a process is asked for.
-        self._address = str(Path(self._folder.name) / "door")
+        self.address = str(Path(self._folder.name) / "door")
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as door:
-            door.bind(self._address)
+            door.bind(self.address)
             door.listen()
             self._process = subprocess.Popen(
                 [*line, str(door.fileno())],
@@ -92,7 +92,7 @@ class Forks:
         """The exit code of a run; negative, the signal that ended it."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as calls:
             calls.settimeout(timeout_s)
-            calls.connect(self._address)
+            calls.connect(self.address)
             socket.send_fds(calls, [json.dumps(request).encode()], files)
             process = int(calls.recv(20))
             try:

@@ -10,12 +10,14 @@ import atexit
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from forks import Forks
 
 _PROGRAM = Path(__file__).with_name("forked_command.py")
+_ASKS = Path(__file__).with_name("asked_command.py")
 #: Variables that are read when they are needed, never while a library loads.
 _READ_LATE = ("GEOFIELD_", "PYTEST_", "XDG_", "HOME")
 _FORKS: list[Forks] = []
@@ -72,3 +74,13 @@ def run_geofield(
     if check:
         assert done.returncode == 0, done.stderr
     return done
+
+
+@contextmanager
+def asked() -> Iterator[list[str]]:
+    """A program for shells that stands for the command, loaded once."""
+    forks = Forks([sys.executable, str(_PROGRAM)], os.environ)
+    try:
+        yield [sys.executable, "-IS", str(_ASKS), forks.address]
+    finally:
+        forks.end()

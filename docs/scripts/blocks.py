@@ -26,7 +26,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,6 +35,7 @@ from orthophoto_server import CHIP_HOST, PUBLIC_ADDRESS, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+COMMAND = (sys.executable, "-m", "geofield")
 
 _FENCE = re.compile(
     r"^(?P<indent> *)```(?P<language>\w+)(?P<info>[^\n]*)\n(?P<body>.*?)^(?P=indent)```[ ]*$",
@@ -118,7 +119,9 @@ def _runs(block: Block) -> bool:
     return block.language in ("python", "bash") and not block.is_output
 
 
-def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
+def prepare(
+    folder: Path, shared: Path | None, program: Sequence[str]
+) -> tuple[Path, dict[str, str]]:
     """A working folder as a reader's checkout looks, and the environment for its shell."""
     work = folder / "geofield"
     work.mkdir(parents=True)
@@ -128,7 +131,7 @@ def prepare(folder: Path, shared: Path | None) -> tuple[Path, dict[str, str]]:
     programs = folder / "bin"
     programs.mkdir()
     command = programs / "geofield"
-    command.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m geofield "$@"\n')
+    command.write_text(f'#!/bin/sh\nexec {shlex.join(program)} "$@"\n')
     command.chmod(0o755)
     environment = dict(os.environ)
     beside = Path(sys.executable).parent  # programs of what is installed with geofield
@@ -146,16 +149,23 @@ def run_page(path: Path, folder: Path, shared: Path | None = None, *, update: bo
 
 
 def run_pages(
-    paths: Iterable[Path], folder: Path, shared: Path | None = None, *, update: bool = False
+    paths: Iterable[Path],
+    folder: Path,
+    shared: Path | None = None,
+    *,
+    update: bool = False,
+    program: Sequence[str] = COMMAND,
 ) -> int:
     """Run the blocks of pages one after another in one folder; the number of blocks run.
+
+    `program` is what the command `geofield` starts.
 
     Raises
     ------
     BlockError
         Naming the page and the line of the block.
     """
-    work, environment = prepare(folder, shared)
+    work, environment = prepare(folder, shared, program)
     with serving(shared) as address:
         addresses = {PUBLIC_ADDRESS: address, CHIP_HOST: address}
         return sum(_run_page(path, work, environment, addresses, update=update) for path in paths)

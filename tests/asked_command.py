@@ -1,0 +1,24 @@
+"""Ask forks for a process that runs these words with the caller's streams, and end as it does.
+
+`asked_command.py ADDRESS WORD...`; it loads next to nothing, for it stands for a command.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+from pathlib import Path
+
+with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as calls:
+    calls.connect(sys.argv[1])
+    request = {
+        "words": sys.argv[2:],
+        "folder": str(Path.cwd()),
+        "environment": dict(os.environ),
+        "without": [],
+    }
+    socket.send_fds(calls, [json.dumps(request).encode()], [0, 1, 2])
+    calls.recv(20)  # its number
+    sys.exit(int(calls.recv(20)))
