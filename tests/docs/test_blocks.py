@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,16 @@ PAGES = blocks.pages()
 IN_TURN = pytest.mark.xdist_group("cluster of the documentation")
 
 
+#: Here the command starts from nothing, as a reader's does; loaded once, it takes half the time.
+FROM_NOTHING = ("README.md", "docs/tutorial.md", "docs/how-to/install.md")
+
+
+@pytest.fixture(scope="session")
+def loaded() -> Iterator[list[str]]:
+    with asked() as program:
+        yield program
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
@@ -30,12 +41,18 @@ IN_TURN = pytest.mark.xdist_group("cluster of the documentation")
 )
 def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     shared = request.getfixturevalue("shared") if blocks.needs_shared(page) else None
-    assert blocks.run_page(page, tmp_path, shared) > 0
+    nothing = str(page.relative_to(ROOT)) in FROM_NOTHING
+    program = blocks.COMMAND if nothing else request.getfixturevalue("loaded")
+    assert blocks.run_pages([page], tmp_path, shared, program=program) > 0
+
+
+def test_pages_of_beginners_start_the_command_from_nothing() -> None:
+    assert {str(page.relative_to(ROOT)) for page in PAGES} > set(FROM_NOTHING)
 
 
 @pytest.mark.slow
 @IN_TURN
-def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path) -> None:
+def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path, loaded: list[str]) -> None:
     names = [page.relative_to(blocks.DOCS).as_posix() for page in blocks.course()]
     assert names[0] == "tutorial.md"
     how_to = {page for page in PAGES if page.parent.name == "how-to"}
@@ -43,9 +60,7 @@ def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path) -> None
     assert how_to < set(blocks.course())
     shared = blocks.real_data()
     course = [page for page in blocks.course() if shared or not blocks.needs_shared(page)]
-    # Started from nothing it is where each page is run alone; loaded once, it takes half the time.
-    with asked() as program:
-        assert blocks.run_pages(course, tmp_path, shared, program=program) > 40
+    assert blocks.run_pages(course, tmp_path, shared, program=loaded) > 40
 
 
 def test_a_file_of_settings_grows_from_page_to_page(
