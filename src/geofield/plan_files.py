@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from geofield.errors import FormatError
 from geofield.staging import staged_folder
-from geofield.staging.generations import keep_earlier
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -35,16 +34,12 @@ def staged_plan(
     along; a project beside it that a person saved stays. `inputs`, files read for this work, are
     never replaced.
     """
-    from geofield.formats.gpkg_guests import bring_guests, keep_project
+    from geofield.formats.gpkg_guests import replace_plan
 
     refuse_other_names(output)
     with staged_folder(output.parent, overwrite=overwrite, inputs=inputs) as staging:
-        earlier = keep_earlier(output, staging)
         yield staging
-        if earlier is not None:
-            bring_guests(earlier, staging / output.name)
-        project = output.with_suffix(".qgz")
-        keep_project(project, staging / project.name)
+        replace_plan(output, staging / output.name)
 
 
 def save_plan(

@@ -19,11 +19,10 @@ from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import format_named, write_dataset
 from geofield.formats.export import dropped
-from geofield.formats.gpkg_guests import bring_guests, keep_project
+from geofield.formats.gpkg_guests import replace_plan
 from geofield.model.dataset import Dataset
 from geofield.model.scene import Scene
 from geofield.staging import staged_folder
-from geofield.staging.generations import keep_earlier
 
 PLAN_FILE = "field.gpkg"
 SCENE_FILE = "scene.tif"
@@ -57,7 +56,6 @@ def write_products(
     ):
         written: list[Path] = []
         shown = {"scene": scene}
-        earlier = keep_earlier(folder / PLAN_FILE, staging) if "gpkg" in asked else None
         if scene is not None:
             written += write_scene(dataset, staging, stem="", options=shown)
             dataset = replace(dataset, scene_path=written[0])
@@ -68,9 +66,8 @@ def write_products(
         written += write_dataset(
             dataset, staging, asked, overwrite=True, options=options, tell_drops=not told
         )
-        if earlier is not None:
-            bring_guests(earlier, staging / PLAN_FILE)
-        keep_project(folder / PROJECT_FILE, staging / PROJECT_FILE)
+        if "gpkg" in asked:
+            replace_plan(folder / PLAN_FILE, staging / PLAN_FILE)
         written += drawn.result()
         facts = {"timings_s": timings_s or {}, "formats": asked, "changes": changes}
         written += write_report(dataset, staging, stem="", options=facts)

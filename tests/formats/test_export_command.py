@@ -283,3 +283,29 @@ def test_whose_a_field_is_comes_back_from_a_shapefile(plan_file, tmp_path):
     assert done.returncode == 0, done.stderr
     back = read_dataset(tmp_path / "out" / "shapefile").table("field").iloc[0]
     assert (back["customer"], back["farm"]) == ("M\u00fcller & S\u00f6hne", "Ost")
+
+
+def test_an_exported_plan_that_a_person_edited_stays_as_the_earlier_one(plan_file, tmp_path):
+    """QGIS opens it as it opens any plan, so it is edited as one."""
+    out = tmp_path / "out"
+    words = ("export", plan_file, "-f", "gpkg", "-f", "kml", "--out", out)
+    assert geofield(*words).returncode == 0
+    copy, project = out / "field.gpkg", out / "field.qgz"
+    edited = gpd.read_file(copy, layer="obstacles").assign(note="a well")
+    edited.to_file(copy, layer="obstacles")
+    edited[["geometry"]].to_file(copy, layer="stones")
+    with zipfile.ZipFile(project, "w") as archive:
+        archive.writestr("field.qgs", "<qgis/>")
+    saved = project.read_bytes()
+
+    done = geofield(*words, "--overwrite", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "field.qgz is as it was saved in QGIS: it stays" in " ".join(done.stderr.split())
+    assert project.read_bytes() == saved
+    assert json.loads(done.stdout)["files"] == [str(copy), str(out / "field.kml")]
+    assert "stones" in pyogrio.list_layers(copy)[:, 0]
+    assert "note" not in gpd.read_file(copy, layer="obstacles")
+
+    done = geofield("undo", copy)
+    assert done.returncode == 0, done.stderr
+    assert (gpd.read_file(copy, layer="obstacles")["note"] == "a well").all()

@@ -1610,7 +1610,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Replace products that are there already.</source>
+      <source>Replace products that are there already; `geofield undo` brings a GeoPackage back.</source>
       <translation type="unfinished" />
     </message>
     <message>

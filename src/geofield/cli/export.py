@@ -47,7 +47,11 @@ Examples (on the project's own sample):
 @click.option(
     "--option", "further", multiple=True, metavar="NAME=VALUE", help="Further option of a format."
 )
-@click.option("--overwrite", is_flag=True, help="Replace products that are there already.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace products that are there already; `geofield undo` brings a GeoPackage back.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the files as JSON on stdout.")
 def export(
     plan_files: tuple[Path, ...],

@@ -51,15 +51,13 @@ def import_(
     from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged
-    from geofield.staging import staged_folder
-    from geofield.staging.generations import keep_earlier
+    from geofield.plan_files import staged_plan
 
     if output.suffix.lower() != ".gpkg":
         raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
     claim_file(output)
     dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
-    with staged_folder(output.parent, overwrite=overwrite, inputs=files) as staging:
-        keep_earlier(output, staging)
+    with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
     for note in dataset.notes:
         say(note)

@@ -12,6 +12,7 @@ from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.clear_way import tell_blocked
 from geofield.formats.edited import made_whole
+from geofield.formats.gpkg_guests import replace_plan
 from geofield.formats.many import distinct, field_ids, joined
 from geofield.formats.names import safe_name
 from geofield.formats.registry import FORMATS, Format, format_named
@@ -58,7 +59,8 @@ def write_datasets(
     stem : str
         Name of the products that are one file.
     overwrite : bool
-        Whether products that are there already may be replaced.
+        Whether products that are there already may be replaced; a GeoPackage stays beside the new
+        one as ``.bak``, and what a person keeps in it comes along.
     options : mapping, optional
         Options of the writers (see `Format.options`); each writer gets those it knows. Under
         a format's name stands a mapping of options for it alone.
@@ -112,6 +114,7 @@ def write_datasets(
                         hint="Write them into different folders, one after the other.",
                     )
                 written.append(place)
+        written = _replacing(written, target, staging)
     # Nobody takes the picture, map and report for a plan's whole content.
     for each in [each for each in chosen if tell_drops and not each.automatic]:
         told = (dropped(one, each, together=len(datasets) > 1) for one in datasets)
@@ -126,6 +129,16 @@ def write_datasets(
                 stacklevel=2,
             )
     return written
+
+
+def _replacing(places: Sequence[Path], target: Path, staging: Path) -> list[Path]:
+    """Keep what a person has in plans that are replaced; the places that still are written."""
+    staged = {place: staging / place.relative_to(target) for place in places}
+    for place, new in staged.items():
+        if new.suffix == ".gpkg" and place.is_file():
+            replace_plan(place, new)
+    # A project that a person saved stays in its place.
+    return [place for place, new in staged.items() if new.is_file()]
 
 
 def _points_alone(into: Format) -> bool:

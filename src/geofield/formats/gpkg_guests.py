@@ -17,6 +17,7 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.gpkg_read import own_layers
 from geofield.formats.qgis import is_as_written, is_project_as_written
+from geofield.staging.generations import keep_earlier
 
 #: Of QGIS: their rows are brought one by one.
 _OF_QGIS = {"layer_styles", "qgis_projects"}
@@ -28,6 +29,19 @@ _REGISTERS = {
     "gpkg_ogr_contents": "table_name",
     "gpkg_data_columns": "table_name",
 }
+
+
+def replace_plan(there: Path, new: Path) -> None:
+    """Prepare that `new`, in a staging folder, takes the place of the plan's file that is there.
+
+    That one stays beside it as the earlier one; what a person keeps in it comes along, and so does
+    the project beside it that a person saved. Errors and warnings are those of
+    :func:`bring_guests` and :func:`keep_project`.
+    """
+    earlier = keep_earlier(there, new.parent)
+    if earlier is not None:
+        bring_guests(earlier, new)
+    keep_project(there.with_suffix(".qgz"), new.with_suffix(".qgz"))
 
 
 def bring_guests(earlier: Path, plan_file: Path) -> None:
