@@ -24,7 +24,8 @@ demo: $(VENV)/run.stamp  ## run the main job on the sample field
 	$(BIN)/geofield run $(SAMPLE) --spacing 4 --out $(DEMO_OUT) --overwrite
 	@echo "Map picture: $(CURDIR)/$(DEMO_OUT)/map.png"
 
-test: check pytest  ## everything that must hold: lint, types, layers, tests
+test: $(VENV)/dev.stamp  ## everything that must hold: lint, types, layers, tests
+	@$(MAKE) --no-print-directory -j 2 check pytest
 
 check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .
