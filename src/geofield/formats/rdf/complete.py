@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -24,14 +24,12 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
     segments from tracks that have none. An obstacle without a word on its status counts as
     added by a person, so that no re-run drops it.
     """
-    field = tables["field"]
+    field, obstacles = tables["field"], tables["obstacles"]
     shapes = field.geometry.to_numpy()
     _fill(field, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
     _fill(field, "perimeter_m", ground_lengths_m(shapely.get_exterior_ring(shapes), crs))
-    obstacles = tables["obstacles"]
-    _fill(obstacles, "kind", np.full(len(obstacles), "other", dtype=object))
-    _fill(obstacles, "status", np.full(len(obstacles), "added", dtype=object))
-    _fill(obstacles, "buffer_m", np.zeros(len(obstacles)))
+    for column, value in {"kind": "other", "status": "added", "buffer_m": 0.0}.items():
+        _fill(obstacles, column, value)
     numbered(obstacles, "obstacle_no")
     _positions(obstacles, crs)
     numbered(tables["tracks"], "track_no")
@@ -49,10 +47,10 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
             _fill(points, column, values)
 
 
-def _fill(frame: gpd.GeoDataFrame, column: str, values: object) -> None:
-    if len(frame) and frame[column].isna().any():
-        missing = frame[column].isna()
-        frame.loc[missing, column] = np.asarray(values)[missing.to_numpy()]
+def _fill(frame: gpd.GeoDataFrame, column: str, values: Any) -> None:
+    missing = frame[column].isna()
+    if missing.any():
+        frame.loc[missing, column] = np.broadcast_to(values, len(frame))[missing.to_numpy()]
 
 
 def numbered(frame: gpd.GeoDataFrame, column: str) -> None:
@@ -63,7 +61,7 @@ def numbered(frame: gpd.GeoDataFrame, column: str) -> None:
 
 
 def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
-    if not len(frame) or not (frame["lat"].isna() | frame["lon"].isna()).any():
+    if not frame[["lat", "lon"]].isna().any(axis=None):
         return
     centre = shapely.centroid(frame.geometry.to_numpy())
     lon, lat = transformer(crs, LONLAT).transform(shapely.get_x(centre), shapely.get_y(centre))

@@ -23,6 +23,7 @@ from geofield.formats.rdf.features import (
     point_group,
     row_iris,
 )
+from geofield.formats.rdf.graph import ontology
 from geofield.formats.rdf.layers import CANDIDATE, LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
 from geofield.formats.rdf.namespaces import crs_iri, node
@@ -33,16 +34,6 @@ from geofield.model.obstacles import active
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: Licences by the words a source gives them, lower case, hyphens for spaces, to the document.
-LICENCES = {
-    "cc0": "https://creativecommons.org/publicdomain/zero/1.0/",
-    "cc0-1.0": "https://creativecommons.org/publicdomain/zero/1.0/",
-    "cc-by-4.0": "https://creativecommons.org/licenses/by/4.0/",
-    "cc-by-sa-4.0": "https://creativecommons.org/licenses/by-sa/4.0/",
-    "odbl-1.0": "https://opendatacommons.org/licenses/odbl/1-0/",
-    "dl-de-zero-2.0": "https://www.govdata.de/dl-de/zero-2-0",
-    "dl-de-by-2.0": "https://www.govdata.de/dl-de/by-2-0",
-}
 #: Metres by which `geo:sfWithin` may miss, for corners that are computed, not measured.
 WITHIN_TOLERANCE_M = 0.001
 #: The files of RDF/XML; also the order of the others.
@@ -288,7 +279,9 @@ def licence_iri(licence: str) -> str | None:
     text = licence.strip()
     if text.startswith(("http://", "https://")) and not NOT_IN_IRI.search(text):
         return text
-    return LICENCES.get(text.lower().replace(" ", "-"))
+    # The ontology tells their names, lower case, with hyphens for spaces.
+    name = text.lower().replace(" ", "-")
+    return next((iri for iri, known in ontology().pairs("skos:notation") if known == name), None)
 
 
 def _json(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -99,14 +100,13 @@ def point_group(frame: gpd.GeoDataFrame, names: Names) -> Group:
 
 def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series[Any]) -> Values:
     """The terms of a column; refuses numbers that are infinite."""
-    values = [None if pd.isna(value) else value for value in series.tolist()]
+    values = series.astype(object).where(series.notna(), None).tolist()
     if column.type == "float":
-        for row, value in enumerate(values):
-            if value is not None and not np.isfinite(value):
-                raise FormatError(
-                    f"Layer {layer!r}, row {row}: {column.name} is infinite.",
-                    hint="Correct the value, or leave it empty.",
-                )
+        for row in [row for row, v in enumerate(values) if v is not None and not math.isfinite(v)]:
+            raise FormatError(
+                f"Layer {layer!r}, row {row}: {column.name} is infinite.",
+                hint="Correct the value, or leave it empty.",
+            )
         return Texts([None if v is None else repr(float(v)) for v in values], "xsd:double")
     if column.type == "int":
         return Texts([None if v is None else str(int(v)) for v in values], "xsd:integer")
@@ -123,11 +123,9 @@ def link_properties(layer: LayerMap, frame: gpd.GeoDataFrame, names: Names) -> l
     """A layer's links to other rows as properties."""
     result: list[Column] = []
     for link in layer.links:
-        pointing = frame
-        if link.target_key != link.column:
-            pointing = frame.assign(**{link.target_key: frame[link.column]})
-        targets = row_iris(layer_map(link.target), pointing, names)
-        result.append((node(link.predicate), targets))
+        target = layer_map(link.target)
+        pointing = frame.assign(**{target.layer.key[-1]: frame[link.column]})
+        result.append((node(link.predicate), row_iris(target, pointing, names)))
     if layer.layer.name == schema.GAPS.name:
         result.append((node("gf:causedBy"), [_causes(text, names) for text in frame["cause"]]))
     return result

@@ -33,12 +33,11 @@ CANDIDATE = "gf:Candidate"
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A column that holds a key of another layer's row, told by a link instead of a number."""
+    """A column with the number of another layer's row (the last of its key), told as a link."""
 
     column: str
     predicate: str
     target: str
-    target_key: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +74,10 @@ class LayerMap:
 
 
 _IN_FIELD, _OF_PICTURE = ("gf:inField", "field"), ("prov:wasDerivedFrom", "imagery")
-_ON_TRACK = Link("track_no", "gf:onTrack", "tracks", "track_no")
-_ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments", "segment_no")
-_OF_TRACK: dict[str, Any] = {"links": (_ON_TRACK,), "belongs": ()}
+_ON_TRACK = Link("track_no", "gf:onTrack", "tracks")
+_ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments")
 
+#: By layer what differs from the default.
 _MAPS: dict[str, dict[str, Any]] = {
     "field": {
         "cls": "gf:Survey", "path": "", "product": "field", "in_plan": False,
@@ -86,37 +85,28 @@ _MAPS: dict[str, dict[str, Any]] = {
         "also": ("prov:Entity",),
     },
     "obstacles": {
-        "cls": "gf:Obstacle", "path": "obstacle/{obstacle_no}", "product": "obstacles",
-        "in_plan": False, "label": "Obstacle {obstacle_no}",
+        "product": "obstacles", "in_plan": False, "label": "Obstacle {obstacle_no}",
         "belongs": (_IN_FIELD, ("gf:inSurvey", "survey"), _OF_PICTURE),
         "also": ("sosa:FeatureOfInterest",),
     },
     "tracks": {
-        "cls": "gf:Track", "path": "track/{track_no}", "label": "Track {track_no}",
+        "label": "Track {track_no}",
         "belongs": (_IN_FIELD, ("prov:wasDerivedFrom", "survey"), ("gf:inPlan", "plan")),
     },
-    "segments": {"cls": "gf:Segment", "path": "track/{track_no}/segment/{segment_no}", **_OF_TRACK},
+    "segments": {"links": (_ON_TRACK,), "belongs": ()},
     "gaps": {
-        "cls": "gf:Gap", "path": "track/{track_no}/gap/{gap_no}", **_OF_TRACK,
-        "terms": {"obstacle_no": "gf:causingObstacleNo"},
+        "links": (_ON_TRACK,), "belongs": (), "terms": {"obstacle_no": "gf:causingObstacleNo"},
     },
-    "track_points": {
-        "cls": "gf:TrackPoint", "path": "point/{point_no}", "belongs": (),
-        "links": (_ON_TRACK, _ON_SEGMENT),
-    },
-    "headland": {"cls": "gf:Headland", "path": "headland/{headland_no}"},
-    "headland_tracks": {
-        "cls": "gf:HeadlandTrack", "path": "headland-track/{pass_no}/segment/{segment_no}",
-    },
+    "track_points": {"links": (_ON_TRACK, _ON_SEGMENT), "belongs": ()},
+    "headland_tracks": {"path": "headland-track/{pass_no}/segment/{segment_no}"},
     "route": {
         "cls": "gf:RouteStep", "path": "route/{sequence}", "links": (_ON_TRACK, _ON_SEGMENT),
         "terms": {"kind": "gf:stepKind", "direction": "gf:drivingDirection"},
     },
     "turns": {
-        "cls": "gf:Turn", "path": "turn/{turn_no}",
         "links": (
-            Link("from_track", "gf:fromTrack", "tracks", "track_no"),
-            Link("to_track", "gf:toTrack", "tracks", "track_no"),
+            Link("from_track", "gf:fromTrack", "tracks"),
+            Link("to_track", "gf:toTrack", "tracks"),
         ),
         "terms": {
             "kind": "gf:turnKind", "direction": "gf:turnDirection",
@@ -128,10 +118,12 @@ _MAPS: dict[str, dict[str, Any]] = {
 
 @cache
 def layer_map(name: str) -> LayerMap:
-    """How a layer becomes RDF: its entry, or the default for its schema."""
-    layer, single = schema.layer(name), name.removesuffix("s")
-    path = "/".join([single.replace("_", "-"), *(f"{{{key}}}" for key in layer.key)])
-    return LayerMap(layer, **_MAPS.get(name, {"cls": value_iri(single), "path": path}))
+    """How a layer becomes RDF: a class of its own name, its key numbers in the rows' names."""
+    layer = schema.layer(name)
+    path = "/".join(f"{key.removesuffix('_no')}/{{{key}}}" for key in layer.key)
+    return LayerMap(
+        layer, **{"cls": value_iri(name.removesuffix("s")), "path": path, **_MAPS.get(name, {})}
+    )
 
 
 def layer_maps() -> list[LayerMap]:

@@ -64,7 +64,10 @@ class Names:
         base = check_base(base)
         provenance, grid = dataset.provenance, dataset.grid
         source = provenance.source
-        picture = [asdict(source), None if grid is None else _grid(grid)]
+        picture: list[Any] = [asdict(source), None]
+        if grid is not None:
+            transform = list(map(float, grid.transform[:6]))
+            picture[1] = [grid.width_px, grid.height_px, transform, grid.crs.to_wkt()]
         field = f"{base}field/{_field_part(dataset)}"
         table = dataset.table(schema.FIELD.name)
         if dataset.has(schema.TRACKS.name):
@@ -129,10 +132,6 @@ def _table_bytes(table: gpd.GeoDataFrame) -> bytes:
     }
     text = json.dumps(columns, default=str).encode()
     return text + b"".join(shapely.to_wkb(table.geometry.to_numpy(), byte_order=1))
-
-
-def _grid(grid: Any) -> list[Any]:
-    return [grid.width_px, grid.height_px, list(map(float, grid.transform[:6])), grid.crs.to_wkt()]
 
 
 def _field_part(dataset: Dataset) -> str:

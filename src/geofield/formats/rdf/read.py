@@ -34,7 +34,7 @@ from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_p
 from geofield.formats.rdf.parse import SYNTAXES, parse
 from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
-from geofield.formats.rdf.study import STUDY_OBSTACLE_TERMS, STUDY_POINT_TERMS
+from geofield.formats.rdf.study import STUDY_TERMS
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import circle_polygons
 
@@ -42,11 +42,8 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
 _DEFAULT = "geo:hasDefaultGeometry"
-#: A further type by which rows of a layer are known, and further names of their columns.
-_STUDY = {
-    "obstacles": (STUDY_TREE + "tree", STUDY_OBSTACLE_TERMS),
-    "track_points": (GML + "point", STUDY_POINT_TERMS),
-}
+#: A further class by which rows of a layer are known.
+_STUDY_CLASSES = {"obstacles": [STUDY_TREE + "tree"], "track_points": [GML + "point"]}
 
 
 def read(path: Path, *, plan: str | None = None) -> Dataset:
@@ -94,7 +91,7 @@ def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = N
     grid = read_grid(graph, scope)
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in layer_maps():
-        further = _STUDY.get(layer.layer.name, ())[:1]
+        further = _STUDY_CLASSES.get(layer.layer.name, ())
         subjects = scope.rows(graph, layer, graph.of_type(*classes(layer), *further))
         if subjects or not layer.layer.optional:
             pixel_m = None if grid is None else grid.ground_resolution_m
@@ -168,24 +165,25 @@ class _Rows:
         if not self.subjects:
             return schema.empty(of, crs)
         data: dict[str, Any] = {}
-        study = _STUDY.get(of.name, ("", {}))[1]
+        study = STUDY_TERMS.get(of.name, {})
         for column, name in self.layer.properties():
-            names = [name, *study.get(column.name, ())[:1]]
+            names = [name, study.get(column.name)]
             data[column.name] = self.typed(column, self.told(self.subjects, names))
         for link in self.layer.links:
-            target = layer_map(link.target).properties()
-            names = [name for column, name in target if column.name == link.target_key]
-            names += study.get(link.column, ())[:1]
-            texts = self.linked(link.predicate, names)
-            data[link.column] = self.typed(of.column(link.column), texts)
+            target = layer_map(link.target)
+            numbers = {column.name: name for column, name in target.properties()}
+            names = [numbers[target.layer.key[-1]], study.get(link.column)]
+            data[link.column] = self.typed(
+                of.column(link.column), self.linked(link.predicate, names)
+            )
         geometry = self.promoted(self.geometry(data, crs, pixel_m))
         return schema.conform(of, schema.table(of, data, geometry, crs))
 
-    def told(self, subjects: Sequence[str | None], names: Iterable[str]) -> list[str | None]:
+    def told(self, subjects: Sequence[str | None], names: Iterable[str | None]) -> list[str | None]:
         """Of each subject the first value of any of some properties."""
         found: list[str | None] = [None] * len(subjects)
         survey, plan = self.scope.survey, self.scope.plan
-        for name in names:
+        for name in filter(None, names):
             column = self.graph.column(name)
             if not column:
                 continue
@@ -196,7 +194,7 @@ class _Rows:
                 found = [next((column[iri] for iri in others if iri in column), None)]
         return found
 
-    def linked(self, predicate: str, names: list[str]) -> list[str | None]:
+    def linked(self, predicate: str, names: list[str | None]) -> list[str | None]:
         """The number of the thing a link points to, or the number told directly."""
         link = self.graph.column(predicate)
         targets: list[str | None] = list(map(link.get, self.subjects))

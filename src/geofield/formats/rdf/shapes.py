@@ -8,7 +8,8 @@ tests hold the findings against pySHACL's.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -34,7 +35,8 @@ _LEXICAL = {
     XSD + "boolean": r"true|false|1|0",
     XSD + "date": r"-?\d{4,}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])(Z|[+-]\d\d:\d\d)?",
 }
-_NUMBERS = tuple(XSD + name for name in ("double", "integer", "int", "decimal", "float"))
+_LEXICAL |= dict.fromkeys((XSD + "decimal", XSD + "float"), _LEXICAL[XSD + "double"])
+_NUMBERS = [XSD + name for name in ("double", "integer", "int", "decimal", "float")]
 
 
 def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
@@ -53,8 +55,8 @@ def _nodes(quads: Iterable[ox.Quad]) -> dict[Any, Node]:
     """What is said of each subject, by predicate."""
     nodes: dict[Any, Node] = {}
     # A graph is a set: what a file says a thousand times counts once.
-    for quad in dict.fromkeys(quads):
-        nodes.setdefault(quad.subject, {}).setdefault(quad.predicate.value, []).append(quad.object)
+    for subject, predicate, value, _ in dict.fromkeys(quads):
+        nodes.setdefault(subject, {}).setdefault(predicate.value, []).append(value)
     return nodes
 
 
@@ -62,9 +64,8 @@ def _with_parents(types: Iterable[Any], nodes: dict[Any, Node]) -> list[str]:
     """Classes, and those above them where the file has classes of its own."""
     found = list(types)
     for each in found:
-        found += [
-            p for p in nodes.get(each, {}).get(expand("rdfs:subClassOf"), ()) if p not in found
-        ]
+        above = nodes.get(each, {}).get(expand("rdfs:subClassOf"), ())
+        found += [parent for parent in above if parent not in found]
     return [each.value for each in found if isinstance(each, ox.NamedNode)]
 
 
@@ -89,16 +90,14 @@ def _rules_of(types: tuple[str, ...]) -> list[tuple[PropertyPath, list[Rule]]]:
 def _rules() -> dict[str, list[tuple[PropertyPath, Rule]]]:
     """Path and rule of everything that is asked, by the class it is for."""
     graph = _nodes(ox.parse(resource(SHAPES), ox.RdfFormat.TURTLE))
-    rules: dict[str, list[tuple[PropertyPath, Rule]]] = {}
-    for node in graph.values():
-        compiled = [
-            r for prop in node.get(SH + "property", ()) for r in _compiled(graph, graph[prop])
-        ]
-        for kind in node.get(SH + "nodeKind", ()) if SH + "targetClass" in node else ():
-            words = "Name it, or it cannot be merged with other data."
-            compiled.append(((), (words, "nodeKind", _test(graph, "nodeKind", kind, node))))
-        for cls in node.get(SH + "targetClass", ()):
-            rules.setdefault(cls.value, []).extend(compiled)
+    rules: defaultdict[str, list[tuple[PropertyPath, Rule]]] = defaultdict(list)
+    words = "Name it, or it cannot be merged with other data."
+    is_named: tuple[PropertyPath, Rule] = ((), (words, "nodeKind", _each(_is_iri)))
+    for shape in graph.values():
+        for cls in shape.get(SH + "targetClass", ()):
+            for prop in shape[SH + "property"]:
+                rules[cls.value].extend(_compiled(graph, graph[prop]))
+            rules[cls.value] += [is_named] * (SH + "nodeKind" in shape)
     return rules
 
 
@@ -130,14 +129,16 @@ def _test(graph: dict[Any, Node], name: str, value: Any, shape: Node) -> Test:
         return lambda values: [] if value in values else [None]
     if name == "or":
         kinds = [graph[each][SH + "datatype"][0].value for each in _items(graph, value)]
-        return _each(lambda term: any(_is_of(term, kind) for kind in kinds))
+        return _each(lambda term: _is_of(term, kinds))
     if name == "nodeKind":
-        return _each(lambda term: isinstance(term, ox.NamedNode))
+        return _each(_is_iri)
     if name == "datatype":
-        return _each(lambda term: _is_of(term, value.value))
+        return _each(lambda term: _is_of(term, (value.value,)))
     if name in ("minInclusive", "maxInclusive"):
         sign, bound = (1.0 if name == "minInclusive" else -1.0), float(value.value)
-        return _each(lambda term: _is_number(term) and sign * float(term.value) >= sign * bound)
+        return _each(
+            lambda term: _is_of(term, _NUMBERS) and sign * float(term.value) >= sign * bound
+        )
     if name == "in":
         allowed = set(_items(graph, value))
         return _each(lambda term: term in allowed)
@@ -151,21 +152,14 @@ def _each(test: Callable[[Any], bool]) -> Test:
     return lambda values: [value for value in values if not test(value)]
 
 
-def _is_of(term: Any, datatype: str) -> bool:
-    lexical = _LEXICAL.get(datatype, "(?s:.*)")
-    return (
-        isinstance(term, ox.Literal)
-        and term.datatype.value == datatype
-        and re.fullmatch(lexical, term.value) is not None
-    )
+def _is_iri(term: Any) -> bool:
+    return isinstance(term, ox.NamedNode)
 
 
-def _is_number(term: Any) -> bool:
-    return (
-        isinstance(term, ox.Literal)
-        and term.datatype.value in _NUMBERS
-        and re.fullmatch(_LEXICAL[XSD + "double"], term.value) is not None
-    )
+def _is_of(term: Any, kinds: Sequence[str]) -> bool:
+    """Whether a term is a literal of one of some datatypes, and its text one."""
+    kind = term.datatype.value if isinstance(term, ox.Literal) else ""
+    return kind in kinds and re.fullmatch(_LEXICAL.get(kind, "(?s:.*)"), term.value) is not None
 
 
 def _problem(subject: Any, path: PropertyPath, name: str, value: Any, rule: str) -> Problem:
@@ -193,6 +187,6 @@ def _problem(subject: Any, path: PropertyPath, name: str, value: Any, rule: str)
 def _typed(value: Any) -> str:
     if not isinstance(value, ox.Literal):
         return f"the thing {value}"
-    kind = compact(value.datatype.value)
-    is_one = value.datatype.value not in _LEXICAL or _is_of(value, value.datatype.value)
-    return f"{value.value[:80]!r}, " + (f"typed {kind}" if is_one else f"which is no {kind}")
+    kind = value.datatype.value
+    words = "typed" if _is_of(value, (kind,)) else "which is no"
+    return f"{value.value[:80]!r}, {words} {compact(kind)}"

@@ -23,7 +23,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
-from geofield.formats.rdf.features import POINT_DECIMALS, row_iris
+from geofield.formats.rdf.features import POINT_DECIMALS, column_terms, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map
 from geofield.formats.rdf.namespaces import (
     DCMI_IMAGE,
@@ -38,22 +38,23 @@ from geofield.formats.rdf.namespaces import (
 )
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
-#: The study's property and datatype for columns of its two tables.
-STUDY_OBSTACLE_TERMS: dict[str, tuple[str, str]] = {
-    "obstacle_no": (STUDY_OBSTACLE + "no", "xsd:int"),
-    "lat": (expand("wgs84:lat"), "xsd:double"),
-    "lon": (expand("wgs84:long"), "xsd:double"),
-    "x_px": (SVG_CIRCLE + "cx", "xsd:double"),
-    "y_px": (SVG_CIRCLE + "cy", "xsd:double"),
-    "radius_px": (SVG_CIRCLE + "r", "xsd:double"),
-}
-STUDY_POINT_TERMS: dict[str, tuple[str, str]] = {
-    "point_no": (STUDY_POINT + "no", "xsd:int"),
-    "track_no": (STUDY_POINT + "track", "xsd:int"),
-    "lat": (GML + "lat", "xsd:double"),
-    "lon": (GML + "long", "xsd:double"),
-    "x_px": (SVG_CIRCLE + "cx", "xsd:double"),
-    "y_px": (SVG_CIRCLE + "cy", "xsd:double"),
+_PIXEL = {"x_px": SVG_CIRCLE + "cx", "y_px": SVG_CIRCLE + "cy"}
+#: By layer the study's property of columns.
+STUDY_TERMS: dict[str, dict[str, str]] = {
+    "obstacles": {
+        "obstacle_no": STUDY_OBSTACLE + "no",
+        "lat": expand("wgs84:lat"),
+        "lon": expand("wgs84:long"),
+        **_PIXEL,
+        "radius_px": SVG_CIRCLE + "r",
+    },
+    "track_points": {
+        "point_no": STUDY_POINT + "no",
+        "track_no": STUDY_POINT + "track",
+        "lat": GML + "lat",
+        "lon": GML + "long",
+        **_PIXEL,
+    },
 }
 
 
@@ -100,7 +101,7 @@ class StudyDescription(Description):
         columns = super().columns(layer, frame)
         if layer.layer.name != schema.OBSTACLES.name:
             return columns
-        study = _study_columns(frame, STUDY_OBSTACLE_TERMS)
+        study = _study_columns(layer.layer, frame)
         taken = {predicate for predicate, _ in study}
         image: Column = (node("dc:type"), node(DCMI_IMAGE))
         return [image, *study, *(each for each in columns if each[0] not in taken)]
@@ -117,7 +118,7 @@ class StudyDescription(Description):
         places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
         columns: list[Column] = [
             (node("rdf:type"), node(GML + "point")),
-            *_study_columns(rounded, STUDY_POINT_TERMS),
+            *_study_columns(schema.TRACK_POINTS, rounded),
             (node(GML + "pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
             (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
@@ -130,10 +131,10 @@ def _members(root: str, members: Texts) -> Group:
     return (Nodes(Texts([root]), [(node("rdfs:member"), [tuple(terms(members, 0))])]),)
 
 
-def _study_columns(frame: Any, terms: dict[str, tuple[str, str]]) -> list[Column]:
+def _study_columns(layer: schema.Layer, frame: Any) -> list[Column]:
     result: list[Column] = []
-    for column, (predicate, datatype) in terms.items():
-        values = frame[column].astype(object).where(frame[column].notna(), None).tolist()
-        texts = [None if value is None else repr(value) for value in values]
-        result.append((node(predicate), Texts(texts, datatype)))
+    for name, predicate in STUDY_TERMS[layer.name].items():
+        values: Any = column_terms(layer.name, layer.column(name), predicate, frame[name])
+        is_int = layer.column(name).type == "int"
+        result.append((node(predicate), Texts(values, "xsd:int" if is_int else "xsd:double")))
     return result

@@ -9,7 +9,6 @@ when asked.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,14 +42,9 @@ def write_rdfxml(
 
     A stem other than ``field`` stands before the names: ``north_obstacles.rdf``.
     """
-    told = _described(fields, options)
     before = "" if stem == "field" else f"{stem}_"
-    paths = [folder / f"{before}{product}.rdf" for product in PRODUCTS]
-    for path, product in zip(paths, PRODUCTS, strict=True):
-        groups = chain.from_iterable(each.product(product) for each in told)
-        with path.open("wb") as file:
-            write_repeated(groups, file, ox.RdfFormat.RDF_XML, _profile(options)[2])
-    return paths
+    told = {folder / f"{before}{product}.rdf": (product,) for product in PRODUCTS}
+    return _written(fields, told, ox.RdfFormat.RDF_XML, options)
 
 
 def write_study(
@@ -64,11 +58,7 @@ def _one_file(suffix: str, syntax: ox.RdfFormat) -> Callable[..., list[Path]]:
     def write(
         fields: Fields, folder: Path, *, stem: str = "field", options: Mapping[str, Any]
     ) -> list[Path]:
-        path = folder / f"{stem}{suffix}"
-        groups = chain.from_iterable(each.everything() for each in _described(fields, options))
-        with path.open("wb") as file:
-            write_repeated(groups, file, syntax, _profile(options)[2])
-        return [path]
+        return _written(fields, {folder / f"{stem}{suffix}": PRODUCTS}, syntax, options)
 
     return write
 
@@ -109,9 +99,20 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     return kind(dataset, names, wanted)
 
 
-def _described(fields: Fields, options: Mapping[str, Any]) -> list[Description]:
+def _written(
+    fields: Fields,
+    told: Mapping[Path, Sequence[str]],
+    syntax: ox.RdfFormat,
+    options: Mapping[str, Any],
+) -> list[Path]:
+    """Files, each with some products of all fields."""
     each_field = [fields] if isinstance(fields, Dataset) else fields
-    return [describe(each, options) for each in each_field]
+    described = [describe(each, options) for each in each_field]
+    for path, products in told.items():
+        groups = (group for each in described for name in products for group in each.product(name))
+        with path.open("wb") as file:
+            write_repeated(groups, file, syntax, _profile(options)[2])
+    return list(told)
 
 
 def _profile(options: Mapping[str, Any]) -> tuple[type[Description], bool, dict[str, str]]:
