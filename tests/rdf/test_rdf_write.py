@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import pyoxigraph as ox
@@ -13,6 +14,7 @@ from rdflib.compare import isomorphic
 from geofield.errors import FormatError
 from geofield.formats.rdf import write
 from geofield.formats.rdf.names import Names
+from geofield.formats.rdf.namespaces import node
 
 WRITERS = {
     "xml": write.write_rdfxml,
@@ -97,3 +99,24 @@ def test_any_field_id_becomes_a_valid_iri(tmp_path, name):
     assert all(graph == graphs[0] for graph in graphs)
     texts = {t.object.value for t in graphs[0] if t.predicate.value.endswith("terms/identifier")}
     assert texts == {name}
+
+
+@pytest.mark.parametrize(
+    ("licence", "document"),
+    [
+        ("CC0", "https://creativecommons.org/publicdomain/zero/1.0/"),
+        ("CC0 1.0", "https://creativecommons.org/publicdomain/zero/1.0/"),
+        ("dl-de by 2.0", "https://www.govdata.de/dl-de/by-2-0"),
+        ("https://a.example/terms", "https://a.example/terms"),
+        ("all rights reserved", None),
+    ],
+)
+def test_a_licence_that_the_ontology_knows_is_told_by_its_document(tmp_path, licence, document):
+    plan = small_plan(spacing_m=30.0)
+    source = dataclasses.replace(plan.provenance.source, licence=licence)
+    origin = dataclasses.replace(plan.provenance, source=source)
+    (path,) = write.write_ntriples(
+        dataclasses.replace(plan, provenance=origin), tmp_path, options={}
+    )
+    told = {q.object.value for q in ox.parse(path=path) if q.predicate == node("dcterms:license")}
+    assert told == ({document} if document else set())
