@@ -249,6 +249,29 @@ def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> N
     assert page.state()["tracks"] == before["tracks"]
 
 
+def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(
+    page: Page, plan_path: Path
+) -> None:
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    box.clear()
+    box.send_keys("6,5")
+    page.run("document.activeElement.blur()")
+    page.press("j", "r")
+    page.wait(lambda: page.judged() == 1)
+    assert (box.get_attribute("value"), page.state()["settings"]["spacing_m"]) == ("6,5", 4)
+    page.button("save")
+    page.wait(lambda: "Saved" in page.text("message"))
+    saved = read_plan(plan_path).settings
+    assert saved is not None
+    assert (saved.tracks.spacing_m, box.get_attribute("value")) == (6.5, "6.5")
+    # What cannot be is not passed over: nothing is saved then.
+    box.clear()
+    box.send_keys("six")
+    page.button("save")
+    page.wait(lambda: "spacing_m: input should be a valid number" in page.text("message"))
+    assert page.state()["can_redo"] is page.state()["edited"] is False
+
+
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
     before = page.obstacle(8)
     page.run("document.querySelector('#list [data-no=\"8\"]').click()")
@@ -577,6 +600,17 @@ def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(
         page.run("document.querySelector('#list [data-no=\"16\"]').click()")
         page.press("u")
         page.wait(lambda: page.obstacle(16)["status"] == "possible")
+        page.press("a")  # what was drawn stays drawn
+        page.run("document.querySelector('#map').focus()")
+        page.press(Keys.ENTER, "c")
+        page.wait(lambda: page.obstacle(22)["status"] == "confirmed")
+        page.run("document.querySelector('#list [data-no=\"22\"]').click()")
+        page.press("u")
+        page.wait(lambda: page.obstacle(22)["status"] == "added")
+        page.press(Keys.DELETE)
+        page.wait(lambda: len(page.state()["obstacles"]) == 21)
+        for _ in range(4):
+            page.chord(Keys.CONTROL, "z")
         page.chord(Keys.CONTROL, "z")
         page.chord(Keys.CONTROL, "z")
         page.wait(lambda: not page.state()["can_undo"])

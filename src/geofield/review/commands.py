@@ -22,6 +22,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
 from geofield.settings import Settings, TrackSettings
+from geofield.settings.explain import explained
 from geofield.settings.tracks import said_over
 
 if TYPE_CHECKING:
@@ -152,9 +153,7 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
     try:
         tracks = TrackSettings(**said_over(settings.tracks.model_dump(), given))
     except ValidationError as error:
-        problem = error.errors()[0]
-        name = ".".join(str(part) for part in problem["loc"])
-        raise SettingsError(f"{name}: {problem['msg']}.") from None
+        raise SettingsError(explained(error)) from None
     # Known as a person's word in every later run.
     before, names = settings.tracks, set(plan.evidence.said_tracks)
     names |= {name for name, value in tracks if value != getattr(before, name)}

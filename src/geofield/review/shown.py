@@ -36,9 +36,14 @@ def tracks_of(plan: Plan, notes: tuple[str, ...] = ()) -> dict[str, Any]:
     return tracks_view(plan.tracks, plan.field.area_ha, notes)
 
 
-def _detected_from(plan: Plan) -> float:
-    """The confidence from which what was found is driven around without a person's word."""
+def _detected_from(plan: Plan) -> float | None:
+    """The confidence from which what was found is driven around without a person's word.
+
+    None where nothing was searched.
+    """
     found = plan.evidence.detection
+    if not found:
+        return None
     # The study's own methods know nothing merely possible; their thresholds are of other things.
     return float(found["threshold"]) if "possible_from" in found else 0.0
 

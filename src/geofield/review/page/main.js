@@ -88,13 +88,14 @@ function show(answer) {
   maps.showHandle(chosen === null ? null : row(chosen));
   showList();
   showField();
-  for (const [name, value] of Object.entries(state.settings)) {
-    const input = $("settings").elements[name];
-    if (input && document.activeElement !== input) input.value = value;
+  for (const input of inputs()) {
+    const value = String(state.settings[input.name]);
+    // What is typed and was not applied yet stays beside other edits.
+    if (input.dataset.shown !== value) input.value = input.dataset.shown = value;
   }
   $("undo").disabled = !state.can_undo;
   $("redo").disabled = !state.can_redo;
-  $("save").disabled = !state.edited;
+  $("save").disabled = !unsaved();
   $("title").textContent = state.name + (state.edited ? ` · ${t("unsaved")}` : "");
   if (state.unnoted && state.edited) say(t("unnoted", {why: state.unnoted}), true);
   document.title = `${state.edited ? "* " : ""}${state.name} – geofield`;
@@ -221,7 +222,9 @@ async function verdict(status) {
 function takeBack() {
   const each = row(chosen);
   if (!each || waits(each) || each.status === "added") return;
-  return verdict(each.confidence !== null && each.confidence < state.detected_from ? "possible" : "detected");
+  // Where confidences are told, what has none was drawn.
+  if (each.confidence === null) return verdict(state.detected_from === 0 ? "detected" : "added");
+  return verdict(each.confidence < state.detected_from ? "possible" : "detected");
 }
 
 const ifChosen = work => inTurn(() => chosen !== null && work(chosen));
@@ -233,7 +236,30 @@ function resize(factor) {
     return make({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
 }
 
-const save = name => inTurn(() => act(() => api.save(name), answer => {
+const inputs = () => [...$("settings").elements].filter(input => input.name);
+
+// Settings as they are typed where they are others; 6,5 is what a comma on the keyboard says.
+function typed() {
+  const given = {};
+  for (const {name, value} of inputs()) {
+    const text = value.trim().replace(/^([-+]?\d+),(\d+)$/, "$1.$2"), before = state.settings[name];
+    const meant = typeof before === "number" && text && Number.isFinite(Number(text)) ? Number(text) : text;
+    if (String(meant) !== String(before)) given[name] = meant;
+  }
+  return given;
+}
+
+const unsaved = () => state.edited || Object.keys(typed()).length > 0;
+
+async function apply() {
+  const settings = typed();
+  return !Object.keys(settings).length || make({do: "tracks", settings});
+}
+
+// What is typed goes along, or nothing is done: the form says what counts.
+const applied = work => inTurn(async () => await apply() && work());
+
+const save = name => applied(() => act(() => api.save(name), answer => {
   show(answer);
   say(t("saved", {name: answer.saved_as}));
 }));
@@ -249,7 +275,7 @@ const ACTIONS = {
 };
 
 // Edits stay with their plan on the server: nothing is lost by going to another one.
-const goTo = plan => plan !== state.plan && inTurn(() => act(() => api.openPlan(plan), again));
+const goTo = plan => plan !== state.plan && applied(() => act(() => api.openPlan(plan), again));
 
 // -- beginning ---------------------------------------------------------------------------
 
@@ -300,31 +326,26 @@ async function start() {
   $("opacity").oninput = ({target}) => maps.setOpacity(Number(target.value));
   $("contrast").oninput = ({target}) => maps.setContrast(Number(target.value));
   $("language").onchange = ({target}) => { setLanguage(target.value); words(); show({}); };
+  $("settings").oninput = () => { $("save").disabled = !unsaved(); };
   $("settings").onsubmit = event => {
     event.preventDefault();
-    const given = {};
-    for (const input of event.target.elements) {
-      if (!input.name) continue;
-      const value = input.type === "number" ? Number(input.value) : input.value;
-      if (String(value) !== String(state.settings[input.name])) given[input.name] = value;
-    }
-    if (Object.keys(given).length) commit({do: "tracks", settings: given});
+    inTurn(apply);
   };
-  $("export").onclick = () => act(() => api.exportAs($("export-format").value),
-    answer => say(t("exported", {files: answer.files.join(", ")})));
+  $("export").onclick = () => applied(() => act(() => api.exportAs($("export-format").value),
+    answer => say(t("exported", {files: answer.files.join(", ")}))));
   $("save-as").onclick = async () => {
     const name = $("save-name").value.trim();
     if (!name) $("save-name").focus();
     else if (await save(name)) $("menu").close();
   };
   for (const dialog of document.querySelectorAll("dialog")) dialog.onclose = () => document.body.append($("message"));
-  $("reload").onclick = () => inTurn(() => act(() => api.reload(), again));
-  $("stop").onclick = () => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); });
+  $("reload").onclick = () => applied(() => act(() => api.reload(), again));
+  $("stop").onclick = () => applied(() => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); }));
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
     $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
   });
-  window.addEventListener("beforeunload", event => { if ((state.edited || undone) && !ended) event.preventDefault(); });
+  window.addEventListener("beforeunload", event => { if ((unsaved() || undone) && !ended) event.preventDefault(); });
   if (!state.yours) say(t("second"), true, {text: t("take"), act: takeOver});
   else if (state.brought_back) say(told(state.brought_back));
   document.body.dataset.ready = "yes";
