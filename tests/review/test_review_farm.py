@@ -58,6 +58,8 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     assert sorted(shown, key=lambda one: sure[one]) == shown
     desk = shelf.desk
     assert desk.picture is not None  # it lies beside the farm
+    assert desk.export("kml")["files"] == [f"export/{desk.path.stem}/{desk.path.stem}.kml"]
+    assert [path.name for path in (farm / "export").iterdir()] == [desk.path.stem]
     number = int(desk.session.plan.obstacles["obstacle_no"].iloc[0])  # type: ignore[index]
     desk.edit({"do": "status", "no": number, "status": "rejected"})
     assert "rejected" not in statuses(farm, shown[0])
@@ -79,6 +81,23 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     assert again.end() == []
     shelf.desk_of(0).end()
     assert not (farm / "reviewing").exists()
+
+
+def test_a_folder_of_pictures_is_shown_and_a_lost_one_told(farm: Path) -> None:
+    picture = farm.parent / "field_1.tif"
+    one = Shelf(farm).desk.picture
+    assert one is not None
+    first = one.tile(0, 0, 0, "colour")
+    whole = picture.rename(farm.parent / "a.tif")
+    picture.mkdir()
+    whole.rename(picture / "a.tif")
+    desk = Shelf(farm).desk
+    assert desk.picture is not None
+    assert desk.picture.tile(0, 0, 0, "colour") == first
+    (picture / "a.tif").write_bytes(b"II*")
+    assert "The picture is not shown: " in str(Shelf(farm).desk.brought_back)
+    shutil.rmtree(picture)
+    assert "The picture of this plan is not beside it" in str(Shelf(farm).desk.brought_back)
 
 
 def test_a_field_that_was_put_back_by_somebody_else_is_not_replaced(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -458,3 +459,25 @@ def test_edits_are_saved_elsewhere_while_another_program_holds_the_file(plan_pat
     mine = plan_path.with_name("mine.gpkg")
     assert row(read_plan(mine), 3)["status"] == "rejected"
     assert read_dataset(mine).scene_path == plan_path.with_name("scene.tif")
+
+
+def test_exports_show_the_picture_and_do_not_replace_those_of_another_plan(
+    plan_path: Path, tmp_path: Path
+) -> None:
+    (folder := tmp_path / "several").mkdir()
+    for name in ("scene.tif", "field.gpkg", "other.gpkg"):
+        source = plan_path.with_name(name) if name != "other.gpkg" else plan_path
+        shutil.copy(source, folder / name)
+    shelf = Shelf(folder)
+    assert "gpkg" not in [name for name, _ in shelf.desk.opening()["formats"]]
+    first = shelf.desk.export("shapefile")
+    assert first["files"] == ["export/field/shapefile"]
+    assert "cannot carry gaps" in first["notes"][0]
+    pages = []
+    for picture in (None, plan_path.with_name("scene.tif"), folder / "scene.tif"):
+        desk = Desk(folder / "other.gpkg", picture)
+        (page,) = desk.export("html")["files"]
+        pages.append((folder / page).read_text())
+        assert desk.export("shapefile")["files"] == ["export/other/shapefile"]
+    assert all("data:image/" in page for page in pages)
+    assert (folder / "export" / "field" / "shapefile" / "guidance.shp").exists()

@@ -10,7 +10,7 @@ import click
 
 from geofield.cli.console import say
 from geofield.cli.farm import say_waiting
-from geofield.cli.files import OLD_FILE, OLD_PATH
+from geofield.cli.files import OLD_PATH
 from geofield.cli.refresh import say_outdated
 from geofield.cli.stops import stop_heard
 
@@ -29,7 +29,11 @@ The page lists its keys when you press "?". Ctrl-C, or the page itself, ends the
 """
 )
 @click.argument("plan_file", metavar="PLAN", type=OLD_PATH)
-@click.option("--picture", type=OLD_FILE, help="Picture to show; the one beside PLAN by default.")
+@click.option(
+    "--picture",
+    type=OLD_PATH,
+    help="Picture to show, or a folder of some; that beside PLAN by default.",
+)
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),

@@ -27,6 +27,7 @@ from rasterio.warp import reproject, transform_bounds
 from geofield.errors import ImageryError
 from geofield.grid import Grid
 from geofield.imagery.gdal import to_rasterio
+from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import Scene
 
@@ -45,9 +46,14 @@ class TiledPicture:
     crs: CRS
 
     @classmethod
-    def open(cls, path: Path, crs: CRS) -> TiledPicture:
-        """Look at a picture without reading it."""
-        return cls(SceneReader.open(str(path)), crs)
+    def open(cls, path: Path, crs: CRS, point: tuple[float, float] | None = None) -> TiledPicture:
+        """Look at a picture without reading it.
+
+        Of a folder with pictures, or a list of some, those around the `point` (latitude and
+        longitude) count.
+        """
+        lat, lon = point or (None, None)
+        return cls(open_reader(str(path), lat=lat, lon=lon), crs)
 
     @cached_property
     def direct(self) -> bool:

@@ -7,14 +7,17 @@ in words why something was refused, and nothing has changed then.
 from __future__ import annotations
 
 import secrets
+import tempfile
 import threading
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 from geofield.crs import ground_scale_of
-from geofield.errors import ChangedError, FormatError, GeofieldError
+from geofield.errors import ChangedError, FormatError, GeofieldError, GeofieldWarning
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
 from geofield.plan import Plan, read_plan
@@ -30,27 +33,30 @@ from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
 from geofield.windows import scene_of_plan
 
+#: Formats that show the picture.
+_PICTURED = ("scene", "map", "map-svg", "map-pdf", "html")
+
 
 class Desk:
     """A plan, from a GeoPackage of geofield, on the desk.
 
-    Below it the picture is shown: the one that lies beside the plan when none is given.
+    Below it the `picture` is shown; where none is given that which was `found`, or lies beside the
+    plan. Of that it is told when it cannot be shown.
     """
 
-    def __init__(self, path: Path, picture: Path | None = None) -> None:
+    def __init__(
+        self, path: Path, picture: Path | None = None, *, found: Path | None = None
+    ) -> None:
         self.path = path
         self.lock = threading.RLock()
-        self._picture_path = picture or picture_beside(path)
+        self._picture_given = picture is not None
+        self._picture_path = picture or found or picture_beside(path)
         self._read()
 
     def _read(self) -> None:
         # What cannot be read is refused before the journal forgets what is not of this file.
         seen, plan = self._read_plan()
-        picture = (
-            None
-            if self._picture_path is None
-            else TiledPicture.open(self._picture_path, plan.field.crs)
-        )
+        picture, unshown = self._opened(plan)
         journal = Journal(self.path, plan)
         if journal.begins_at != self.path:
             plan = read_plan(journal.begins_at)
@@ -62,6 +68,7 @@ class Desk:
                 "Field, obstacles or tracks were edited after the tracks had been planned; the "
                 "tracks here are planned anew, with what you changed of them. Save them."
             )
+        self.brought_back = " ".join(filter(None, [self.brought_back, unshown])) or None
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.
         self.reading = secrets.token_hex(4)
@@ -70,6 +77,19 @@ class Desk:
         self._elsewhere: tuple[Step, str] | None = None
         #: Whether edits were neither saved nor noted when the session ended.
         self.lost = False
+
+    def _opened(self, plan: Plan) -> tuple[TiledPicture | None, str | None]:
+        """The picture, or why there is none of a plan that was made from one."""
+        path = self._picture_path
+        if path is None:
+            lost = "The picture of this plan is not beside it; --picture shows one."
+            return None, lost if plan.field.imagery else None
+        try:
+            return TiledPicture.open(path, plan.field.crs, plan.point), None
+        except GeofieldError as error:
+            if self._picture_given:
+                raise
+            return None, f"The picture is not shown: {error}"
 
     def _read_plan(self) -> tuple[str, Plan]:
         """The version of the file, and the plan in it.
@@ -104,7 +124,10 @@ class Desk:
                 "picture": self._picture_facts(),
                 "scale": 1.0 / float(ground_scale_of(plan.field.polygon, plan.field.crs)),
                 "theme": web_theme(),
-                "formats": [(one.name, one.title) for one in FORMATS.values()],
+                # Plans are saved under other names: in an export of one, edits would be replaced.
+                "formats": [
+                    (one.name, one.title) for one in FORMATS.values() if one.name != "gpkg"
+                ],
                 "directions": get_args(DirectionName),
             }
 
@@ -175,16 +198,35 @@ class Desk:
             return self.opening()
 
     def export(self, name: str) -> dict[str, Any]:
-        """Write the plan as edited in another format, into a folder beside it."""
+        """Write the plan as edited in another format, into a folder of its own beside it."""
         from geofield.formats import write_dataset
+        from geofield.imagery import write_scene
 
-        with self.lock:
+        folder = self._exports()
+        with (
+            self.lock,
+            tempfile.TemporaryDirectory(prefix="geofield-") as place,
+            warnings.catch_warnings(record=True) as caught,
+        ):
+            warnings.simplefilter("always", GeofieldWarning)
             dataset = self.session.plan.to_dataset()
-            folder = self.path.parent / "export"
+            if self._picture_path is not None and name in _PICTURED:
+                scene = picture_beside(self.path)
+                if scene != self._picture_path:
+                    cut = self._scene_of(self.session.plan)
+                    scene = write_scene(cut, Path(place) / "scene.tif")
+                dataset = replace(dataset, scene_path=scene)
             written = write_dataset(
                 dataset, folder, [name], stem=self.path.stem, overwrite=True, inputs=[self.path]
             )
-        return {"files": [str(path.relative_to(self.path.parent)) for path in written]}
+        told = [str(one.message) for one in caught if issubclass(one.category, GeofieldWarning)]
+        within = Path(*folder.parts[-2:])
+        made = dict.fromkeys(str(within / path.relative_to(folder).parts[0]) for path in written)
+        return {"files": list(made), "notes": told}
+
+    def _exports(self) -> Path:
+        """The folder of this plan's exports: those of several plans have the same names."""
+        return self.path.parent / "export" / self.path.stem
 
     def _scene_of(self, plan: Plan) -> Scene:
         """The picture around the field, as the plan's own run read it."""

@@ -35,19 +35,24 @@ _AT_ONCE = 1000
 class FarmDesk(Desk):
     """A field of a farm, by its id."""
 
-    def __init__(self, folder: Path, field_id: str, picture: Path | None) -> None:
+    def __init__(
+        self, folder: Path, field_id: str, picture: Path | None, found: Path | None
+    ) -> None:
         self._folder, self._field_id = folder, field_id
         self._put_back = False
         path = _file_of(folder, field_id)
         path.parent.mkdir(exist_ok=True)
         self._fetch(path)
-        super().__init__(path, picture)
+        super().__init__(path, picture, found=found)
 
     def _fetch(self, path: Path) -> None:
         """Have the field's plan as the farm has it, and keep a journal that belongs to it."""
         self._there = self._in_farm()
         if not (path.exists() and journal_path(path).exists() and read_plan(path) == self._there):
             save_plan(self._there, path, overwrite=True)
+
+    def _exports(self) -> Path:
+        return self._folder / "export" / self.path.stem
 
     def _in_farm(self) -> Plan:
         return read_farm(self._folder)[self._field_id]
@@ -130,9 +135,9 @@ def farm_desks(folder: Path, picture: Path | None) -> list[tuple[str, Callable[[
         _likely=found["certainty"].astype(float).fillna(1.0),
     )
     found = found.sort_values(["_begun", "reviewed", "_sure", "_likely"], kind="stable")
-    below = picture or _picture_of(folder)
+    below = _picture_of(folder)
     return [
-        (_title(row), partial(FarmDesk, folder, str(row.field_id), below))
+        (_title(row), partial(FarmDesk, folder, str(row.field_id), picture, below))
         for row in found.itertuples()
     ]
 
@@ -148,8 +153,8 @@ def _title(row: Any) -> str:
 
 
 def _picture_of(folder: Path) -> Path | None:
-    """The picture that the farm was planned on, beside it or in the current folder."""
+    """The pictures that the farm was planned on, beside it or in the current folder."""
     record = Record.read(Store.of(folder))
     name = str(((record and record.imagery) or {}).get("imagery", ""))
     places = (folder.parent / name, Path(name)) if name else ()
-    return next((place for place in places if place.is_file()), None)
+    return next((place for place in places if place.exists()), None)

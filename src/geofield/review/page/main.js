@@ -29,7 +29,7 @@ function say(text, bad = false, button = null) {
     node.append(" ", press);
   }
   clearTimeout(silence);
-  if (text && !button) silence = setTimeout(() => say(""), bad ? 9000 : 4000);
+  if (text && !button) silence = setTimeout(() => say(""), Math.max(bad ? 9000 : 4000, 60 * text.length));
 }
 
 // For those who hear the page: what is told in one moment is said together.
@@ -332,7 +332,7 @@ async function start() {
     inTurn(apply);
   };
   $("export").onclick = () => applied(() => act(() => api.exportAs($("export-format").value),
-    answer => say(t("exported", {files: answer.files.join(", ")}))));
+    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes].join(" "))));
   $("save-as").onclick = async () => {
     const name = $("save-name").value.trim();
     if (!name) $("save-name").focus();
