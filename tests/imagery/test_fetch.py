@@ -25,7 +25,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import box
 
-from geofield.errors import ImageryError, ImageryWarning, NetworkError, OutputExistsError
+from geofield.errors import (
+    ImageryError,
+    ImageryWarning,
+    NetworkError,
+    OutputExistsError,
+)
 from geofield.imagery import FetchOptions, Where, acquire, find_source, read_scene
 from geofield.imagery.cache import cache_infos, clear_cache
 from geofield.imagery.mosaic import Staging
@@ -384,15 +389,34 @@ def test_a_tile_half_transparent_is_masked(tmp_path: Path) -> None:
     with serving() as server:
         server.__class__ = Transparent
         where = replace(HERE, whole_tiles=True)
-        done = acquire(_named(server), where, tmp_path / "a.tif", options=FAST)
+        with pytest.warns(ImageryWarning, match=r"does not show 50 % of the picture"):
+            done = acquire(_named(server), where, tmp_path / "a.tif", options=FAST)
     scene = read_scene(done.path)
     assert not scene.valid[:, :128].any()
     assert scene.valid[:, 128:256].all()
 
 
+def test_a_source_with_nothing_to_show_is_told(tmp_path: Path) -> None:
+    """Servers answer with clear tiles, or with one and the same, where they have no picture."""
+
+    class Nothing(TileServer):
+        values = (0, 0, 0, 0)
+
+        def body(self, tile: tuple[int, int, int]) -> bytes:
+            return tile_server.encode(np.full((256, 256, 4), self.values, np.uint8))
+
+    with serving() as server:
+        server.__class__ = Nothing
+        with pytest.raises(ImageryError, match="all of the picture is transparent"):
+            acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)
+        Nothing.values = (204, 204, 204, 255)
+        with pytest.warns(ImageryWarning, match=r"(\d+) of \1 tiles .* are the same picture"):
+            acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)
+
+
 def test_tiles_of_another_size_are_refused(tmp_path: Path) -> None:
     with serving(size=512) as server:
-        with pytest.raises(ImageryError, match=r"512 x 512 px, not 256 x 256 px.*tile_px to 512"):
+        with pytest.raises(ImageryError, match=r"512 x 512 px, not 256 x 256 px.*tile_px = 512"):
             acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)
         source = replace(_named(server), tile_px=512)
         done = acquire(source, replace(HERE, zoom=17), tmp_path / "a.tif", options=FAST)

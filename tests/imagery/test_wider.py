@@ -125,7 +125,8 @@ def test_a_server_is_asked_for_more(
         monkeypatch.chdir(tmp_path)
         command = ("field", "county", *POINT, "--size-m", FIRST_M, "-o", tmp_path / "f.gpkg")
         if all_there:
-            told(*command)
+            with pytest.warns(ImageryWarning, match="it is transparent there"):
+                told(*command)
         else:
             with (
                 pytest.warns(ImageryWarning, match="could not be had"),

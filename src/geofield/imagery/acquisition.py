@@ -150,6 +150,7 @@ def acquire(
         masked = options.missing == "mask" or not (report.failed or isinstance(source, TileSource))
         if report.absent and (not masked or report.absent == report.wanted):
             raise absence_error(source, report, offline=options.offline)
+        _tell_nothing(source, block, staging.missing_px, report)
         provenance = _provenance(source, block, report)
         if progress is not None:
             progress(block.count, block.count, "writing")
@@ -233,6 +234,34 @@ def _fetcher(
         client = Client(options, rate_per_s=source.rate_per_s, secrets=source.secrets)
         stack.callback(client.close)
     return TileFetcher(source, client=client, cache=cache, threads=options.threads)
+
+
+def _tell_nothing(
+    source: TileSource | MBTilesSource, block: Block, missing_px: int, report: FetchReport
+) -> None:
+    """Tell of ground for which a source has an answer, but nothing to show."""
+    _, _, width, height = block.window
+    if missing_px == width * height:
+        raise ImageryError(
+            f"{source.name} shows nothing there: all of the picture is transparent.",
+            hint="Check the place, the layer and the zoom.",
+        )
+    if not isinstance(source, TileSource):
+        return  # a file of one's own shows what it shows
+    if missing_px and not report.absent:
+        warnings.warn(
+            f"{source.name} does not show {100 * missing_px / (width * height):.2g} % of the "
+            "picture: it is transparent there, and no-data.",
+            ImageryWarning,
+            stacklevel=3,
+        )
+    if report.alike:
+        warnings.warn(
+            f"{report.alike} of {report.wanted} tiles of {source.name} are the same picture: it "
+            "may have nothing there, or not at this zoom. Look at the picture first.",
+            ImageryWarning,
+            stacklevel=3,
+        )
 
 
 def _provenance(

@@ -16,6 +16,9 @@ from geofield.imagery.client import BrokenBodyError
 Pixels = tuple[NDArray[np.uint8], NDArray[np.bool_] | None]
 
 
+#: Side of the smallest tile that a source can have, pixels.
+_LEAST_PX = 64
+
 #: A small file that says it is a picture of gigabytes.
 _BOMBS = (Image.DecompressionBombWarning, Image.DecompressionBombError)
 
@@ -38,10 +41,14 @@ def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             image: Image.Image = Image.open(io.BytesIO(body))
             if image.size != size_px:
+                tile = image.width == image.height and image.width >= _LEAST_PX
                 raise WrongSizeError(
                     f"The source sends tiles of {image.width} x {image.height} px, not "
                     f"{size_px[0]} x {size_px[1]} px.",
-                    hint=f"Set its tile_px to {image.width}.",
+                    hint="Name it in the settings file, as [fetch.sources.NAME], with "
+                    f"tile_px = {image.width}."
+                    if tile
+                    else None,
                 )
             image.load()
     except UnidentifiedImageError:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import zlib
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -48,6 +49,8 @@ class FetchReport:
     reasons: Counter[str] = field(default_factory=Counter)
     #: Faults survived, by kind.
     troubles: Counter[str] = field(default_factory=Counter)
+    #: How often each picture came: many sources answer with one where they have nothing.
+    pictures: Counter[int] = field(default_factory=Counter)
     #: When the newest tile was fetched (UTC).
     newest: date | None = None
 
@@ -55,6 +58,11 @@ class FetchReport:
     def absent(self) -> int:
         """Tiles that are not in the product."""
         return self.missing + self.failed
+
+    @property
+    def alike(self) -> int:
+        """Tiles that are the same picture as another one."""
+        return sum(count for count in self.pictures.values() if count > 1)
 
 
 #: The result of a worker: pixels, and the bytes to keep where they are new.
@@ -135,6 +143,8 @@ class TileFetcher:
                 there: NDArray[np.bool_] | np.bool_ | None = np.False_
                 try:
                     (strip[part], there), body = future.result()
+                    if there is None or there.any():
+                        self.report.pictures[zlib.crc32(strip[part].tobytes())] += 1
                 except (NotThereError, GaveUpError, BrokenBodyError) as error:
                     self._absent(error)
                     strip[part], body = 0, None

@@ -35,6 +35,8 @@ class Staging:
         self.path = path
         self.block = block
         self.grid: Grid = block.grid
+        #: Pixels that no tile has.
+        self.missing_px = 0
         self._masked = False
 
     def fill(self, rows: Rows) -> None:
@@ -81,6 +83,8 @@ class Staging:
     def _mask(self, file: Any, window: Window, valid: NDArray[np.bool_] | None) -> None:
         if valid is not None and valid.all():
             valid = None
+        if valid is not None:
+            self.missing_px += valid.size - int(np.count_nonzero(valid))
         if valid is not None and not self._masked:
             self._masked = True
             width, top = self.grid.width_px, int(window.row_off)

@@ -108,13 +108,15 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
 
 def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
-    # The corner follows the authority's axis order when the CRS is named as a URN.
-    swapped = northing_first(crs) and "urn:" in text(element, "SupportedCRS")
+    # The corner follows the authority's axis order when the CRS is named as a URN or an address.
+    swapped = northing_first(crs) and not text(element, "SupportedCRS").startswith("EPSG:")
     rough: list[_Rough] = []
     for matrix in children(element, "TileMatrix"):
         resolution = float(text(matrix, "ScaleDenominator")) * _PIXEL_M / unit_m
         corner = [float(part) for part in text(matrix, "TopLeftCorner").split()]
-        left, top = reversed(corner) if swapped else corner
+        # Some write longitude first all the same: no latitude is beyond 90 degrees.
+        turned = swapped and not (crs.is_geographic and abs(corner[0]) > 90)
+        left, top = reversed(corner) if turned else corner
         columns, rows = int(text(matrix, "MatrixWidth")), int(text(matrix, "MatrixHeight"))
         tile_px = int(text(matrix, "TileWidth")), int(text(matrix, "TileHeight"))
         name = text(matrix, "Identifier")
