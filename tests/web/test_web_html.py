@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def test_places_across_180_degrees_go_on() -> None:
     assert np.ptp(table["lon"]) < 0.02  # a parabola through 179.9 and -179.9 leads nowhere
 
 
-def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path) -> None:
+def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path, tmp_path: Path) -> None:
     binary, program = shutil.which("chromium"), shutil.which("chromedriver")
     if not binary or not program:
         pytest.skip("Chromium and its driver are not installed")
@@ -70,6 +71,16 @@ def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path) -> None:
         assert f"{plan.field.area_ha:.2f} ha" in shown
         assert f"{len(plan.tracks.lines)} ·" in shown
         assert "Turn that does not fit" in shown
+        # What no track goes around is not counted among the obstacles.
+        assert plan.obstacles is not None
+        some = plan.obstacles.assign(status=["rejected"] * 5 + ["confirmed"] * 16)
+        driver.get(replace(plan, obstacles=some).explore().save(tmp_path / "a.html").as_uri())
+        WebDriverWait(driver, 20).until(
+            lambda d: d.execute_script("return document.body.dataset.ready")
+        )
+        shown = driver.execute_script("return document.querySelector('#facts').innerText")
+        assert re.search(r"Obstacles\s+16\s+rejected\s+5", shown)
+        driver.get((folder / "field.html").as_uri())
         size = {"width": 360, "height": 800, "deviceScaleFactor": 1, "mobile": True}
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         assert driver.execute_script("return document.documentElement.scrollWidth") == 360
@@ -95,8 +106,6 @@ def test_the_page_holds_the_plan_in_its_own_zone(folder: Path) -> None:
 
 
 def test_names_cannot_break_out(folder: Path, tmp_path: Path) -> None:
-    from dataclasses import replace
-
     plan = gf.read_plan(folder / "field.gpkg")
     evil = "</script><script>document.title='owned'</script><!--"
     page = replace(plan, field=replace(plan.field, name=evil)).explore()

@@ -72,7 +72,12 @@ const facts = [["area", `${number(plan.area_ha, 2)} ha`]];
 if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.length_m / 1000, 2)} km`], ["coverage", `${number(f.coverage_percent, 1)} %`],
   ["heading", heading(f.heading_deg)]);
 if (f.turns) facts.push(["turns", String(f.turns)]);
-if (plan.obstacles.length) facts.push(["obstacles", String(plan.obstacles.length)]);
+if (plan.obstacles.length) {
+  // Those that tracks go around; the others are no obstacles to a driver.
+  const idle = ["possible", "rejected"].map(status => [status, plan.obstacles.filter(row => row.status === status).length]);
+  const around = plan.obstacles.length - idle.reduce((sum, [, count]) => sum + count, 0);
+  facts.push(["obstacles", String(around)], ...idle.filter(([, count]) => count).map(([status, count]) => [status, String(count)]));
+}
 document.getElementById("facts").replaceChildren(...facts.flatMap(([name, text]) => [node("dt", t(name)), node("dd", text)]));
 const doubts = [...[...field.doubts, ...plan.doubts].map(told),
   ...(f.turns_that_do_not_fit ? [t("unfit", {n: f.turns_that_do_not_fit})] : [])];
