@@ -12,7 +12,7 @@ from PIL import Image
 from shapely import Point, box
 
 import geofield as gf
-from geofield.errors import CRSError, ObstacleError
+from geofield.errors import CRSError, ObstacleError, ObstacleWarning
 from geofield.evaluation import draw_matches, draw_reliability, match_points, reliability
 from geofield.evaluation.picture import FALSE, HIT
 
@@ -181,6 +181,24 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
     with Image.open(tmp_path / "hits.png") as picture:
         colours = {c for _, c in picture.getcolors(10_000)}
     assert {(40, 200, 90), (60, 150, 255), (235, 60, 50)} <= colours
+    # Neither a picture that is there is replaced unasked, nor ever the one that is drawn on.
+    for place, more in (("hits.png", []), ("scene.png", ["--overwrite"])):
+        (tmp_path / "scene.png").write_bytes(b"mine")
+        scene = ["--scene", str(tmp_path / "scene.png"), "--draw", str(tmp_path / place)]
+        with pytest.raises(SystemExit, match="1"):
+            main(["evaluate", *arguments, *scene, *more])
+        assert ("is there already" if not more else "is an input") in capsys.readouterr().err
+        assert (tmp_path / "scene.png").read_bytes() == b"mine"
+    with pytest.raises(SystemExit, match="0"):
+        main(["evaluate", *arguments, "--draw", str(tmp_path / "hits.png"), "--overwrite"])
+
+
+def test_a_truth_of_another_place_is_told():
+    found = table([(500_000, 4_000_000)])
+    turned = found.to_crs(4326).geometry.transform(lambda xy: xy[:, ::-1])
+    with pytest.warns(ObstacleWarning, match=r"The truth lies [\d,]+ km from the obstacles"):
+        result = gf.evaluate(found, gpd.GeoDataFrame(geometry=turned, crs=4326), bootstrap=0)
+    assert result.pooled.hits == 0
 
 
 @pytest.mark.parametrize("drawn", ["outside", "no shape", "nothing"])

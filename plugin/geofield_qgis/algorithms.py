@@ -405,7 +405,7 @@ class EvaluateAlgorithm(GeofieldAlgorithm):
         environment: dict[str, str] = {}
         picture = self.parameterAsString(values, "PICTURE", context)
         if picture:
-            words += ["--draw", picture]
+            words += ["--draw", picture, "--overwrite"]  # QGIS has asked
         scene = self.parameterAsRasterLayer(values, "SCENE", context)
         if scene is not None:
             picture, environment = sources.imagery(scene)

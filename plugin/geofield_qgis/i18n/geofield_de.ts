@@ -1724,6 +1724,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.json" />
+      <source>Replace an existing drawing.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Places</source>
       <translation>Orte</translation>

@@ -50,6 +50,7 @@ Examples (on the project's own sample):
     "--draw", "picture", type=FILE, help="PNG to write: hits, misses and false detections."
 )
 @click.option("--scene", "scene_file", type=OLD_FILE, help="Picture to draw them on.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing drawing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on stdout.")
 def evaluate(
     detected: Path,
@@ -61,6 +62,7 @@ def evaluate(
     seed: int,
     picture: Path | None,
     scene_file: Path | None,
+    overwrite: bool,
     as_json: bool,
 ) -> None:
     """Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.
@@ -73,6 +75,7 @@ def evaluate(
     """
     from geofield.evaluation import draw_matches, read_obstacles
     from geofield.evaluation import evaluate as compare
+    from geofield.imagery.write import replacing
     from geofield.plan import read_plan
 
     if picture is not None:
@@ -94,7 +97,9 @@ def evaluate(
     result = compare(found, true, **options)
     score = result.pooled
     if picture is not None:
-        draw_matches(found, true, result, picture, scene_file, area=options.get("area"))
+        inputs = [each for each in (detected, truth, scene_file) if each is not None]
+        with replacing(picture, overwrite=overwrite, inputs=inputs) as place:
+            draw_matches(found, true, result, place, scene_file, area=options.get("area"))
         say(f"Drawn to {picture}: hits green, missed blue, false red.")
     if as_json:
         figures = {"distance_m": distance_m, **score.as_dict(), "false_kinds": result.false_kinds}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield.crs import ground_areas_m2, ground_scale, is_metric
-from geofield.errors import CRSError, ObstacleError
+from geofield.errors import CRSError, ObstacleError, ObstacleWarning
 from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
 from geofield.evaluation.scores import Counts, Score, score
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
 DEFAULT_DISTANCE_M = 6.0
+#: No picture and its truth lie so far apart.
+_ELSEWHERE_KM = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,7 @@ def evaluate(
         centre_a, radius_a, _ = _circles(a)
         centre_b, radius_b, has_radius = _circles(b)
         scale = _scale(np.vstack([centre_a, centre_b]), a.crs)
+        _tell_elsewhere(centre_a / scale, centre_b / scale)
         match = match_points(centre_a / scale, centre_b / scale, distance_m)
         matches[name] = match
         if "kind" in a.columns:
@@ -149,6 +153,21 @@ def compared(
         )
     truth = active(truth).to_crs(detected.crs)
     return _counting(active(detected), area), _counting(truth, area)
+
+
+def _tell_elsewhere(found_m: FloatArray, true_m: FloatArray) -> None:
+    """Warn of a truth that is of other ground: its figures say nothing of the detections."""
+    if not (len(found_m) and len(true_m)):
+        return
+    boxes = [shapely.box(*each.min(axis=0), *each.max(axis=0)) for each in (found_m, true_m)]
+    apart_km = float(shapely.distance(*boxes)) / 1000
+    if apart_km > _ELSEWHERE_KM:
+        warnings.warn(
+            f"The truth lies {apart_km:,.0f} km from the obstacles: it is of another place, or its "
+            "CRS is not the right one (are latitude and longitude exchanged?).",
+            ObstacleWarning,
+            stacklevel=3,
+        )
 
 
 def _scale(centres: FloatArray, crs: Any) -> float:

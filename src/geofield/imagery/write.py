@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -97,8 +97,8 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
 
 
 @contextmanager
-def replacing(path: str | Path, *, overwrite: bool) -> Iterator[Path]:
-    """A path to write a picture at, which takes its place when all went well."""
+def replacing(path: str | Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+    """A path to write a picture at, which takes its place when all went well; never an input's."""
     target = Path(path)
     if not target.parent.is_dir():
         raise FormatError(
@@ -106,7 +106,7 @@ def replacing(path: str | Path, *, overwrite: bool) -> Iterator[Path]:
             hint="Check that the folder exists and that you may write there.",
         )
     try:
-        with staged_file(target, overwrite=overwrite) as temporary:
+        with staged_file(target, overwrite=overwrite, inputs=inputs) as temporary:
             yield temporary
     except RasterioError as error:
         raise FormatError(
