@@ -202,7 +202,7 @@ class Desk:
         from geofield.formats import write_dataset
         from geofield.imagery import write_scene
 
-        folder = self._exports()
+        folder, stem = self._exports()
         with (
             self.lock,
             tempfile.TemporaryDirectory(prefix="geofield-") as place,
@@ -217,16 +217,16 @@ class Desk:
                     scene = write_scene(cut, Path(place) / "scene.tif")
                 dataset = replace(dataset, scene_path=scene)
             written = write_dataset(
-                dataset, folder, [name], stem=self.path.stem, overwrite=True, inputs=[self.path]
+                dataset, folder, [name], stem=stem, overwrite=True, inputs=[self.path]
             )
         told = [str(one.message) for one in caught if issubclass(one.category, GeofieldWarning)]
         within = Path(*folder.parts[-2:])
         made = dict.fromkeys(str(within / path.relative_to(folder).parts[0]) for path in written)
         return {"files": list(made), "notes": told}
 
-    def _exports(self) -> Path:
-        """The folder of this plan's exports: those of several plans have the same names."""
-        return self.path.parent / "export" / self.path.stem
+    def _exports(self) -> tuple[Path, str]:
+        """The folder of exports, one for each plan as their names are the same, and their stem."""
+        return self.path.parent / "export" / self.path.stem, self.path.stem
 
     def _scene_of(self, plan: Plan) -> Scene:
         """The picture around the field, as the plan's own run read it."""

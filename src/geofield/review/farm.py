@@ -21,6 +21,7 @@ from geofield.farm.overview import OVERVIEW
 from geofield.farm.put_back import put_back
 from geofield.farm.reviewed import name_of
 from geofield.farm.store import Store
+from geofield.formats.names import safe_name
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
 from geofield.review.desk import Desk
@@ -51,8 +52,8 @@ class FarmDesk(Desk):
         if not (path.exists() and journal_path(path).exists() and read_plan(path) == self._there):
             save_plan(self._there, path, overwrite=True)
 
-    def _exports(self) -> Path:
-        return self._folder / "export" / self.path.stem
+    def _exports(self) -> tuple[Path, str]:
+        return self._folder / "export" / self.path.stem, safe_name(self._field_id)
 
     def _in_farm(self) -> Plan:
         return read_farm(self._folder)[self._field_id]
