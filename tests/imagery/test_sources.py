@@ -6,6 +6,7 @@ import io
 import json
 import logging
 import pickle
+import re
 import shutil
 import subprocess
 from contextlib import closing
@@ -520,6 +521,23 @@ def test_a_wmts_in_degrees_that_has_longitude_first(tmp_path: Path) -> None:
         assert not isinstance(source, PictureSource)
         corners += [(level.left, level.top) for level in source.pyramid.levels]
     assert set(corners) == {(-180.0, 90.0)}
+
+
+@pytest.mark.parametrize("wrong", ["", "0", "nan", "1e-300", "x", "-1", "1 2 3"])
+@pytest.mark.parametrize("name", ["ScaleDenominator", "TopLeftCorner", "TileWidth", "MatrixHeight"])
+def test_a_wmts_with_a_wrong_number_has_its_other_levels(
+    tmp_path: Path, name: str, wrong: str
+) -> None:
+    text = wmts_document("http://127.0.0.1:9", mercator=True, rest=True)
+    (file := tmp_path / "caps.xml").write_text(
+        re.sub(f"<{name}>[^<]*", f"<{name}>{wrong}", text, count=1)
+    )
+    source = find_source(str(file), allow=["http://127.0.0.1:9"])
+    assert not isinstance(source, PictureSource)
+    assert source.pyramid.zooms == (6, 20)
+    file.write_text(re.sub(f"<{name}>[^<]*", f"<{name}>{wrong}", text))
+    with pytest.raises(ImageryError, match="does not say how it is cut into tiles"):
+        find_source(str(file), allow=["http://127.0.0.1:9"])
 
 
 def test_a_document_that_is_not_there_names_the_host() -> None:

@@ -29,6 +29,10 @@ from geofield.imagery.tiling import Tile, TileLevel, TilePyramid
 #: Metres per pixel at scale 1:1 in the standard (0.28 mm pixels).
 _PIXEL_M = 0.00028
 _METRES_PER_DEGREE = 111319.49079327358
+#: Side of the largest tile that is taken, pixels.
+_MOST_PX = 8192
+#: No place and no pixel of a map is beyond it, units of the CRS.
+_FAR = 1e9
 _FORMATS = ("image/png", "image/webp", "image/jpeg", "image/jpg", "image/png8")
 
 
@@ -100,7 +104,8 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
             found.append((rank, -len(levels), identifier, TilePyramid(crs, levels)))
     if not found:
         raise ImageryError(
-            f"{plain_address(address)} offers the layer in no known coordinate reference system."
+            f"{plain_address(address)} offers the layer in no known coordinate reference system, "
+            "or does not say how it is cut into tiles."
         )
     _, _, identifier, pyramid = min(found, key=lambda each: each[:3])
     return identifier, pyramid
@@ -110,17 +115,8 @@ def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
     # The corner follows the authority's axis order when the CRS is named as a URN or an address.
     swapped = northing_first(crs) and not text(element, "SupportedCRS").startswith("EPSG:")
-    rough: list[_Rough] = []
-    for matrix in children(element, "TileMatrix"):
-        resolution = float(text(matrix, "ScaleDenominator")) * _PIXEL_M / unit_m
-        corner = [float(part) for part in text(matrix, "TopLeftCorner").split()]
-        # Some write longitude first all the same: no latitude is beyond 90 degrees.
-        turned = swapped and not (crs.is_geographic and abs(corner[0]) > 90)
-        left, top = reversed(corner) if turned else corner
-        columns, rows = int(text(matrix, "MatrixWidth")), int(text(matrix, "MatrixHeight"))
-        tile_px = int(text(matrix, "TileWidth")), int(text(matrix, "TileHeight"))
-        name = text(matrix, "Identifier")
-        rough.append((resolution, left, top, columns, rows, tile_px, name))
+    read = (_matrix(each, unit_m, swapped, crs) for each in children(element, "TileMatrix"))
+    rough = [each for each in read if each is not None]
     rough.sort(key=lambda each: -each[0])
     if crs == WEB_MERCATOR:
         return _web_mercator_levels(rough)
@@ -128,6 +124,25 @@ def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
 
 
 _Rough = tuple[float, float, float, int, int, tuple[int, int], str]
+
+
+def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> _Rough | None:
+    """The values of a level; None of one that is not written as it should be."""
+    try:
+        resolution = float(text(element, "ScaleDenominator")) * _PIXEL_M / unit_m
+        left, top = (float(part) for part in text(element, "TopLeftCorner").split())
+        names = ("MatrixWidth", "MatrixHeight", "TileWidth", "TileHeight")
+        columns, rows, width, height = (int(text(element, name)) for name in names)
+    except ValueError:
+        return None
+    if not (1 / _FAR < resolution < _FAR and abs(left) < _FAR and abs(top) < _FAR):
+        return None  # not a number, either
+    if min(columns, rows, width, height) < 1 or max(width, height) > _MOST_PX:
+        return None
+    # Some write longitude first all the same: no latitude is beyond 90 degrees.
+    if swapped and not (crs.is_geographic and abs(left) > 90):
+        left, top = top, left
+    return resolution, left, top, columns, rows, (width, height), text(element, "Identifier")
 
 
 def _web_mercator_levels(rough: list[_Rough]) -> tuple[TileLevel, ...]:
