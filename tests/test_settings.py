@@ -55,6 +55,7 @@ def test_names_of_another_version_are_passed_over() -> None:
         ("[tracks]\nspacing_m = 0\n", "tracks.spacing_m"),
         ("[tracks]\nspacing_m = nan\n", "tracks.spacing_m"),
         ("[tracks]\nspacing = 2\n", "tracks.spacing"),
+        ("[tracks]\nheadland_m = true\n", "tracks.headland_m: .* not true or false"),
         ("[trucks]\nspacing_m = 2\n", "trucks"),
         ("[tracks\n", "not valid TOML"),
         ("tracks = 3\n", "tracks is a section"),
