@@ -72,4 +72,5 @@ def save_plan(
         # The project goes on showing the picture that lies there.
         dataset = replace(dataset, scene_path=picture)
     with staged_plan(output, overwrite=overwrite or same, inputs=inputs) as staging:
-        write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
+        shown = {"picture": True}
+        write_dataset(dataset, staging, ["gpkg"], stem=output.stem, options=shown)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import zipfile
 from dataclasses import replace
 
 import pytest
@@ -67,6 +69,26 @@ def test_export_options_reach_the_writer(plan_file, tmp_path):
     ).is_file()
     run(export, plan_file, "-f", "shapefile", "--zip", "--out", tmp_path / "zip")
     assert [p.name for p in (tmp_path / "zip").iterdir()] == ["field_shapefile.zip"]
+
+
+def test_a_project_shows_the_picture_where_it_lies_beside_it_alone(sample, tmp_path):
+    picture = shutil.copy(sample / "field_1.tif", tmp_path / "scene.tif")
+    write_dataset(replace(make_dataset(), scene_path=picture), tmp_path, ["gpkg"])
+    run(export, tmp_path / "field.gpkg", "-f", "gpkg,html", "--out", tmp_path / "out")
+    run(export, tmp_path / "field.gpkg", "-f", "gpkg,scene", "--out", tmp_path / "whole")
+    for place in ("", "/.."):
+        back = tmp_path / f"whole{place}" / "back.gpkg"
+        run(import_, tmp_path / "field.gpkg", "-o", back)
+        assert shown(back) == (place == "/..")
+    assert shown(tmp_path / "field.gpkg")
+    assert not shown(tmp_path / "out" / "field.gpkg")
+    assert shown(tmp_path / "whole" / "field.gpkg")
+    assert "data:image/webp" in (tmp_path / "out" / "field.html").read_text(encoding="utf-8")
+
+
+def shown(plan_file):
+    with zipfile.ZipFile(plan_file.with_suffix(".qgz")) as project:
+        return b"scene.tif" in project.read(project.namelist()[0])
 
 
 def test_export_never_replaces_its_input(plan_file):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +75,6 @@ def export(
     from geofield.farm import is_farm, read_farm
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
-    from geofield.formats.gpkg_read import scene_beside
     from geofield.formats.many import apart
 
     given["zip"] = given.pop("zipped") or None
@@ -100,9 +98,6 @@ def export(
         dataset = read_dataset(plan_file, crs=crs)
         for note in dataset.notes:
             say(note)
-        if plan_file.suffix.lower() == ".gpkg" and ("gpkg" not in names or "scene" in names):
-            # A project written without the picture must not look for it.
-            dataset = replace(dataset, scene_path=scene_beside(plan_file))
         datasets += apart(dataset)
     written = write_datasets(
         datasets,

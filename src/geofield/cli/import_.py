@@ -58,7 +58,8 @@ def import_(
     claim_file(output)
     dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
     with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
-        write_dataset(dataset, staging, ["gpkg"], stem=output.stem)
+        shown = {"picture": dataset.picture_lies_in(output.parent)}
+        write_dataset(dataset, staging, ["gpkg"], stem=output.stem, options=shown)
     for note in dataset.notes:
         say(note)
     counts = {layer: len(table) for layer, table in dataset.tables.items() if len(table)}

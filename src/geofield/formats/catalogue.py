@@ -74,7 +74,7 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".gpkg",),
         precision_m=0.0,
         crs="metric",
-        options=("points", "project"),
+        options=("points", "project", "picture"),
         validator="geofield.formats.checks.gpkg:check",
         fields="joined",
     ),

@@ -106,6 +106,8 @@ def write_datasets(
         for each in chosen:
             own = {key: value for key, value in given.items() if key in each.options}
             own |= given.get(each.name, {})
+            if "picture" in each.options and not any(one.name == "scene" for one in chosen):
+                own.setdefault("picture", all(one.picture_lies_in(target) for one in datasets))
             for path in _written(each, datasets, staging, stem, own):
                 place = target / path.relative_to(staging)
                 if place in written:

@@ -11,6 +11,7 @@ import os
 import sqlite3
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,8 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     """Write ``{stem}.gpkg`` and, over it, the QGIS project ``{stem}.qgz``.
 
     Options: ``points`` (default true) says whether the track points are written, which are
-    streamed; ``project`` (default true) whether the ``.qgz`` is.
+    streamed; ``project`` (default true) whether the ``.qgz`` is; ``picture`` (default true)
+    whether the project shows the picture, which lies in the same folder then.
     """
     path = folder / f"{stem}.gpkg"
     stamp = origin.timestamp(dataset)
@@ -99,7 +101,8 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
         add_styles(connection, dataset, stamp)
-        project = qgz_bytes(project_xml(dataset, path.name), stem, stamp)
+        shown = dataset if options.get("picture", True) else replace(dataset, scene_path=None)
+        project = qgz_bytes(project_xml(shown, path.name), stem, stamp)
         add_project(connection, stem, project, stamp)
     with path.open("rb") as file:
         os.fsync(file.fileno())

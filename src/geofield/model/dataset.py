@@ -97,6 +97,11 @@ class Dataset:
         """Whether tracks that are edited in its file stand in a later run."""
         return len(self.table(schema.FIELD.name)) < 2
 
+    def picture_lies_in(self, folder: Path) -> bool:
+        """Whether the picture, where there is one, is in a folder."""
+        scene = self.scene_path
+        return scene is None or scene.resolve().parent == folder.resolve()
+
     def table(self, name: str) -> gpd.GeoDataFrame:
         """The table of a layer; an empty one where the dataset has none."""
         if name in self.tables:
