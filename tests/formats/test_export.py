@@ -180,7 +180,7 @@ def test_mixed_geometries_are_refused(dataset, tmp_path):
         write_dataset(broken, tmp_path, ["gpkg"])
 
 
-@pytest.mark.parametrize("stem", ["", "a/b", "..", "a:b", "x\0"])
+@pytest.mark.parametrize("stem", ["", "a/b", "..", "a:b", "x\0", "a\nb"])
 def test_impossible_stems(dataset, tmp_path, stem):
     with pytest.raises(FormatError, match="not a file name"):
         write_dataset(dataset, tmp_path, ["gpkg"], stem=stem)

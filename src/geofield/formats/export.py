@@ -229,7 +229,7 @@ def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[
 
 
 def _check_stem(stem: str) -> None:
-    if not stem or stem in (".", "..") or set(stem) & set('/\\:*?"<>|\0'):
+    if not stem or stem in (".", "..") or set(stem) & set('/\\:*?"<>|') or not stem.isprintable():
         raise FormatError(f"{stem!r} is not a file name.", hint="Use letters, digits, '-' and '_'.")
 
 
