@@ -326,6 +326,41 @@ def test_a_size_typed_for_a_copy_or_beside_another_shape_counts(folder: Path) ->
     assert np.isnan(after["radius_m"][3])
 
 
+def test_a_row_copied_in_place_is_no_further_obstacle(folder: Path) -> None:
+    """What a copy says is said of its original; both stood, and "rejected" did nothing."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+
+    def paste(table: Frame) -> Frame:
+        table.loc[at(table, 4), "status"] = "confirmed"
+        table["mine"] = "as it was"
+        copies = table[table["obstacle_no"].isin([1, 2, 3, 4])].copy()
+        copies.loc[at(copies, 1) | at(copies, 4), "status"] = "Rejected"
+        copies.loc[at(copies, 1), ["mine", "obstacle_no"]] = ["seen", None]
+        copies.loc[at(copies, 2), "radius_m"] = 7.0
+        return pd.concat([table, copies])
+
+    rewritten(file, "obstacles", paste)
+    told = geofield("tracks", file, "-o", file)
+    assert (
+        "(obstacle 1): what was changed in one of them holds (status rejected, mine seen)" in told
+    )
+    assert "(obstacle 2): what was changed in one of them holds (radius_m 7.0)" in told
+    assert "(obstacle 3): they are alike and count once" in told
+    assert "(obstacle 4): they contradict each other (status confirmed; status rejected)" in told
+    after = rows(plan_in(folder))
+    assert after.index.tolist() == before.index.tolist()
+    assert after["status"][[1, 2, 3, 4]].tolist() == [
+        "rejected",
+        "confirmed",
+        before["status"][3],
+        "confirmed",
+    ]
+    assert after["radius_m"][2] == 7.0
+    assert after["mine"][[1, 2]].tolist() == ["seen", "as it was"]
+    assert "Rows copied in place" not in geofield("tracks", file, "-o", file)
+
+
 def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) -> None:
     """Of another program, whose table takes any shape: none is lost, each has a width."""
     file = folder / "out/field.gpkg"

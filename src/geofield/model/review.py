@@ -22,6 +22,7 @@ from geofield import schema
 from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.errors import FormatWarning, ObstacleError
 from geofield.grid import Grid
+from geofield.model.copies import without_copies
 from geofield.model.obstacles import (
     FloatArray,
     floats,
@@ -59,7 +60,8 @@ def reconcile(
 
     A row without a number, or with a number that another row has (a copy of that one), was drawn:
     it becomes `added` (unless another status was chosen) and gets the next free number; a safety
-    margin typed for it grows what was drawn, a radius makes it a circle. Points and lines become
+    margin typed for it grows what was drawn, a radius makes it a circle. One that lies exactly
+    on its original is no further obstacle (`geofield.model.copies`). Points and lines become
     areas (`geofield.model.resized.widened`). Rows without a shape are dropped.
 
     Parameters
@@ -84,8 +86,9 @@ def reconcile(
         When a radius or safety margin is negative or infinite.
     """
     table = _with_shapes(obstacles)
-    rows = _Rows.of(table)
     record = (from_earlier_version(table) if written is None else written).by_number
+    table = without_copies(table, record)
+    rows = _Rows.of(table)
     _find_lost_numbers(rows, list(record.values()))
     known, before = _known(rows, record)
     _spell(rows, known, before)
