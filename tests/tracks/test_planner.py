@@ -14,7 +14,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod, Transformer
-from shapely import Polygon
+from shapely import Polygon, affinity
 
 from geofield import schema
 from geofield.errors import CRSError, CRSMismatchError, ObstacleError, TrackError, TrackWarning
@@ -320,6 +320,21 @@ def test_offset_and_place() -> None:
     assert tracks.segments.distance(place).min() < 1e-6
     border = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, offset_m=0.0)
     assert len(border.lines) == 11
+
+
+def test_a_track_on_a_border_of_many_vertices_is_whole() -> None:
+    """Vertices lie beside their line by the last digits of a northing: pieces were lost."""
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        length_m, angle = rng.uniform(200, 600), rng.uniform(0, 180)
+        along = np.concatenate([[0], np.sort(rng.uniform(0, length_m, 120)), [length_m]])
+        ring = [*((x, 0) for x in along), *((x, 100) for x in along[::-1])]
+        field = affinity.rotate(Polygon(ring), angle, origin=(0, 0))
+        field = affinity.translate(field, rng.uniform(2e5, 8e5), rng.uniform(1e6, 9e6))
+        how: Any = {"crs": "EPSG:32636", "spacing_m": 4.0, "direction": "longest_edge"}
+        segments = plan_tracks(field, offset_m=0.0, **how).segments
+        first = segments[segments["track_no"] == 1]
+        assert first.geometry.length.tolist() == pytest.approx([length_m], abs=1e-3)
 
 
 def test_headland() -> None:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import FIELD, Discs, Edges, IntArray
 
-SNAP_M = 1e-9
-"""A vertex this near to a track lies on it: about the last digit of a UTM northing."""
+SNAP_M = 1e-7
+"""A vertex this near to a track lies on it: the last digits of northings, along a fitted edge."""
 TOUCH_M = 1e-8
 """Pieces and gaps up to this length are touching points, not pieces and gaps."""
 

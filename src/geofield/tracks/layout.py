@@ -12,13 +12,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from geofield.errors import TrackError
+from geofield.tracks.clip import SNAP_M
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import Edges
 
 LastStrip = Literal["overrun", "leave", "shift", "spread"]
 LAST_STRIPS: tuple[str, ...] = get_args(LastStrip)
-
-_EPS_M = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +93,10 @@ def on_the_border(positions: FloatArray, edges: Edges) -> FloatArray:
     keep = np.ones(len(positions), dtype=bool)
     for at in {0, len(positions) - 1} if len(positions) else set():
         place = positions[at]
-        if min(abs(place - near), abs(place - far)) <= _EPS_M:
-            along = (np.abs(edges.va - place) <= _EPS_M) & (np.abs(edges.vb - place) <= _EPS_M)
+        if min(abs(place - near), abs(place - far)) <= SNAP_M:
+            along = (np.abs(edges.va - place) <= SNAP_M) & (np.abs(edges.vb - place) <= SNAP_M)
             keep[at] = bool(along.any())
-            positions[at] = near if abs(place - near) <= _EPS_M else far
+            positions[at] = near if abs(place - near) <= SNAP_M else far
     return positions[keep]
 
 
@@ -129,9 +128,9 @@ def track_positions(
     half = (width_m or spacing_m) / 2.0
     # Of passes that overlap by more than half, none beyond those that reach the borders: their
     # machine would drive outside for nothing. What was asked for stays.
-    idle = half - spacing_m + _EPS_M if half > spacing_m else -_EPS_M
+    idle = half - spacing_m + SNAP_M if half > spacing_m else -SNAP_M
     low, high = near_m + idle, far_m - idle
-    if near_m - _EPS_M <= first_m <= far_m + _EPS_M:
+    if near_m - SNAP_M <= first_m <= far_m + SNAP_M:
         low, high = min(low, first_m), max(high, first_m)
     index = np.ceil((low - first_m) / spacing_m)
     start = first_m + index * spacing_m
@@ -146,12 +145,12 @@ def track_positions(
         count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
         width = (far_m - edge) / count
         return np.asarray(edge + (np.arange(count) + 0.5) * width)
-    limit = high if last_strip == "overrun" else far_m - half + _EPS_M
+    limit = high if last_strip == "overrun" else far_m - half + SNAP_M
     count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
     # Multiples of the spacing from the one place, so that numbers far away do not drift.
     positions = first_m + (index + np.arange(count)) * spacing_m
     if last_strip == "shift":
         worked = positions[-1] + half if count else near_m
-        if far_m - worked > _EPS_M and far_m - half > near_m:
+        if far_m - worked > SNAP_M and far_m - half > near_m:
             positions = np.append(positions, far_m - half)
     return np.asarray(positions)
