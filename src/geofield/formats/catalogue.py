@@ -56,6 +56,7 @@ _ISOXML = Format(
     drops=_TERMINAL_DROPS,
     precision_m=0.0002,
     options=("customer", "farm", "zip", "headland"),
+    several="geofield.formats.isoxml:several",
     validator="geofield.formats.checks.isoxml:check",
     steers=True,
     reads_folders=True,

@@ -61,6 +61,9 @@ class Format:
     reader : str or None
         ``module:function`` with the signature ``read(path) -> Dataset``; None where the
         format cannot be imported.
+    several : str or None
+        ``module:function`` with the signature ``several(path) -> list of (name, read)``: the
+        fields in a file, each with what reads it, where the reader alone takes a lone field.
     suffixes : tuple of str
         By which a file is recognised; with the dot, lower case.
     drops : tuple of Drop
@@ -108,6 +111,7 @@ class Format:
     automatic: bool = False
     fields: Literal["one", "apart", "many", "joined"] = "one"
     steers: bool = False
+    several: str | None = None
 
     def load_writer(self) -> Writer:
         """The writer, imported."""
@@ -127,6 +131,10 @@ class Format:
                 hint="`geofield formats` lists what can be read.",
             )
         return _load(self.reader)  # type: ignore[no-any-return]
+
+    def readers(self, path: Path) -> list[tuple[str, Callable[[], Dataset]]]:
+        """What reads each field in a file, with its name; none where only a lone one is read."""
+        return [] if self.several is None else list(_load(self.several)(path))
 
     def load_validator(self) -> Validator | None:
         """The check of the format's own rules, imported; None where there is none."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,7 +16,9 @@ from geofield import schema
 from geofield.crs import ground_lengths_m
 from geofield.errors import EmptyFileError, FormatWarning, GeofieldError, SeveralFieldsError
 from geofield.formats.clear_way import driven_through, leaving
+from geofield.formats.format import Format
 from geofield.formats.importing import read_dataset
+from geofield.formats.many import apart
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
@@ -70,27 +73,49 @@ def validate_file(path: Path | str) -> list[Finding]:
         if check is None:
             findings.append(Finding("warning", place.name, f"there is no check for {found.title}"))
         return findings
+    # Where the format's own rules are broken already, that is why it cannot be read.
+    broken = any(each.level == "error" for each in findings)
+    try:
+        readers = found.readers(place)
+    except GeofieldError:
+        readers = []  # the reader tells why
+    if len(readers) < 2:
+        return findings + _of_content(partial(read_dataset, place), place, found, broken=broken)
+    of_each = ((name, _of_content(read, place, found, broken=broken)) for name, read in readers)
+    return findings + [_in_field(name, each) for name, these in of_each for each in these]
+
+
+def _of_content(
+    read: Callable[[], Dataset], place: Path, found: Format, *, broken: bool
+) -> list[Finding]:
+    """What there is to say of what a file holds."""
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FormatWarning)
-            dataset = _one_field(read_dataset(place), place)
+            dataset = read()
+            fields = _fields(dataset, place)
     except EmptyFileError:
         # As a layer of a plan without obstacles is: there is nothing that could not fit together.
-        return [*findings, Finding("warning", place.name, "holds no geometries")]
+        return [Finding("warning", place.name, "holds no geometries")]
     except SeveralFieldsError as error:
         words = f"{error} Each field's own rules were not checked."
-        return [*findings, Finding("warning", place.name, words)]
+        return [Finding("warning", place.name, words)]
     except GeofieldError as error:
-        # Where the format's own rules are broken already, that is why it cannot be read.
-        if any(each.level == "error" for each in findings):
-            return findings
-        return [*findings, Finding("error", place.name, str(error))]
-    findings += [
+        return [] if broken else [Finding("error", place.name, str(error))]
+    findings = [
         Finding("warning", place.name, str(each.message).removeprefix(f"{place.name}: "))
         for each in caught
         if issubclass(each.category, FormatWarning)
     ]
-    return findings + list(check_dataset(dataset, with_segments="segments" in found.layers))
+    with_segments = "segments" in found.layers
+    for one in fields:
+        of_one = check_dataset(one, with_segments=with_segments)
+        findings += [_in_field(one.name, each) if len(fields) > 1 else each for each in of_one]
+    return findings
+
+
+def _in_field(name: str, finding: Finding) -> Finding:
+    return replace(finding, where=f"{name}, {finding.where}")
 
 
 def _of_project(project: Path) -> Finding:
@@ -105,11 +130,13 @@ def _of_project(project: Path) -> Finding:
     )
 
 
-def _one_field(dataset: Dataset, place: Path) -> Dataset:
-    count = len(dataset.table(schema.FIELD.name))
+def _fields(dataset: Dataset, place: Path) -> list[Dataset]:
+    """The fields of a dataset, each by itself."""
+    fields = apart(dataset)
+    count = len(fields[0].table(schema.FIELD.name))
     if count > 1:
         raise SeveralFieldsError(f"{place.name} holds {count} fields.")
-    return dataset
+    return fields
 
 
 def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[Finding]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -42,9 +43,7 @@ def read(path: Path) -> Dataset:
     FormatError
         When there is no field or more than one, or the file is damaged.
     """
-    file = task_file(path)
-    root = read_xml(file)
-    fields = [*root.iter("PFD"), *_external(root, file.parent)]
+    file, fields = _fields(path)
     if len(fields) != 1:
         names = ", ".join(str(field.get("C")) for field in fields[:5])
         kind = SeveralFieldsError if fields else FormatError
@@ -52,7 +51,22 @@ def read(path: Path) -> Dataset:
             f"{file} holds {len(fields)} fields ({names}); a dataset is one field.",
             hint="Export the one you want from the terminal or farm program alone.",
         )
-    field = fields[0]
+    return _dataset(fields[0], file)
+
+
+def several(path: Path) -> list[tuple[str, Callable[[], Dataset]]]:
+    """The name of every field in task data, and what reads it."""
+    file, fields = _fields(path)
+    return [(str(field.get("C")), partial(_dataset, field, file)) for field in fields]
+
+
+def _fields(path: Path) -> tuple[Path, list[ET.Element]]:
+    file = task_file(path)
+    root = read_xml(file)
+    return file, [*root.iter("PFD"), *_external(root, file.parent)]
+
+
+def _dataset(field: ET.Element, file: Path) -> Dataset:
     _unwrap(field)
     boundaries = list(_boundaries(field))
     outline = shapely.union_all([_sound(row["geometry"]) for row in boundaries])
