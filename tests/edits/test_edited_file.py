@@ -13,6 +13,7 @@ import geopandas as gpd
 import pandas as pd
 import pyogrio
 import pytest
+import shapely
 from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run, shrunk
 
 from geofield.simulate import SimulatedField
@@ -236,6 +237,13 @@ def test_no_machine_is_steered_through_an_obstacle_drawn_since(folder: Path) -> 
     assert not (folder / "x").exists()
     # Who looks at a map may see it, and is told.
     assert "plan the tracks again" in geofield(*export, "-f", "geojson")
+    rewritten(file, "obstacles", lambda table: table[table["obstacle_no"].notna()])
+    # A fence is hardly wider than what ends of segments may be off.
+    x, y = drawn.centroid.coords[0]
+    fence = shapely.LineString([(x - 20, y - 15), (x + 20, y + 15)])
+    wire = gpd.GeoDataFrame(geometry=[fence], crs=rock.crs)
+    rewritten(file, "obstacles", lambda table: pd.concat([table, wire]))
+    assert "through obstacle" in run_geofield(*export, "-f", "isoxml").stderr
     # So are tracks out of an outline that was drawn smaller.
     rewritten(file, "obstacles", lambda table: table[table["obstacle_no"].notna()])
     rewritten(file, "field", shrunk)

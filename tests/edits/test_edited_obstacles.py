@@ -19,6 +19,7 @@ from shapely.affinity import translate
 
 from geofield.crs import ground_scale_of
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield
 
 
 def rearranged(table: Frame) -> Frame:
@@ -378,6 +379,10 @@ def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) ->
         return pd.concat([table, gpd.GeoDataFrame(more, geometry=drawn, crs=table.crs)])
 
     rewritten(file, "obstacles", draw)
+    found = run_geofield("validate", file).stderr
+    assert "row 12: is a point: a circle of radius_m (2 m where empty) and buffer_m" in found
+    assert "row 14: is a line: a strip of radius_m (at least 0.05 m) and buffer_m" in found
+    assert "runs through an obstacle that was drawn" in found
     told = geofield("tracks", file, "-o", file)
     assert "One point among the obstacles without radius_m: taken for circles of 2 m" in told
     assert "among the obstacles without buffer_m: taken for strips of 0.1 m" in told

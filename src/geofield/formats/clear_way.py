@@ -18,6 +18,8 @@ from geofield.model.tracks import Tracks
 
 #: Segments end exactly on a border: so far beyond it is no fault, metres.
 _HAIR_M = 0.05
+#: The same for what is hardly wider than two of these, as a fence is; more than formats round to.
+_THIN_HAIR_M = 0.02
 #: So many tracks or obstacles are named.
 _MOST = 5
 
@@ -28,7 +30,10 @@ def driven_through(dataset: Dataset) -> list[tuple[int, str]]:
     if not len(obstacles) or not len(segments):
         return []
     kept = active(obstacles)
-    inside = shapely.buffer(np.asarray(kept.geometry.to_numpy(), dtype=object), -_HAIR_M)
+    shapes = np.asarray(kept.geometry.to_numpy(), dtype=object)
+    inside = shapely.buffer(shapes, -_HAIR_M)
+    thin = shapely.is_empty(inside)
+    inside[thin] = shapely.buffer(shapes[thin], -_THIN_HAIR_M)
     tree = shapely.STRtree(segments.geometry.to_numpy())
     hit, where = tree.query(inside, predicate="intersects")
     numbers = kept["obstacle_no"].tolist()

@@ -23,6 +23,8 @@ from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
+from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
+from geofield.model.resized import widened
 from geofield.model.searched import unsearched
 
 if TYPE_CHECKING:
@@ -149,6 +151,8 @@ def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[F
         yield from _check_rows(layer, table)
     if schema.FIELD.name in dataset.tables and not len(dataset.table(schema.FIELD.name)):
         yield Finding("error", schema.FIELD.name, "no row has an outline")
+    if dataset.has(schema.OBSTACLES.name):
+        yield from _check_areas(dataset.table(schema.OBSTACLES.name))
     if with_segments:
         yield from _check_obstacles(dataset)
         yield from _check_searched(dataset)
@@ -189,7 +193,24 @@ def _check_rows(layer: schema.Layer, table: gpd.GeoDataFrame) -> Iterator[Findin
                 )
 
 
+def _check_areas(obstacles: gpd.GeoDataFrame) -> Iterator[Finding]:
+    """What counts as an area though it is drawn as none."""
+    dimension = shapely.get_dimensions(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
+    for of, words in (
+        (0, f"is a point: a circle of radius_m ({POINT_RADIUS_M:g} m where empty) and buffer_m"),
+        (1, f"is a line: a strip of radius_m (at least {LINE_HALF_WIDTH_M:g} m) and buffer_m to "
+            "both sides"),
+    ):  # fmt: skip
+        for row in np.flatnonzero(dimension == of)[:5]:
+            yield Finding("warning", f"{schema.OBSTACLES.name}, row {row + 1}", words)
+
+
 def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
+    if dataset.has(schema.OBSTACLES.name):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FormatWarning)  # sizes are found already
+            areas = widened(dataset.table(schema.OBSTACLES.name))
+        dataset = replace(dataset, tables={**dataset.tables, schema.OBSTACLES.name: areas})
     segments = dataset.table("segments")
     for segment, obstacle in driven_through(dataset)[:5]:
         row = segments.iloc[segment]
