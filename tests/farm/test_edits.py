@@ -574,6 +574,27 @@ def test_tracks_edited_in_the_overview_stand(folder: Path, door: str) -> None:
         assert "as edited" not in _batch(folder, *more)
 
 
+@pytest.mark.parametrize("lost", ["emptied", "dropped", "bare"])
+def test_segments_of_the_overview_that_lost_their_numbers(folder: Path, lost: str) -> None:
+    """They all counted as drawn (42 tracks for 20), or the run was refused."""
+    before = {plan.field.field_id: plan for plan in gf.read_farm(folder / "farm")}
+    path = folder / "farm" / "farm.gpkg"
+    table = pyogrio.read_dataframe(path, layer="segments")
+    table = table[~((table["field_id"] == "b") & (table["track_no"] == 4))]
+    if lost == "emptied":
+        table[["track_no", "segment_no"]] = None
+    else:
+        table = table[["geometry"] if lost == "bare" else ["field_id", "length_m", "geometry"]]
+    pyogrio.write_dataframe(table, path, layer="segments", geometry_name="geom")
+    said = _batch(folder)
+    assert ("no column track_no, segment_no any more" in said) == (lost != "emptied")
+    assert [one for one in "abcd" if f"{one} as edited" in said] == ["b"]
+    after = {plan.field.field_id: plan for plan in gf.read_farm(folder / "farm")}
+    assert after["b"].track_edits.in_words().endswith(": 4 taken away")
+    assert len(after["b"].tracks.lines) == len(before["b"].tracks.lines) - 1
+    assert all(after[one] == before[one] for one in "acd")
+
+
 def _without(number: int) -> Callable[[Any], Any]:
     """Without a track of field a, or of the only one."""
 

@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 import fiona
 import geopandas as gpd
 import numpy as np
+import pandas as pd
 import pyogrio
 import pyoxigraph as ox
 import pytest
@@ -250,6 +251,25 @@ def test_a_file_of_several_fields_is_exported_field_by_field(tmp_path):
         np.testing.assert_allclose(lonlat, other, rtol=0, atol=2e-9)
     assert len(list(tmp_path.glob("*.gpx"))) == 3
     assert [f for f in validate_file(tmp_path / "field.ttl") if f.level == "error"] == []
+
+
+def test_segments_of_several_fields_that_lost_their_numbers(tmp_path):
+    """They are known by the tracks; ISOXML ended in a traceback, GPX had lines without names."""
+    write_datasets(FARM, tmp_path, ["gpkg"])
+    file = tmp_path / "field.gpkg"
+    before = pyogrio.read_dataframe(file, layer="segments")
+    drawn = before.iloc[:1].assign(geometry=before.geometry[:1].translate(0, 1e-5))
+    bare = pd.concat([before, drawn], ignore_index=True)[["field_id", "geometry"]]
+    pyogrio.write_dataframe(bare, file, layer="segments", geometry_name="geom")
+    done = geofield("export", file, "-f", "isoxml", "-f", "geojson", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "no column track_no, segment_no any more" in done.stderr
+    after = gpd.read_file(tmp_path / "out" / "geojson" / "segments.geojson")
+    keys = ["field_id", "track_no", "segment_no"]
+    own = drawn.assign(track_no=before["track_no"][before["field_id"] == "f0"].max() + 1)
+    wanted = pd.concat([before, own.assign(segment_no=1)]).set_index(keys)["length_m"]
+    found = after.set_index(keys)["length_m"]
+    assert found.to_dict() == pytest.approx(wanted.to_dict(), abs=0.002)
 
 
 def test_a_row_of_none_of_the_fields_is_not_left_out_silently(tmp_path):

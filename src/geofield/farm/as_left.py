@@ -12,7 +12,7 @@ from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.farm.layers import FIELD_ID
 from geofield.formats import origin
-from geofield.formats.gpkg_read import in_own_terms, record_of
+from geofield.formats.gpkg_read import in_own_terms, record_of, tell_lost_columns
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -45,7 +45,8 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     Raises
     ------
     FormatError
-        When it is gone, lacks a column, or is in another CRS than the overview was written in.
+        When it is gone, or in another CRS than the overview was written in, or when outlines or
+        obstacles lack a column: lines are known by their shapes.
     """
     import pyogrio
 
@@ -61,8 +62,10 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     if absent and of is not schema.FIELD:
         words = f"{absent} row(s) of layer {of.name!r} have no geometry, and count as deleted"
         tell(f"{overview.name}: {words}.")
+    if of in (schema.TRACKS, schema.SEGMENTS):
+        tell_lost_columns(of, table, overview)
     for name in of.column_names:
-        if name not in table:
+        if name not in table and of in (schema.FIELD, schema.OBSTACLES):
             raise FormatError(
                 f"{overview.name}: the column {name!r} of layer {of.name!r} is gone.",
                 hint="Undo that in QGIS, or put the edited fields back one by one.",

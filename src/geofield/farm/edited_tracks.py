@@ -18,6 +18,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.farm.as_written import hashed, own_names, text_of
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.model.lost_numbers import known_by_shape
 from geofield.plan import Plan
 
 if TYPE_CHECKING:
@@ -97,7 +98,35 @@ def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
         return schema.conform(of, rows.rename(columns=names.get(of.name, {})), extras=True)
 
     lines, segments = (mine(of) for of in (schema.TRACKS, schema.SEGMENTS))
+    written = plan.tracks.written
+    if written is not None:
+        lines = known_by_shape(schema.TRACKS, lines, written)
+        segments = known_by_shape(schema.SEGMENTS, segments, written)
     return replace(plan, tracks=replace(plan.tracks, lines=lines, segments=segments))
+
+
+def only_lost_numbers(farm: Farm, ids: Collection[str], tables: Tables, names: Names) -> set[str]:
+    """The fields of which rows lost their numbers in another program, and nothing was edited.
+
+    Parameters
+    ----------
+    farm : Farm
+    ids : collection of str
+        Fields of which the digests differ.
+    tables : mapping
+        The layers `EDITED` of many fields.
+    names : mapping
+    """
+    lost: set[str] = set()
+    for of, keys in EDITED.items():
+        without = tables[of][list(keys)].isna().any(axis=1)
+        lost.update(tables[of][FIELD_ID][without].astype(str))
+    plans = (farm[one] for one in lost & set(ids) if one in farm)
+    return {
+        plan.field.field_id
+        for plan in plans
+        if with_tracks(plan, tables, names).track_edits == plan.track_edits
+    }
 
 
 def layers_in(overview: Path) -> set[schema.Layer]:

@@ -120,6 +120,9 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     digests = edited_tracks.track_digests(tracks) if tracks else {}
     # A field of which no track is left is no word on any one of them.
     driven = {one: told for one, told in digests.items() if told != record[TRACKS].get(one)}
+    names = record.get(OWN, {}).get("columns", {})
+    for one in edited_tracks.only_lost_numbers(farm, driven, tracks, names) if driven else ():
+        del driven[one]
     marks = {
         one: f"{written[one]} {now[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
         for one in fields[FIELD_ID]
@@ -132,7 +135,6 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     if not anyway:
         _refuse_double(farm, overview, marks, record, fields)
     standing = obstacles if record[DETAILS] else None
-    names = record.get(OWN, {}).get("columns", {})
     return Edits(marks, fields, standing, names, tracks, driven)
 
 

@@ -186,7 +186,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             stacklevel=3,
         )
         frame = frame[~absent]
-    _tell_lost_columns(of, frame, path)
+    tell_lost_columns(of, frame, path)
     if of is schema.SEGMENTS and (frame.count_geometries() > 1).any():
         warnings.warn(
             f"{path.name}: layer 'segments' has rows of several lines: each line counts as the "
@@ -199,14 +199,17 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     return schema.conform(of, frame, extras=True)
 
 
-def _tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> None:
-    """Tell which columns by which rows are known another program dropped or renamed."""
+def tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> None:
+    """Tell which columns by which rows are known another program dropped, renamed or emptied."""
     words = {
         schema.OBSTACLES.name: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
         schema.TRACKS.name: ("track_no",),
-        schema.SEGMENTS.name: ("track_no",),
+        schema.SEGMENTS.name: ("track_no", "segment_no"),
     }
     lost = [name for name in words.get(of.name, ()) if name not in frame.columns]
+    if of is schema.SEGMENTS and not lost and frame["track_no"].notna().any():
+        # Rows that were drawn have neither number.
+        lost += ["segment_no"] if frame["segment_no"].isna().all() else []
     if lost:
         warnings.warn(
             f"{path.name}: layer {of.name!r} has no column {', '.join(lost)} any more: there each "

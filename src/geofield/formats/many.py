@@ -21,6 +21,7 @@ from geofield.formats.antimeridian import seamless
 from geofield.formats.names import safe_name, unlike
 from geofield.formats.origin import imagery_day
 from geofield.model import Dataset, Provenance
+from geofield.model.lost_numbers import numbered
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -155,6 +156,9 @@ def _one_of(dataset: Dataset, tables: Mapping[str, Any], row: Mapping[str, Any])
         said = [each for each in (FIELD_ID, UTM_EPSG) if each not in layer.column_names]
         mine = table[table[FIELD_ID] == field_id].drop(columns=said, errors="ignore")
         found[name] = mine.to_crs(crs).reset_index(drop=True)
+    if schema.TRACKS.name in found and schema.SEGMENTS.name in found:
+        segments = numbered(found[schema.TRACKS.name], found[schema.SEGMENTS.name])
+        found[schema.SEGMENTS.name] = segments
     label = row["name"] if isinstance(row["name"], str) else str(field_id)
     source = dataset.provenance.source
     return Dataset(found, crs, label, Provenance(dataset.provenance.software, source))

@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import shapely
 from numpy.typing import NDArray
+from pyproj import CRS
 
 from geofield import schema
+from geofield.crs import ground_lengths_m
 from geofield.model.tracks_written import SAME_M, TracksWritten, track_numbers
 
 if TYPE_CHECKING:
@@ -33,8 +36,6 @@ def known_by_shape(
     rows : GeoDataFrame
     written : TracksWritten
     """
-    import pandas as pd
-
     numbers, shapes = np.array(track_numbers(rows)), rows.geometry.to_numpy()
     most = [len(written.segments.get(no, ())) if of is schema.TRACKS else 1 for no in numbers]
     lost = shapely.get_num_geometries(shapes) > np.maximum(most, 1)
@@ -64,6 +65,45 @@ def known_by_shape(
         {name: rows[name].array[row[first]] for name in names},
     )
     return schema.conform(of, pd.concat([rows[~lost], found]), extras=True)
+
+
+def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Segments that all have numbers and lengths: of the track that they are of, else new ones.
+
+    For files that keep no record of what was written: the tracks, with their numbers, are it.
+
+    Parameters
+    ----------
+    tracks, segments : GeoDataFrame
+        Layers `tracks` and `segments` of one field.
+    """
+    if not segments[["track_no", "segment_no"]].isna().any(axis=None):
+        return segments
+    known = tracks[tracks["track_no"].notna()]
+    lines, row = shapely.get_parts(known.geometry.to_numpy(), return_index=True)
+    middle = (
+        shapely.centroid(shapely.multilinestrings(lines)) if len(lines) else shapely.Point(0, 0)
+    )
+    written = TracksWritten.of(
+        known["track_no"].to_numpy()[row],
+        lines,
+        heading_deg=0.0,
+        spacing_m=0.0,
+        middle=(middle.x, middle.y),
+    )
+    rows = known_by_shape(schema.SEGMENTS, segments, written)
+    numbers = np.array(track_numbers(rows))
+    drawn = numbers < 1
+    numbers[drawn] = max([*numbers, *written.segments, 0]) + 1 + np.arange(drawn.sum())
+    rows = rows.assign(track_no=pd.array(numbers, dtype="Int64"))
+    lost = rows["segment_no"].isna()
+    of_lost = rows["track_no"].isin(rows["track_no"][lost])
+    count = rows.groupby("track_no").cumcount() + 1
+    length = ground_lengths_m(rows.geometry.to_numpy(), CRS(rows.crs))
+    return rows.assign(
+        segment_no=rows["segment_no"].where(~of_lost, count),
+        length_m=rows["length_m"].where(~lost, length),
+    )
 
 
 def _numbered(
