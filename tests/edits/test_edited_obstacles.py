@@ -362,6 +362,26 @@ def test_a_row_copied_in_place_is_no_further_obstacle(folder: Path) -> None:
     assert "Rows copied in place" not in geofield("tracks", file, "-o", file)
 
 
+def test_numbers_that_none_can_have(folder: Path) -> None:
+    """They stood, as numbers that a person gave, and what was detected became added."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+
+    def numbered(table: Frame) -> Frame:
+        numbers = table["obstacle_no"].replace({1: -5, 2: 10**12}).astype("Int64")
+        table["obstacle_no"] = numbers.mask(numbers == 3)
+        drawn = table[at(table, -5)].assign(obstacle_no=0)
+        return pd.concat([table, drawn.set_geometry(drawn.translate(15), crs=table.crs)])
+
+    rewritten(file, "obstacles", numbered)
+    told = geofield("tracks", file, "-o", file)
+    assert "obstacle_no -5, 0, 1000000000000 is no whole number from 1 to" in told
+    after = rows(plan_in(folder))
+    assert after.index.tolist() == [*before.index, before.index.max() + 1]
+    assert after["status"][before.index].equals(before["status"])
+    assert after.geometry[before.index].geom_equals_exact(before.geometry, 1e-3).all()
+
+
 def test_points_and_lines_drawn_among_the_obstacles_are_avoided(folder: Path) -> None:
     """Of another program, whose table takes any shape: none is lost, each has a width."""
     file = folder / "out/field.gpkg"

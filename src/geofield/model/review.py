@@ -23,6 +23,7 @@ from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.errors import FormatWarning, ObstacleError
 from geofield.grid import Grid
 from geofield.model.copies import without_copies
+from geofield.model.obstacle_numbers import lost_numbers, possible_numbers
 from geofield.model.obstacles import (
     FloatArray,
     floats,
@@ -89,7 +90,7 @@ def reconcile(
     record = (from_earlier_version(table) if written is None else written).by_number
     table = without_copies(table, record)
     rows = _Rows.of(table)
-    _find_lost_numbers(rows, list(record.values()))
+    _fill_lost_numbers(rows, list(record.values()))
     known, before = _known(rows, record)
     _spell(rows, known, before)
     _refuse_sizes(rows)
@@ -170,7 +171,7 @@ def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     names = [each.name for each in schema.OBSTACLES.columns if each.type in ("int", "float")]
     if not all(name in kinds and kinds[name].kind in "if" for name in names):
         table = schema.conform(schema.OBSTACLES, table, extras=True)
-    return widened(table)
+    return widened(possible_numbers(table))
 
 
 def _repaired(obstacles: gpd.GeoDataFrame, crossed: NDArray[np.bool_]) -> gpd.GeoDataFrame:
@@ -192,29 +193,11 @@ def _plain_polygons(geometry: Any) -> NDArray[np.object_]:
     return np.asarray(shapely.orient_polygons(shapes), dtype=object)
 
 
-def _find_lost_numbers(rows: _Rows, record: list[WrittenRow]) -> None:
-    """Numbers and radii of a table that lost the column of its numbers in another program.
-
-    Its rows are known by where they stand: without that they all were new, and what was deleted
-    would be found again. Some must stand just as they were written, or it is a table drawn anew.
-    """
-    if not len(rows) or not record or not np.isnan(rows.at["obstacle_no"]).all():
-        return
-    shapes = shapes_of_plain([row.shape for row in record])
-    of = matches(rows.shapes, shapes)
-    same = of >= 0
-    same[same] = same_shapes(rows.shapes[same], shapes[of[same]])
-    if not same.any():
-        return
-    taken: set[int] = set()
-    # Of several rows on one place the first that is as it was written; others were drawn.
-    for row in np.argsort(~same, kind="stable").tolist():
-        if of[row] < 0 or of[row] in taken:
-            continue
-        taken.add(of[row])
-        one = record[of[row]]
+def _fill_lost_numbers(rows: _Rows, record: list[WrittenRow]) -> None:
+    """Numbers, and with them radii, of rows that lost their number in another program."""
+    for row, (one, same) in lost_numbers(rows.shapes, rows.at["obstacle_no"], record).items():
         rows.at["obstacle_no"][row] = one.obstacle_no
-        if np.isnan(rows.at["radius_m"][row]) and same[row] and one.radius_m is not None:
+        if np.isnan(rows.at["radius_m"][row]) and same and one.radius_m is not None:
             rows.at["radius_m"][row] = one.radius_m
 
 
