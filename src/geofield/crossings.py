@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 import shapely
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import FormatError
@@ -19,6 +20,8 @@ from geofield.errors import FormatError
 _MOST_CROSSINGS = 2000
 #: So often the same ground may be gone over.
 _MOST_TIMES = 20
+#: Parts that together have less than this share of the area are lost in a repair.
+_SLIVER = 0.01
 #: So many pairs of sides are looked at in one go.
 _PAIRS = 500_000
 
@@ -43,6 +46,27 @@ def mended(
             hint="Its vertices are in disorder: draw it anew, or ask for a sound file.",
         )
     return shapely.make_valid(polygon, method=method)
+
+
+def largest_part(repaired: BaseGeometry) -> tuple[BaseGeometry, float]:
+    """Of a mended outline the part that has nearly all of the area, and the area of the others.
+
+    The outline as it is, and no area, where none has.
+    """
+    parts = [part for part in shapely.get_parts(repaired) if isinstance(part, Polygon)]
+    area = sum(part.area for part in parts)
+    largest = max(parts, key=lambda part: part.area, default=repaired)
+    kept = largest.area > 0.0 and largest.area >= (1.0 - _SLIVER) * area
+    return (largest, area - largest.area) if kept else (repaired, 0.0)
+
+
+def in_words(kept_m2: float, left_m2: float) -> str:
+    """How much of a mended outline is kept, and how much is left out."""
+
+    def size(area_m2: float) -> str:
+        return f"{area_m2:.1f} m2" if area_m2 < 100.0 else f"{area_m2 / 10_000.0:.2f} ha"
+
+    return f"{size(kept_m2)} kept, {size(left_m2)} left out"
 
 
 def _is_tangle(polygon: BaseGeometry) -> bool:

@@ -104,6 +104,12 @@ def test_an_invalid_parcel_is_repaired_and_flagged():
     assert field.polygon.is_valid
     assert field.quality is not None
     assert not field.quality.trusted
+    (told,) = field.quality.reasons
+    assert told.endswith(f"repaired: {field.area_ha:.2f} ha kept, 0.51 ha left out")
+    # A point says which of its parts is meant.
+    smaller = field_from_boundary(table, lat=50.0, lon=9.9992)
+    assert smaller.area_ha == pytest.approx(0.51, abs=0.005)
+    assert field_from_boundary(table).area_ha == pytest.approx(field.area_ha)
 
 
 def test_holes_and_parts_are_kept():

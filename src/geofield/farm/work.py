@@ -252,7 +252,10 @@ def parcel_of(place: Place) -> Field:
     """
     source = parse_crs(place.crs)
     metric = metric_crs(place.lon, place.lat, source)
-    polygon, _ = clean_outline(reproject(shapely.from_wkb(place.outline), source, metric))
+    outline = shapely.force_2d(reproject(shapely.from_wkb(place.outline), source, metric))
+    polygon, repaired = clean_outline(outline)
+    for words in repaired:
+        warnings.warn(words, FieldWarning, stacklevel=2)
     return Field(
         polygon, metric, name=place.name, field_id=place.field_id, method="boundary", own=place.own
     )

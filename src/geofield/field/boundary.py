@@ -9,8 +9,8 @@ import shapely
 from pyproj import CRS
 from shapely import Polygon
 
-from geofield.crossings import mended
-from geofield.crs import LONLAT, metric_crs, reproject, transformer
+from geofield.crossings import in_words, mended
+from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transformer
 from geofield.errors import CRSError, FieldError
 from geofield.model import Field, FieldQuality
 
@@ -72,10 +72,11 @@ def field_from_boundary(
         chosen = _around(rows, own, lat, lon)
     else:
         chosen = _only(rows)
-    if lat is None or lon is None:
-        inside = chosen.geometry.iloc[0].representative_point()
-        lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
-    return _field(chosen, own, lat, lon)
+    if lat is not None and lon is not None:
+        return _field(chosen, own, lat, lon, pointed=True)
+    inside = chosen.geometry.iloc[0].representative_point()
+    lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
+    return _field(chosen, own, lat, lon, pointed=False)
 
 
 def _outlines(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -149,15 +150,13 @@ def _smallest(chosen: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     return chosen.iloc[[int(np.argmin(shapely.area(chosen.geometry.to_numpy())))]]
 
 
-def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
+def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: bool) -> Field:
     target = metric_crs(lon, lat, own=own)
     polygon = shapely.force_2d(row.geometry.iloc[0])
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
-        why = shapely.is_valid_reason(polygon)
-        parts = shapely.get_parts(mended(polygon))
-        polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
-        reasons = (f"the boundary was not valid ({why}) and was repaired",)
+        point = shapely.Point(transformer(LONLAT, own).transform(lon, lat)) if pointed else None
+        polygon, reasons = _repaired(polygon, point, own, target)
     # Long sides bend in another projection: points between keep them where they are.
     if own != target and own.is_geographic:
         polygon = shapely.segmentize(polygon, 0.001)
@@ -169,6 +168,21 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> Field:
             break
     quality = FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons)
     return Field(polygon, target, name=label, method="boundary", quality=quality)
+
+
+def _repaired(
+    polygon: Polygon, point: shapely.Point | None, own: CRS, metric: CRS
+) -> tuple[Polygon, tuple[str, ...]]:
+    """Of the parts of an outline that crosses itself the one of the point, or else the largest."""
+    parts = np.array([p for p in shapely.get_parts(mended(polygon)) if isinstance(p, Polygon)])
+    if not len(parts):
+        raise FieldError("The boundary has no area.", hint="Draw the outline anew.")
+    areas = ground_areas_m2(reproject(parts, own, metric), metric)
+    here = np.flatnonzero(shapely.intersects(parts, point)) if point is not None else []
+    at = int(here[0]) if len(here) else int(np.argmax(areas))
+    sizes = in_words(areas[at], areas.sum() - areas[at])
+    why = shapely.is_valid_reason(polygon)
+    return parts[at], (f"the boundary was not valid ({why}) and was repaired: {sizes}",)
 
 
 def _named(rows: gpd.GeoDataFrame, name: str) -> np.ndarray:

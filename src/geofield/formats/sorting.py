@@ -20,7 +20,7 @@ import pandas as pd
 import shapely
 from pyproj import CRS
 
-from geofield.crossings import mended
+from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
@@ -118,7 +118,8 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
     points = [part for part in parts if part.kind == "Point"]
     notes += [part.told(len(part.frame), "taken as obstacles") for part in points]
     if outlines:
-        tables["field"] = field_table(_repaired(_joined(outlines), path), metric, path)
+        whole = _repaired(_joined(outlines), path, slivers=False)
+        tables["field"] = field_table(whole, metric, path)
     standing = [*(part.frame for part in points), *inside]
     if standing and "obstacles" not in tables:
         tables["obstacles"] = obstacle_table(_repaired(_joined(standing), path), metric, path)
@@ -220,18 +221,25 @@ def _inside_largest(frame: gpd.GeoDataFrame) -> Any:
     return inside
 
 
-def _repaired(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
+def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> gpd.GeoDataFrame:
+    """The table with valid polygons, of several parts where they cross themselves.
+
+    Without `slivers` what one part has nearly all of the area of is that part.
+    """
     polygons = frame.geom_type == "Polygon"
     bad = polygons & ~frame.geometry.is_valid
     if not bad.any():
         return frame
+    shapes = [mended(shape) for shape in frame.geometry[bad]]
+    words = f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired"
+    if not slivers:
+        shapes, left_m2 = zip(*map(largest_part, shapes), strict=True)
+        whole = all(isinstance(shape, shapely.Polygon) for shape in shapes)
+        kept = f" ({in_words(sum(shape.area for shape in shapes), sum(left_m2))})"
+        words += kept if whole else " into parts"
     sound = frame.copy()
-    sound.loc[bad, sound.geometry.name] = frame.geometry[bad].apply(mended)
-    warnings.warn(
-        f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired; look at them.",
-        FormatWarning,
-        stacklevel=5,
-    )
+    sound.loc[bad, sound.geometry.name] = np.array(shapes, dtype=object)
+    warnings.warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
     sound = sound.explode(index_parts=False, ignore_index=True)
     return sound[sound.geom_type.isin(["Polygon", "Point"])]
 

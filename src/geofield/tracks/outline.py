@@ -10,12 +10,9 @@ from pyproj import CRS
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from geofield.crossings import mended
+from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import authority_name, is_metric, parse_crs
 from geofield.errors import CRSError, TrackError
-
-_SLIVER = 0.01
-"""Parts that together have less than this share of the area are lost in a repair."""
 
 
 def metric(crs: Any) -> CRS:
@@ -66,8 +63,8 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     _refuse_degrees(polygon)
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon)
-        polygon = _largest_part(mended(polygon, "structure"), reason)
-        notes.append(f"The field's outline was repaired ({reason}).")
+        polygon, sizes = _sound(polygon, reason)
+        notes.append(f"The field's outline was repaired ({reason}): {sizes}.")
     parts = [part for part in shapely.get_parts(polygon) if part.area > 0.0]
     if not parts:
         raise TrackError("The field's outline has no area.")
@@ -79,15 +76,18 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     return shapely.orient_polygons(parts[0]), tuple(notes)
 
 
-def _largest_part(repaired: BaseGeometry, reason: str) -> Polygon:
-    parts = [part for part in shapely.get_parts(repaired) if isinstance(part, Polygon)]
-    areas = [part.area for part in parts]
-    if not parts or max(areas) < (1.0 - _SLIVER) * sum(areas):
+def _sound(polygon: BaseGeometry, reason: str) -> tuple[BaseGeometry, str]:
+    """What an outline that crosses itself was meant to be, and how much is kept, in words."""
+    repaired, left_m2 = largest_part(mended(polygon, "structure"))
+    if not isinstance(repaired, Polygon):
+        areas = sorted(shapely.area(shapely.get_parts(repaired)), reverse=True)
+        sizes = ", ".join(f"{area / 10_000.0:.2f}" for area in areas[:5] if area)
         raise TrackError(
-            f"The field's outline is not valid and cannot be repaired without a guess: {reason}.",
+            f"The field's outline is not valid and cannot be repaired without a guess: {reason}."
+            + (f" Its parts have {sizes} ha." if sizes else ""),
             hint="Repair it by hand, or with Fix geometries in QGIS.",
         )
-    return parts[int(np.argmax(areas))]
+    return repaired, in_words(repaired.area, left_m2)
 
 
 def _refuse_degrees(polygon: BaseGeometry) -> None:
