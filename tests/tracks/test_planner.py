@@ -355,6 +355,7 @@ def test_headland() -> None:
     assert tracks.statistics.coverage_percent > 98.0
 
 
+@pytest.mark.filterwarnings("ignore:Between passes:geofield.errors.TrackWarning")
 @pytest.mark.parametrize("last_strip", ["leave", "shift", "spread"])
 @pytest.mark.parametrize("spacing_m", [5.0, 7.0])
 def test_a_machine_whose_passes_overlap_stays_within_the_border(

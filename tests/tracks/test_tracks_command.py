@@ -493,6 +493,7 @@ def test_what_a_person_keeps_in_a_plan_comes_along_or_is_refused(tmp_path: Path)
     assert plan.read_bytes() == before
 
 
+@pytest.mark.filterwarnings("ignore:Between passes:geofield.errors.TrackWarning")
 @pytest.mark.parametrize(
     ("how", "covered", "overlap"),
     [
@@ -515,6 +516,21 @@ def test_what_is_covered_is_what_the_machine_works(
     assert read is not None
     assert read.statistics.coverage_percent == pytest.approx(covered, abs=0.2)
     assert read.statistics.overlap_percent == pytest.approx(overlap, abs=0.2)
+    between = {"4": "4.00", "-10": "10.00"}.get(how[-1])
+    told = [note for note in read.notes if "stay unworked" in note]
+    assert len(told) == (between is not None)
+    assert not told or told[0].startswith(f"Between passes {between} m stay unworked")
+
+
+@pytest.mark.filterwarnings("ignore:Of 10 tracks:geofield.errors.TrackWarning")
+def test_more_tracks_to_skip_than_there_are_is_told(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    arguments = (tmp_path / "parcel.gpkg", "--spacing", "8", "--direction", "90", "--route", "skip")
+    for skip, told in (("100", True), ("9", True), ("8", False)):
+        plan = tmp_path / f"{skip}.gpkg"
+        run(*arguments, "--skip", skip, "-o", plan)
+        notes = gf.read_plan(plan).tracks.notes
+        assert any(f"Of 10 tracks {skip} cannot be left out" in note for note in notes) == told
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,9 @@ from geofield.tracks.shapes import Edges
 LastStrip = Literal["overrun", "leave", "shift", "spread"]
 LAST_STRIPS: tuple[str, ...] = get_args(LastStrip)
 
+#: Ground between passes that is worth a word.
+_GAP_M = 0.01
+
 
 @dataclass(frozen=True, slots=True)
 class Strips:
@@ -40,6 +43,14 @@ class Strips:
     def overlap_m(self) -> float:
         """Of neighbouring passes; below 0 a gap between them."""
         return 2.0 * self.half_m - self.spacing_m
+
+    def gap_note(self, spacing_m: float) -> tuple[str, ...]:
+        """That passes so far apart leave ground between them, where they do."""
+        gap_m = spacing_m - 2.0 * self.half_m
+        if gap_m < _GAP_M:
+            return ()
+        words = f"Between passes {gap_m:.2f} m stay unworked"
+        return (f"{words}: the machine is {2.0 * self.half_m:g} m wide, the spacing larger.",)
 
     @property
     def first_m(self) -> float:

@@ -190,6 +190,8 @@ def plan_tracks(
     told: tuple[str, ...] = (
         () if len(pieces.track) or said.drawn else (_nothing_left(min_segment_m),)
     )
+    if len(positions) > 1:
+        told += strips.gap_note(spacing_m)
     if said.edits.apart:
         told += (_other_layout(len(said.edits.apart)),)
     optional: dict[str, Any] = {}
