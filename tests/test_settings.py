@@ -156,6 +156,20 @@ def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:
     assert load_settings(path).tracks.spacing_m == 3.0
 
 
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"tracks": {"spacing": 6}}, "tracks.spacing: .*Did you mean 'spacing_m'"),
+        ({"trakcs": {"spacing_m": 6}}, "trakcs: .*Did you mean 'tracks'"),
+        ({"spacing_m": 6}, "spacing_m: .*It belongs to tracks"),
+        ({"tracks": {"spacing_m": -6}}, "tracks.spacing_m: .*greater than 0"),
+    ],
+)
+def test_settings_of_python_are_checked_in_words(said: dict[str, Any], message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        Settings(**said)
+
+
 def test_any_setting_by_its_name() -> None:
     names = [name for each in SECTIONS for name in type(getattr(Settings(), each)).model_fields]
     assert len(set(names)) == len(names)

@@ -53,6 +53,18 @@ def test_a_swapped_parcel(parcels: Path, tmp_path: Path) -> None:
     assert "swapped" in refused(*run(tmp_path / "out", "--boundary", parcels))
 
 
+def test_a_swapped_parcel_without_a_point(parcels: Path, tmp_path: Path) -> None:
+    """It told of a point that nobody had given, and how to give it otherwise."""
+    where = (SAMPLE / "field_1.tif", "--boundary", parcels)
+    told = refused("run", *where, "--spacing", 6, "--out", tmp_path / "out")
+    assert "boundary mine lies outside the picture. Its latitude and longitude look sw" in told
+    assert "--lat" not in told
+    table = gpd.read_file(parcels).translate(0, 80)
+    gpd.GeoDataFrame(geometry=table).to_file(parcels)
+    told = refused("field", *where, "-o", tmp_path / "plan.gpkg")
+    assert "they look swapped with longitudes. Exchange them in the file" in told
+
+
 def test_a_swapped_parcel_by_name(parcels: Path, tmp_path: Path) -> None:
     told = refused(*run(tmp_path / "out", "--boundary", parcels, "--boundary-name", "mine"))
     assert "mine lies outside the picture" in told

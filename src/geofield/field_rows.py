@@ -14,7 +14,7 @@ from geofield.crs import ground_areas_m2
 from geofield.errors import FormatError
 from geofield.model.dataset import Dataset
 from geofield.model.evidence import quality_from_json
-from geofield.model.field import Alternative, Field
+from geofield.model.field import Alternative, Field, refuse_no_areas
 from geofield.model.rows import Rows
 
 if TYPE_CHECKING:
@@ -79,9 +79,10 @@ def _alternatives(rows: gpd.GeoDataFrame | None) -> tuple[Alternative, ...]:
 def _single_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     """The one polygon of a geometry: editors like to save multi-polygons."""
     parts = shapely.get_parts(geometry) if geometry is not None else []
-    if len(parts) != 1 or not isinstance(parts[0], shapely.Polygon):
+    if len(parts) != 1:
         raise FormatError(
             f"The field's outline has {len(parts)} parts; a plan needs one polygon.",
             hint="Delete or merge parts in the field layer.",
         )
-    return parts[0]
+    refuse_no_areas(parts)
+    return shapely.Polygon(parts[0])

@@ -47,6 +47,8 @@ def open_scene(
     except PointOutsideError:
         shown = None if outline is None else _point_shown(path, outline, settings)
         if shown is None:
+            if outline is not None and outline.method == "boundary":
+                _refuse_whole(outline, grid_of(path, settings))
             raise
         scene = _read(path, *shown, settings, outline)
     tell_guesses(scene)
@@ -55,7 +57,11 @@ def open_scene(
 
 def refuse_elsewhere(boundary: Field, scene: Scene) -> None:
     """Refuse an outline that the picture does not show: often its coordinates are swapped."""
-    frame = shapely.Polygon(scene.grid.corners_lonlat())
+    _refuse_whole(boundary, scene.grid)
+
+
+def _refuse_whole(boundary: Field, grid: Grid) -> None:
+    frame = shapely.Polygon(grid.corners_lonlat())
     outline = boundary.polygon_lonlat
     if frame.intersects(outline):
         return

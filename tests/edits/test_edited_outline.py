@@ -10,6 +10,8 @@ from pathlib import Path
 import geopandas as gpd
 import numpy as np
 import pandas as pd
+import pytest
+import shapely
 from changed_plans import Frame, geofield, plan_in, rewritten, run, shrunk
 from shapely.affinity import translate
 
@@ -84,6 +86,36 @@ def test_what_was_thought_of_an_outline_that_was_moved_is_not_told_again(folder:
     assert row[["certainty", "doubts"]].isna().all()
     report = json.loads((folder / "x/report.json").read_text())
     assert report["field"]["certainty"] is None
+
+
+@pytest.mark.parametrize(("kind", "told", "found"), [
+    ("emptied", "this file has 0. Draw the outline in its layer `field`", "no row has an outline"),
+    ("cut", "this file has 2. Merge or delete rows of its layer", "has several rows of one field"),
+    ("a line", "is a LineString; a plan needs a polygon. Draw it as", "is a LineString"),
+])  # fmt: skip
+def test_an_outline_that_is_none_is_told(folder: Path, kind: str, told: str, found: str) -> None:
+    """Of no place, of --id-column and of one part too many was told, or it was a traceback."""
+    file = folder / "out/field.gpkg"
+
+    def changed(table: Frame) -> Frame:
+        if kind == "emptied":
+            return table.iloc[:0]
+        shape = table.geometry.iloc[0]
+        if kind == "a line":
+            return table.set_geometry([shapely.LineString(shape.exterior.coords)], crs=table.crs)
+        x0, y0, x1, y1 = shape.bounds
+        half = shapely.box(x0, y0, (x0 + x1) / 2, y1)
+        parts = [shape & half, shape - half]
+        return pd.concat([table, table]).set_geometry(parts, crs=table.crs)
+
+    rewritten(file, "field", changed)
+    done = run_geofield("tracks", file, "-o", file)
+    assert done.returncode == 1
+    assert told in " ".join(done.stderr.split())
+    assert found in run_geofield("validate", file).stderr
+    done = run_geofield("export", file, "-f", "isoxml", "--out", folder / "x")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
 
 
 def test_an_empty_column_stays(folder: Path, made: SimulatedField) -> None:

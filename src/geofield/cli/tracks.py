@@ -159,10 +159,13 @@ def _own_plan(file: Path) -> Plan | None:
     from geofield.plan import read_plan
 
     layer = schema.FIELD.name
-    if file.suffix.lower() != ".gpkg" or layer not in layer_names(file):
+    if file.suffix.lower() != ".gpkg" or not (is_own(file) or layer in layer_names(file)):
         return None
-    if pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"] != 1:
-        return None
+    if layer in layer_names(file):
+        ids = pyogrio.read_dataframe(file, layer=layer, columns=["field_id"], read_geometry=False)
+        # An outline cut into rows, or deleted, is a plan's that says what to do.
+        if len(ids) != 1 and not (is_own(file) and len(ids.drop_duplicates()) < 2):
+            return None
     plan = read_plan(file)
     if schema.TRACKS.name in layer_names(file) and not is_own(file):
         say_note(

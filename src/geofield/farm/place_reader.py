@@ -277,7 +277,8 @@ def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
     first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
     swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
     if swapped.all():
-        hint = "Latitude and longitude look swapped: exchange the columns' names."
+        how = "in the file (`ogr2ogr -swapXY`)" if raw.geometry else "the columns' names"
+        hint = f"Latitude and longitude look swapped: exchange them {how}."
     elif len(wrong) < len(lat):
         hint = "Other rows are degrees: these may be in another CRS. Bring all rows into one."
     else:
@@ -310,11 +311,12 @@ def _names(
         if double:
             first = double[0]
             rows = [i + 1 for i, one in enumerate(column.to_pylist()) if one == first]
+            cut = "If they are parts of one field, merge them (QGIS: Merge Selected Features). "
             raise FormatError(
                 f"{raw.name}: column {id_name!r} holds {len(double)} ids more than once, such as "
                 f"{first!r} in rows {', '.join(map(str, rows[:5]))}.",
-                hint="Give each place an id of its own, or name another column "
-                "(`geofield batch --id-column`).",
+                hint=("" if raw.geometry is None else cut) + "Else give each place an id of its "
+                "own, or name another column (`geofield batch --id-column`).",
             )
         ids = column.take(kept).to_pylist()
     elif None not in names and len(set(names)) == len(names) > 1 and not part.any():

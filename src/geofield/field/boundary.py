@@ -17,6 +17,7 @@ from geofield.model import Field, FieldQuality
 if TYPE_CHECKING:
     import geopandas as gpd
 
+_EXCHANGE = "Exchange them in the file (`ogr2ogr -swapXY`)."
 #: Columns that name a parcel, in the order they are looked for.
 _NAME_COLUMNS = ("name", "Name", "NAME", "field_name", "field_id", "id", "fid")
 
@@ -65,6 +66,13 @@ def field_from_boundary(
         raise FieldError(
             "The boundary file holds no polygon and no closed line.",
             hint="Close the outline where it begins (QGIS: Lines to polygons).",
+        )
+    _, south, _, north = rows.total_bounds
+    if own.is_geographic and max(-south, north) > 90.0:
+        raise FieldError(
+            f"The boundary file has latitudes from {south:.4f} to {north:.4f}: they look swapped "
+            "with longitudes.",
+            hint=_EXCHANGE,
         )
     if name is not None:
         chosen = _of_name(rows, own, name, lat, lon)
@@ -122,8 +130,7 @@ def _around(rows: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> gpd.Geo
         raise FieldError(
             f"None of the {len(rows)} polygons in the boundary file {what}, but one does with "
             "latitude and longitude swapped.",
-            hint="Exchange them in the file (`ogr2ogr -swapXY`), or in --lat and --lon where "
-            "the point is wrong.",
+            hint=f"{_EXCHANGE[:-1]}, or in --lat and --lon where the point is wrong.",
         )
     raise _none_of(rows, what)
 
@@ -178,8 +185,9 @@ def _repaired(
     if not len(parts):
         raise FieldError("The boundary has no area.", hint="Draw the outline anew.")
     areas = ground_areas_m2(reproject(parts, own, metric), metric)
-    here = np.flatnonzero(shapely.intersects(parts, point)) if point is not None else []
-    at = int(here[0]) if len(here) else int(np.argmax(areas))
+    at = int(np.argmax(areas))
+    if point is not None and shapely.intersects(parts, point).any():
+        at = int(np.argmax(shapely.intersects(parts, point)))
     sizes = in_words(areas[at], areas.sum() - areas[at])
     why = shapely.is_valid_reason(polygon)
     return parts[at], (f"the boundary was not valid ({why}) and was repaired: {sizes}",)

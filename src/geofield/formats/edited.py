@@ -21,6 +21,7 @@ from geofield.errors import TrackWarning
 from geofield.formats.many import Joined
 from geofield.model import Dataset, Field
 from geofield.model.evidence import Evidence
+from geofield.model.field import refuse_no_areas
 from geofield.model.frame import along_frame, with_outside
 from geofield.model.review import reconcile
 from geofield.model.tracks import Tracks
@@ -44,6 +45,8 @@ def made_whole(dataset: Dataset) -> Dataset:
     ------
     ObstacleError
         When a radius or safety margin is negative or infinite.
+    FormatError
+        When the outline is a line.
     """
     if isinstance(dataset, Joined):
         return dataset
@@ -52,6 +55,7 @@ def made_whole(dataset: Dataset) -> Dataset:
         obstacles = tables[schema.OBSTACLES.name]
         tables[schema.OBSTACLES.name] = _understood(obstacles, dataset)
     if dataset.has(schema.FIELD.name):
+        refuse_no_areas(tables[schema.FIELD.name].geometry.dropna())
         field = _measured(_named(tables[schema.FIELD.name], dataset), dataset)
         tables[schema.FIELD.name] = _judged(field, dataset)
     return _driven(replace(dataset, tables=tables))

@@ -233,7 +233,8 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
     shapes = [mended(shape) for shape in frame.geometry[bad]]
     words = f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired"
     if not slivers:
-        shapes, left_m2 = zip(*map(largest_part, shapes), strict=True)
+        found = [largest_part(shape) for shape in shapes]
+        shapes, left_m2 = [shape for shape, _ in found], [left for _, left in found]
         whole = all(isinstance(shape, shapely.Polygon) for shape in shapes)
         kept = f" ({in_words(sum(shape.area for shape in shapes), sum(left_m2))})"
         words += kept if whole else " into parts"

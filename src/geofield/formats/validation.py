@@ -14,7 +14,13 @@ import shapely
 
 from geofield import schema
 from geofield.crs import ground_lengths_m
-from geofield.errors import EmptyFileError, FormatWarning, GeofieldError, SeveralFieldsError
+from geofield.errors import (
+    EmptyFileError,
+    FormatError,
+    FormatWarning,
+    GeofieldError,
+    SeveralFieldsError,
+)
 from geofield.formats.clear_way import driven_through, leaving
 from geofield.formats.format import Format
 from geofield.formats.importing import read_dataset
@@ -23,6 +29,7 @@ from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
+from geofield.model.field import refuse_no_areas
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
 from geofield.model.resized import widened
 from geofield.model.searched import unsearched
@@ -135,7 +142,13 @@ def _of_project(project: Path) -> Finding:
 def _fields(dataset: Dataset, place: Path) -> list[Dataset]:
     """The fields of a dataset, each by itself."""
     fields = apart(dataset)
-    count = len(fields[0].table(schema.FIELD.name))
+    ids = fields[0].table(schema.FIELD.name)["field_id"]
+    count = len(ids)
+    if ids.dropna().duplicated().any():
+        raise FormatError(
+            f"{place.name} has several rows of one field.",
+            hint="Merge or delete rows of its layer `field`.",
+        )
     if count > 1:
         raise SeveralFieldsError(f"{place.name} holds {count} fields.")
     return fields
@@ -149,14 +162,23 @@ def check_dataset(dataset: Dataset, *, with_segments: bool = True) -> Iterator[F
     for name, table in dataset.tables.items():
         layer = schema.layer(name)
         yield from _check_rows(layer, table)
-    if schema.FIELD.name in dataset.tables and not len(dataset.table(schema.FIELD.name)):
-        yield Finding("error", schema.FIELD.name, "no row has an outline")
+    if schema.FIELD.name in dataset.tables:
+        yield from _check_outlines(dataset.table(schema.FIELD.name))
     if dataset.has(schema.OBSTACLES.name):
         yield from _check_areas(dataset.table(schema.OBSTACLES.name))
     if with_segments:
         yield from _check_obstacles(dataset)
         yield from _check_searched(dataset)
         yield from _check_tracks(dataset)
+
+
+def _check_outlines(fields: gpd.GeoDataFrame) -> Iterator[Finding]:
+    if not len(fields):
+        yield Finding("error", schema.FIELD.name, "no row has an outline")
+    try:
+        refuse_no_areas(fields.geometry.dropna())
+    except GeofieldError as error:
+        yield Finding("error", schema.FIELD.name, str(error))
 
 
 def _check_rows(layer: schema.Layer, table: gpd.GeoDataFrame) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from geofield.crs import (
     LONLAT,
@@ -21,10 +22,25 @@ from geofield.crs import (
     reproject,
     transformer,
 )
-from geofield.errors import CRSError, FieldError
+from geofield.errors import CRSError, FieldError, FormatError
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, words
 from geofield.model.place import place_id
+
+
+def refuse_no_areas(outlines: Iterable[Any]) -> None:
+    """Refuse points and lines that stand where an outline does.
+
+    Raises
+    ------
+    FormatError
+    """
+    for each in outlines:
+        if not isinstance(each, Polygon | MultiPolygon):
+            raise FormatError(
+                f"The field's outline is a {each.geom_type}; a plan needs a polygon.",
+                hint="Draw it as a polygon in the layer `field` (QGIS: Lines to polygons).",
+            )
 
 
 @dataclass(frozen=True, slots=True)

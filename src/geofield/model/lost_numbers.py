@@ -81,15 +81,13 @@ def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDat
         return segments
     known = tracks[tracks["track_no"].notna()]
     lines, row = shapely.get_parts(known.geometry.to_numpy(), return_index=True)
-    middle = (
-        shapely.centroid(shapely.multilinestrings(lines)) if len(lines) else shapely.Point(0, 0)
-    )
+    x, y = shapely.get_coordinates(lines).mean(axis=0) if len(lines) else (0.0, 0.0)
     written = TracksWritten.of(
         known["track_no"].to_numpy()[row],
         lines,
         heading_deg=0.0,
         spacing_m=0.0,
-        middle=(middle.x, middle.y),
+        middle=(float(x), float(y)),
     )
     rows = known_by_shape(schema.SEGMENTS, segments, written)
     numbers = np.array(track_numbers(rows))

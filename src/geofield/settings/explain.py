@@ -34,7 +34,11 @@ def explained(error: ValidationError) -> str:
                 within = names_of(section)
             elif section == "machines":
                 within = Machine.model_fields
+            elif len(problem["loc"]) == 1:
+                within = SECTIONS
             near = nearest(str(problem["loc"][-1]), within)
+            home = next((each for each in SECTIONS if section in names_of(each)), None)
+            near = near if home is None else f"It belongs to {home}"
         elif not whole and problem["type"] in ("literal_error", "value_error"):
             choices = re.findall(r"'([^']+)'", message) or get_args(DirectionName)
             near = nearest(str(problem.get("input")), choices)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
+from geofield.errors import SettingsError
 from geofield.settings.export import ExportSettings
 from geofield.settings.field import FieldSettings
 from geofield.settings.imagery import FetchSettings, ImagerySettings
@@ -31,6 +32,18 @@ class Settings(Section):
     obstacles: ObstacleSettings = ObstacleSettings()
     tracks: TrackSettings = TrackSettings()
     export: ExportSettings = ExportSettings()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_words(cls, values: Any, check: ModelWrapValidatorHandler[Self]) -> Self:
+        """Say what is wrong as all other ways to settings do."""
+        try:
+            return check(values)
+        except ValidationError as error:
+            from geofield.settings.explain import explained
+
+            raise SettingsError(explained(error)) from None
+
     # What follows from a machine stands in `tracks`, under its name.
     machines: dict[str, Machine] = Field({}, exclude=True, repr=False)
     # Keys live here: never written into a product.

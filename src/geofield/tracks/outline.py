@@ -59,7 +59,10 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     if not np.isfinite(shapely.get_coordinates(polygon)).all():
         raise TrackError("The field's outline has coordinates that are not finite numbers.")
     if not isinstance(polygon, Polygon | MultiPolygon):
-        raise TrackError(f"The field's outline must be a polygon, not a {polygon.geom_type}.")
+        raise TrackError(
+            f"The field's outline must be a polygon, not a {polygon.geom_type}.",
+            hint="Close it where it begins (QGIS: Lines to polygons).",
+        )
     _refuse_degrees(polygon)
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon)
