@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import geopandas as gpd
@@ -60,6 +60,9 @@ def test_statistics_are_the_same_after_a_round_trip(
     assert again.tracks is not None
     assert again.tracks.statistics == before
     assert again == plan
+    assert again.field == plan.field
+    assert len({again.field, plan.field}) == 1
+    assert replace(again.field, name="other") != plan.field
 
 
 def test_the_command_tells_the_same_figures_as_the_plan_that_it_wrote(

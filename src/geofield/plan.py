@@ -117,10 +117,8 @@ class Plan:
 
     def _facts(self) -> tuple[Any, ...]:
         """What is the same in equal plans, besides the tables."""
-        one = self.field
-        words = (one.name, one.field_id, one.method, one.imagery, one.imagery_date, one.licence)
         outline = None if self.tracks is None else self.tracks.outline
-        return (one.crs, one.polygon, words, one.own, outline, self.provenance, self.grid)
+        return (self.field, outline, self.provenance, self.grid)
 
     def _tables(self) -> dict[str, gpd.GeoDataFrame]:
         """All tables but the field's own and its alternatives, which are proposals."""

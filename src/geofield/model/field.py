@@ -65,7 +65,7 @@ class FieldQuality:
     trusted: bool = True
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class Alternative:
     """An outline that may be meant.
 
@@ -146,6 +146,24 @@ class Field:
             object.__setattr__(self, "field_id", place_id(self.polygon, crs))
         if not self.name:
             object.__setattr__(self, "name", self.field_id)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether outline, names, origin, quality and own columns are the same.
+
+        Other outlines that were merely proposed do not count, as between plans.
+        """
+        if not isinstance(other, Field):
+            return NotImplemented
+        return self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash((self.field_id, self.polygon))
+
+    def _values(self) -> tuple[Any, ...]:
+        """What is the same in equal fields."""
+        picture = (self.imagery, self.imagery_date, self.licence)
+        names = (self.name, self.field_id, self.method)
+        return (self.crs, self.polygon, names, picture, self.own, self.quality)
 
     @property
     def certainty(self) -> float | None:
