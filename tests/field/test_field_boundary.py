@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import shapely
 
-from geofield.errors import CRSError, FieldError
+from geofield.errors import CRSError, FieldError, GeofieldError
 from geofield.field import field_from_boundary
 
 LAT, LON = 50.0, 10.0
@@ -117,6 +117,31 @@ def test_holes_and_parts_are_kept():
     table = gpd.GeoDataFrame({"name": ["x"]}, geometry=[shapely.MultiPolygon([ring, B])], crs=4326)
     field = field_from_boundary(table, lat=50.0005, lon=10.0005)
     assert len(list(field.polygon.interiors)) == 1
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    ('name;geometry\nmine;"{degrees}"\n', None),
+    ('name,wkt\nmine,"{degrees}"\n', None),
+    ('name,wkt\nmine,"{metres}"\n', "no coordinate reference system"),
+    ("Easting;Northing\n500000,0;5200000,0\n500100,5;5200000,0\n", "but 2 points"),
+    ("lat,lon\n47.0,15.0\n47.0,15.1\n", "but 2 points"),
+    ("a,b\n1,2\n", "no columns lat and lon and no geometry"),
+])  # fmt: skip
+def test_a_table_of_outlines(text, told, tmp_path):
+    """Shapes as text are read; of a table without them it is told what it has."""
+    from geofield.cli.parcels import parcel_and_point
+
+    metres = gpd.GeoSeries([shapely.box(500_000, 5_200_000, 500_100, 5_200_100)], crs=32633)
+    degrees = metres.to_crs(4326)
+    file = tmp_path / "parcels.csv"
+    file.write_text(text.format(metres=metres.iloc[0].wkt, degrees=degrees.iloc[0].wkt))
+    if told is None:
+        field = parcel_and_point(file, None, None, None, None)[0]
+        assert (field.name, round(field.area_ha, 2)) == ("mine", 1.0)
+        return
+    with pytest.raises(GeofieldError, match=told) as refused:
+        parcel_and_point(file, None, None, None, None)
+    assert "ogrinfo" not in str(refused.value)
 
 
 def test_that_only_the_first_of_several_layers_has_the_parcels_is_told(tmp_path, capsys):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import warnings
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -318,11 +319,12 @@ def standing(path: Path, places: list[Any], crs: object = CRS, **columns: Any) -
     return path
 
 
-def planned_around(parcels: Path, trees: Path, out: Path, code: int = 0) -> str:
+def planned_around(
+    parcels: Path, trees: Path, out: Path, code: int = 0, more: Sequence[str] = ()
+) -> str:
     """What the command says, on one line."""
-    done = CliRunner().invoke(
-        cli, ["tracks", str(parcels), "--obstacles", str(trees), "--spacing", "5", "-o", str(out)]
-    )
+    where = ["tracks", str(parcels), "--obstacles", str(trees), "-o", str(out)]
+    done = CliRunner().invoke(cli, [*where, "--spacing", "5", *more])
     assert done.exit_code == code or isinstance(done.exception, GeofieldError), done.output
     return " ".join(f"{done.output} {done.exception if code else ''}".split())
 
@@ -408,9 +410,16 @@ def test_trees_in_a_table_of_latitudes_and_longitudes(tmp_path: Path, mark: str)
     found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
     assert found["radius_m"].tolist() == [3.5]
     assert found.geometry[0].centroid.distance(shapely.Point(500050, 5600030)) < 0.01
-    trees.write_text("name,north,east\noak,1,2\n")
+    trees.write_text("name,up,right\noak,1,2\n")
     told = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "no.gpkg", 1)
     assert "no columns lat and lon" in told
+    metres = [["North", "East", "radius_m"], ["5600030", "500050", "3"]]
+    trees.write_text("\n".join(map(mark.join, metres)))
+    assert "does not say its CRS" in planned_around(tmp_path / "parcel.gpkg", trees, tmp_path, 1)
+    out = tmp_path / "metres.gpkg"
+    planned_around(tmp_path / "parcel.gpkg", trees, out, more=["--crs", f"EPSG:{CRS}"])
+    found = gpd.read_file(tmp_path / "metres.gpkg", layer="obstacles")
+    assert found.geometry[0].centroid.distance(shapely.Point(500050, 5600030)) < 0.01
 
 
 def test_geoparquet_is_a_vector_file(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ from geofield.cli.files import OLD_PATH
 from geofield.errors import FieldError, FormatError
 
 if TYPE_CHECKING:
+    import geopandas as gpd
+
     from geofield.model import Field
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -47,11 +49,14 @@ def parcel_and_point(
         return None, lat, lon
     if (lat is None) != (lon is None):
         raise _missing(lat)
-    from geofield.field import field_from_boundary
+    from geofield.farm.place_files import CSV
+    from geofield.farm.place_reader import read_table
     from geofield.formats.foreign import layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
 
     try:
+        if path.suffix.lower() in CSV:
+            return _parcel(read_table(path), name, lat, lon)
         layers = layer_names(path) if layer is None and not is_own(path) else []
         if len(layers) > 1:
             say_note(
@@ -63,8 +68,18 @@ def parcel_and_point(
     except FormatError as error:
         raise FieldError(
             f"The boundary: {error.message}",
-            hint="`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
+            hint=error.hint
+            if path.suffix.lower() in CSV
+            else "`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
         ) from None
+    return _parcel(table, name, lat, lon)
+
+
+def _parcel(
+    table: gpd.GeoDataFrame, name: str | None, lat: float | None, lon: float | None
+) -> tuple[Field, float, float]:
+    from geofield.field import field_from_boundary
+
     parcel = field_from_boundary(table, lat=lat, lon=lon, name=name)
     if lat is None or lon is None:
         lon, lat = parcel.inside_lonlat

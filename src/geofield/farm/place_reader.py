@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
+_X = ("x", "easting", "east", "rechtswert")
+_Y = ("y", "northing", "north", "hochwert")
 _BATCH = 50_000
 
 
@@ -105,8 +107,10 @@ def read_places(
     )  # fmt: skip
 
 
-def read_points(path: Path) -> gpd.GeoDataFrame | None:
-    """The rows of a CSV table as points, by its columns lat and lon; None where it has shapes.
+def read_table(path: Path) -> gpd.GeoDataFrame:
+    """The rows of a CSV table: shapes as WKT, or points by columns lat and lon, or x and y.
+
+    What are no degrees is of no CRS: a table cannot say it.
 
     Raises
     ------
@@ -117,19 +121,26 @@ def read_points(path: Path) -> gpd.GeoDataFrame | None:
 
     raw = read_raw(path, layer=None, texts=())
     if raw.geometry is not None:
-        return None
-    names = _found(raw, None, _LAT), _found(raw, None, _LON)
+        shapes = shapely.from_wkb(raw.geometry.to_numpy(zero_copy_only=False))
+        west, south, east, north = shapely.total_bounds(shapes)
+        in_degrees = max(-west, east) <= 180.0 and max(-south, north) <= 90.0
+        frame = raw.table.to_pandas()
+        return gpd.GeoDataFrame(frame, geometry=shapes, crs=LONLAT if in_degrees else None)
+    lonlat = _found(raw, None, _LON), _found(raw, None, _LAT)
+    names = lonlat if None not in lonlat else (_found(raw, None, _X), _found(raw, None, _Y))
     if None in names:
         raise FormatError(
             f"{raw.name} has no columns lat and lon and no geometry.",
             hint=f"It has {', '.join(raw.table.column_names)}; rename them to lat and lon.",
         )
-    lat, lon = (_numbers(raw, str(name)) for name in names)
-    _check_positions(raw, lat, lon)
-    known = np.isfinite(lat) & np.isfinite(lon)
-    points = np.full(len(lat), None)
-    points[known] = shapely.points(lon[known], lat[known])
-    return gpd.GeoDataFrame(raw.table.to_pandas(), geometry=points, crs=LONLAT)
+    x, y = (_numbers(raw, str(name)) for name in names)
+    if names == lonlat:
+        _check_positions(raw, y, x)
+    known = np.isfinite(x) & np.isfinite(y)
+    points = np.full(len(x), None)
+    points[known] = shapely.points(x[known], y[known])
+    crs = LONLAT if names == lonlat else None
+    return gpd.GeoDataFrame(raw.table.to_pandas(), geometry=points, crs=crs)
 
 
 def _without_ours(raw: RawPlaces) -> RawPlaces:

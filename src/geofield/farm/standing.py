@@ -17,7 +17,7 @@ from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
 from geofield.farm.place_files import CSV
-from geofield.farm.place_reader import read_points
+from geofield.farm.place_reader import read_table
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import unwrapped
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
@@ -98,8 +98,8 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
 
     if _holds_obstacles(path):
         return read_vector(path, schema.OBSTACLES.name), []
-    if path.suffix.lower() in CSV and (points := read_points(path)) is not None:
-        return points, []
+    if path.suffix.lower() in CSV:
+        return read_table(path), []
     # The points of a GPX file's lines are told by the lines.
     names = [name for name in layer_names(path) if name not in ("route_points", "track_points")]
     if path.suffix.lower() == ".gpkg" and is_own(path):

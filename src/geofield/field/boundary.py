@@ -54,19 +54,23 @@ def field_from_boundary(
     FieldError
         When no parcel, or more than one of different outline, fits.
     """
+    rows = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)].explode()
+    points = int((rows.geometry.geom_type == "Point").sum())
+    rows = _outlines(rows)
+    if rows.empty:
+        found = f", but {points} points" if points else ""
+        join = "Join the points in their order (QGIS: Points to path), then close the"
+        raise FieldError(
+            f"The boundary file holds no polygon and no closed line{found}.",
+            hint=f"{join if points else 'Close the'} outline where it begins (QGIS: Lines to "
+            "polygons).",
+        )
     if parcels.crs is None:
         raise CRSError(
             "The boundary file has no coordinate reference system.",
-            hint="Assign one, for instance with `ogr2ogr -a_srs EPSG:25832`.",
+            hint="Assign one, for instance with `ogr2ogr -a_srs EPSG:25832 parcels.gpkg FILE`.",
         )
     own = CRS(parcels.crs)
-    rows = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)].explode()
-    rows = _outlines(rows)
-    if rows.empty:
-        raise FieldError(
-            "The boundary file holds no polygon and no closed line.",
-            hint="Close the outline where it begins (QGIS: Lines to polygons).",
-        )
     _, south, _, north = rows.total_bounds
     if own.is_geographic and max(-south, north) > 90.0:
         raise FieldError(
