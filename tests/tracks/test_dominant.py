@@ -48,6 +48,19 @@ def test_a_border_cut_into_pieces_counts_as_one(pieces: int) -> None:
         assert edge == pytest.approx(90.0, abs=1.0)
 
 
+@pytest.mark.parametrize("along_px", [0, 7, 60])
+@pytest.mark.parametrize("stray_m", [0.0, 0.02])
+def test_vertices_on_a_straight_border_change_nothing(along_px: int, stray_m: float) -> None:
+    """As a surveyor or a receiver sets them: one every two metres of the long sides."""
+    x = np.linspace(0.0, 234.0, 120)
+    ring = np.array([*((each, 0.0) for each in x), *((each, 100.0) for each in x[::-1])])
+    ring += np.random.default_rng(1).normal(0.0, stray_m, ring.shape)
+    outline = shapely.Polygon(np.roll(ring, along_px, axis=0) + np.array([440_000, 3_770_000]))
+    tracks = plan_tracks(outline, crs=CRS, spacing_m=3.0)
+    assert abs(tracks.heading_deg - 90.0) < 0.6  # grid north is not true north
+    assert tracks.direction_why.startswith("along an edge of 234 m; 70 %")
+
+
 def test_why_is_told_and_what_fewest_would_save(tmp_path: Path) -> None:
     corners = [
         (0, 0),

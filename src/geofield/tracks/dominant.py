@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
 from geofield.tracks.frame import FloatArray
@@ -35,21 +37,40 @@ def dominant_edge(
     that of the field's own border (without the picture's edge) within a few degrees.
     """
     xy, barred = own_edges(polygon, tolerance, outside)
-    offset = np.roll(xy, -1, axis=0) - xy
-    length = np.where(barred, 0.0, np.hypot(offset[:, 0], offset[:, 1]))
+    corner, piece = _pieces(xy, barred, tolerance / 4.0)
+    offset = xy[np.roll(corner, -1)] - xy[corner]
+    length = np.where(barred[corner], 0.0, np.hypot(offset[:, 0], offset[:, 1]))
     angle = np.degrees(np.arctan2(offset[:, 1], offset[:, 0])) % 180.0
-    # The longest edges are enough to choose among; all edges are weighed.
+    # The longest pieces are enough to choose among; all are weighed.
     tried = np.argsort(-length, kind="stable")[:_MOST_DIRECTIONS]
     sure = length**_LONGER_COUNTS_MORE
-    rows = max(1, _MOST_CELLS // len(xy))
+    rows = max(1, _MOST_CELLS // len(corner))
     weight = np.array([
         row @ sure
         for first in range(0, len(tried), rows)
         for row in _alike(angle, angle[tried[first : first + rows], None])
     ])  # fmt: skip
     alike = _alike(angle, angle[tried[int(np.argmax(weight.round(6)))]])
-    run = longest_run(xy, tolerance, barred | (alike <= 0.5))
+    run = longest_run(xy, tolerance, barred | (alike <= 0.5)[piece])
     return run, float(alike @ length / max(length.sum(), 1e-12))
+
+
+def _pieces(
+    xy: FloatArray, barred: NDArray[np.bool_], tolerance: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The vertices at which a ring turns, and which of the pieces from them each edge is of.
+
+    Vertices on a straight border cut it into nothing, be they a surveyor's or a parcel's.
+    """
+    ahead = np.roll(xy, -1, axis=0) - xy
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    # A ring keeps the vertex that it begins with, so that has to be a corner.
+    sharpest = int(np.argmin(np.cos(heading - np.roll(heading, 1))))
+    ring = np.roll(xy, -sharpest, axis=0)
+    kept = shapely.get_coordinates(LineString([*ring, ring[0]]).simplify(tolerance))
+    turns = np.isin(xy @ (1, 1j), kept @ (1, 1j)) | (barred != np.roll(barred, 1))
+    corner = np.flatnonzero(turns)
+    return corner, (np.cumsum(turns) - 1) % len(corner)
 
 
 def _alike(angle: FloatArray, other: Any) -> FloatArray:
