@@ -15,6 +15,7 @@ from qgis.core import (
     QgsProcessingOutputVectorLayer,
     QgsProcessingParameterBoolean,
     QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFileDestination,
     QgsProcessingParameterPoint,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
@@ -261,6 +262,17 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         for layer in (context.project() or QgsProject.instance()).mapLayers().values():
             if path_of(layer) == path:
                 sources.refuse_unsaved(layer)
+
+    def add_geopackage(self) -> None:
+        """A GeoPackage for a plan, as OUTPUT."""
+        self.addParameter(
+            QgsProcessingParameterFileDestination("OUTPUT", tr("Plan"), "GeoPackage (*.gpkg)")
+        )
+
+    def geopackage_outputs(self, values: Any, context: Any) -> dict[str, Any]:
+        """That plan, loaded."""
+        path = self.parameterAsString(values, "OUTPUT", context)
+        return {"OUTPUT": path, **self.plan_outputs(path, values, context)}
 
     def plan_outputs(self, plan: str | Path, values: Any, context: Any) -> dict[str, Any]:
         """The layers of a plan, and their loading."""

@@ -18,7 +18,6 @@ from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import (
     QDockWidget,
     QGridLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -29,7 +28,9 @@ from .algorithm import path_of
 from .compat import QShortcut
 from .jobs import Live
 from .map_tools import CircleTool, PointTool, band
-from .review import OPEN, Review, by_doubt, counts, value
+from .preview import Preview
+from .review import OPEN, Review, by_doubt, value
+from .review_labels import ReviewLabels
 from .words import tr
 
 #: Edits that follow each other this closely are planned once, milliseconds.
@@ -53,15 +54,8 @@ class ReviewDock(QDockWidget):
         self.live.failed.connect(self._trouble)
         self._released: plan_files.Released | None = None
         self._connections: list[tuple[Any, Any]] = []
-        lines = QgsWkbTypes.GeometryType.LineGeometry
         self._mark = band(self.canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
-        self._bands = {
-            "segments": band(self.canvas, lines, "#ffffff", 2),
-            "gaps": band(self.canvas, lines, "#ff80ab", 2),
-        }
-        self._hidden: list[str] = []
-        #: What the picture did not allow when obstacles were looked for.
-        self._obstacle_doubts: list[str] = []
+        self.preview = Preview(self.canvas)
         self._build()
         self._keys()
         self._timer = QTimer(self)
@@ -75,13 +69,8 @@ class ReviewDock(QDockWidget):
     def _build(self) -> None:
         body = QWidget(self)
         box = QVBoxLayout(body)
-        self.title, self.doubts, self.count = QLabel(), QLabel(), QLabel()
-        self.here, self.figures = QLabel(), QLabel()
-        self.doubts.setStyleSheet("color: #b26a00")
-        self.here.setStyleSheet("font-weight: bold")
-        for label in (self.title, self.doubts, self.count, self.here, self.figures):
-            label.setWordWrap(True)
-            box.addWidget(label)
+        self.labels = ReviewLabels(body)
+        box.addWidget(self.labels)
         grid = QGridLayout()
         self.buttons: dict[str, QPushButton] = {}
         rows = (
@@ -136,53 +125,9 @@ class ReviewDock(QDockWidget):
         """What the panel says of the plan as it is now."""
         for name, button in self.buttons.items():
             button.setEnabled(self._ready or (name == "open" and self._released is None))
-        if self.review is None:
-            self.title.setText(tr("Choose a layer of a plan, then press the button."))
-            for label in (self.doubts, self.count, self.here, self.figures):
-                label.setText("")
-            return
-        self._tell_outline()
-        found = counts(self.review.layer)
-        left = sum(found.get(status, 0) for status in OPEN)
-        words = {
-            "confirmed": tr("{0} confirmed"),
-            "rejected": tr("{0} rejected"),
-            "added": tr("{0} added"),
-        }
-        parts = [tr("{0} left to look at").format(left)]
-        parts += [text.format(found[name]) for name, text in words.items() if found.get(name)]
-        self.count.setText(", ".join(parts))
-        feature = None if self.current is None else self.review.layer.getFeature(self.current)
-        if feature is None or not feature.isValid():
-            self.here.setText("")
-            return
-        radius_m, confidence = value(feature, "radius_m"), value(feature, "confidence")
-        parts = [tr("Obstacle {0}").format(value(feature, "obstacle_no", tr("new")))]
-        parts.append(str(value(feature, "status", "added")))
-        if radius_m is not None:
-            parts.append(tr("radius {0:.2f} m").format(radius_m))
-        if confidence is not None:
-            parts.append(tr("confidence {0:.0%}").format(confidence))
-        self.here.setText(", ".join(parts))
-
-    def _tell_outline(self) -> None:
-        field = plan_files.layers_of(self.path).get("field")
-        row = None if field is None else next(field.getFeatures(), None)
-        if row is None:
-            self.title.setText(self.path)
-            self._show_doubts([])
-            return
-        text = f"{value(row, 'name', '')}, {value(row, 'area_ha', 0.0):.2f} ha"
-        certainty = value(row, "certainty")
-        if certainty is not None:
-            text += tr(", outline {0:.0%} certain").format(certainty)
-        self.title.setText(text)
-        outline = [value(row, "doubts")] if value(row, "doubts") else []
-        self._show_doubts([*outline, *self._obstacle_doubts])
-
-    def _show_doubts(self, doubts: list[str]) -> None:
-        self.doubts.setText("\n".join(doubts))
-        self.doubts.setVisible(bool(doubts))
+        self.labels.tell(
+            None if self.review is None else self.review.layer, self.path, self.current
+        )
 
     # -- which plan --------------------------------------------------------------------------
 
@@ -222,9 +167,9 @@ class ReviewDock(QDockWidget):
             except (TypeError, RuntimeError):
                 continue  # the layer is gone
         self._connections = []
-        self.review, self.current, self._obstacle_doubts = None, None, []
+        self.review, self.current = None, None
         self._timer.stop()
-        self._clear_preview()
+        self.preview.clear()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         self._enable_keys()
         self._tell()
@@ -240,9 +185,8 @@ class ReviewDock(QDockWidget):
         self.live.close()
         for shortcut in self._shortcuts:
             shortcut.deleteLater()
-        scene = self.canvas.scene()
-        for each in (self._mark, *self._bands.values()):
-            scene.removeItem(each)
+        self.preview.remove()
+        self.canvas.scene().removeItem(self._mark)
         self.iface.removeDockWidget(self)
         self.deleteLater()
 
@@ -347,45 +291,15 @@ class ReviewDock(QDockWidget):
     def _show_tracks(self, answer: dict[str, Any]) -> None:
         if self.review is None or not self._show_figures(answer):
             return
-        crs = self.review.layer.crs()
-        lines = QgsWkbTypes.GeometryType.LineGeometry
-        for name, sketch in self._bands.items():
-            sketch.reset(lines)
-            ends = [[QgsPointXY(x0, y0), QgsPointXY(x1, y1)] for x0, y0, x1, y1 in answer[name]]
-            if ends:
-                sketch.addGeometry(QgsGeometry.fromMultiPolylineXY(ends), crs)
-        if not self._hidden:
-            # The tracks in the file are those of before the edits.
-            root = QgsProject.instance().layerTreeRoot()
-            for name in ("tracks", "segments", "gaps", "track_points"):
-                layer = plan_files.layers_of(self.path).get(name)
-                node = None if layer is None else root.findLayer(layer.id())
-                if node is not None and node.isVisible():
-                    node.setItemVisibilityChecked(False)
-                    self._hidden.append(layer.id())
+        self.preview.show(answer, self.review.layer.crs(), plan_files.layers_of(self.path))
 
     def _show_figures(self, answer: dict[str, Any]) -> bool:
         if "error" in answer:
             self._trouble(answer["error"]["message"])
             return False
-        figures = answer["figures"]
-        text = tr("{0} tracks in {1} segments, {2:.2f} km").format(
-            figures["tracks"], figures["segments"], figures["length_m"] / 1000
-        )
-        self.figures.setText("\n".join([text, *answer.get("notes", [])]))
-        self._obstacle_doubts = answer.get("doubts", [])
-        self._tell_outline()
+        self.labels.tell_figures(answer)
+        self.labels.tell_outline(self.path)
         return True
-
-    def _clear_preview(self) -> None:
-        for sketch in self._bands.values():
-            sketch.reset(QgsWkbTypes.GeometryType.LineGeometry)
-        root = QgsProject.instance().layerTreeRoot()
-        for layer_id in self._hidden:
-            node = root.findLayer(layer_id)
-            if node is not None:
-                node.setItemVisibilityChecked(True)
-        self._hidden = []
 
     def _saved(self) -> None:
         # After the signal: QGIS is still at work on the layer while it is sent.
@@ -410,7 +324,7 @@ class ReviewDock(QDockWidget):
         if self.review is None:  # its layers were removed meanwhile
             return
         if self._show_figures(answer):
-            self._clear_preview()
+            self.preview.clear()
         self.current = None
         self.step(1)
         self._tell()

@@ -87,13 +87,13 @@ def work():
         for group in project.layerTreeRoot().findGroups()
     }
     dock = ours.dock
-    until(dock.figures.text, 200, "figures")
+    until(dock.labels.figures.text, 200, "figures")
     screenshot("planned")
 
     # Review by keys.
     layer = dock.review.layer
     before = statuses(layer)
-    ANSWER["before"], ANSWER["count_before"] = before, dock.count.text()
+    ANSWER["before"], ANSWER["count_before"] = before, dock.labels.count.text()
     first = layer.getFeature(dock.current)["obstacle_no"]
     key(Qt.Key.Key_R)
     second = layer.getFeature(dock.current)["obstacle_no"]
@@ -106,7 +106,7 @@ def work():
         answered.append(time.monotonic())
 
     dock._show_tracks = hear
-    until(lambda: dock._hidden, 100, "preview")
+    until(lambda: dock.preview.is_shown, 100, "preview")
     edited = time.monotonic()
     key(Qt.Key.Key_R)
     until(lambda: answered, 100, "second preview")
@@ -154,7 +154,7 @@ def work():
     until(lambda: dock._released is not None, 20, "writing")
     key(Qt.Key.Key_R)  # no layer holds the file now: an edit would be lost
     ANSWER["while_writing"] = [dock.buttons["reject"].isEnabled(), layer.isEditable()]
-    until(lambda: dock._released is None and not dock._hidden, 200, "saved")
+    until(lambda: dock._released is None and not dock.preview.is_shown, 200, "saved")
     ANSWER["after_writing"] = dock.buttons["reject"].isEnabled()
     QTest.qWait(200)
     ANSWER["saved"] = {
@@ -162,7 +162,7 @@ def work():
         "rows": layer.featureCount(),
         "statuses": statuses(layer),
         "renderer": type(layer.renderer()).__name__,
-        "figures": dock.figures.text(),
+        "figures": dock.labels.figures.text(),
         # What went well may still stand there; what went wrong must not.
         "messages": [
             item.text()
@@ -171,21 +171,21 @@ def work():
         ],
     }
     # What the engine has to tell stands in the panel, as long as it tells it.
-    outline = dock.doubts.text()
+    outline = dock.labels.doubts.text()
     figures = {"tracks": 2, "segments": 3, "length_m": 450.0}
     dock._show_figures({"figures": figures, "doubts": ["Hazy."], "notes": ["A strip is left."]})
-    ANSWER["told"] = [dock.doubts.text().removeprefix(outline), dock.figures.text()]
+    ANSWER["told"] = [dock.labels.doubts.text().removeprefix(outline), dock.labels.figures.text()]
     dock._show_figures({"figures": figures})
-    ANSWER["told"].append(dock.doubts.text() == outline)
+    ANSWER["told"].append(dock.labels.doubts.text() == outline)
     # All the rest by keys, timed.
     begun, presses = time.monotonic(), 0
     while any(each in ("detected", "possible") for each in statuses(layer).values()):
         key(Qt.Key.Key_C if presses % 3 else Qt.Key.Key_R)
         presses += 1
     ANSWER["by_keys"] = [presses, time.monotonic() - begun]
-    ANSWER["count_after"] = dock.count.text()
+    ANSWER["count_after"] = dock.labels.count.text()
     key(Qt.Key.Key_S)
-    until(lambda: dock._released is None and not dock._hidden, 200, "saved again")
+    until(lambda: dock._released is None and not dock.preview.is_shown, 200, "saved again")
     canvas.setExtent(QgsRectangle(extent))
     screenshot("saved")
 
@@ -201,7 +201,7 @@ def work():
     until(lambda: finished, 200, "planned with more ground")
     ANSWER["again"] = finished[0]
     until(lambda: not dock.live.busy, 60, "figures again")
-    ANSWER["count_again"] = dock.count.text()
+    ANSWER["count_again"] = dock.labels.count.text()
     ANSWER["layers_again"] = len(
         [each for each in project.mapLayers().values() if each.name() == "Obstacles"]
     )

@@ -45,6 +45,11 @@
     </message>
     <message>
       <location filename="algorithm.py" />
+      <source>Plan</source>
+      <translation>Plan</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
       <source>Plan (GeoPackage)</source>
       <translation>Plan (GeoPackage)</translation>
     </message>
@@ -57,11 +62,6 @@
       <location filename="algorithms.py" />
       <source>Stage by stage</source>
       <translation>Schritt für Schritt</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Files and checks</source>
-      <translation>Dateien und Prüfungen</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
@@ -95,26 +95,6 @@
     </message>
     <message>
       <location filename="algorithms.py" />
-      <source>Export for terminals</source>
-      <translation>Export für Terminals</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Import boundaries</source>
-      <translation>Feldgrenzen einlesen</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Check products</source>
-      <translation>Ergebnisse prüfen</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Compare with a truth</source>
-      <translation>Mit der Wahrheit vergleichen</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
       <source>A point in the field</source>
       <translation>Ein Punkt im Feld</translation>
     </message>
@@ -122,11 +102,6 @@
       <location filename="algorithms.py" />
       <source>Centre</source>
       <translation>Mitte</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Plan</source>
-      <translation>Plan</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
@@ -175,78 +150,13 @@
     </message>
     <message>
       <location filename="algorithms.py" />
-      <source>Files</source>
-      <translation>Dateien</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Errors</source>
-      <translation>Fehler</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Warnings</source>
-      <translation>Warnungen</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Findings</source>
-      <translation>Befunde</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>No fault found.</source>
-      <translation>Kein Fehler gefunden.</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Detected obstacles</source>
-      <translation>Gefundene Hindernisse</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Truth</source>
-      <translation>Wahrheit</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Picture to draw on</source>
-      <translation>Bild als Untergrund</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>Drawing of hits and misses</source>
-      <translation>Zeichnung der Treffer und Fehler</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
       <source>Give a centre or an extent.</source>
       <translation>Geben Sie eine Mitte oder einen Ausschnitt an.</translation>
-    </message>
-    <message>
-      <location filename="algorithms.py" />
-      <source>The engine gave no answer.</source>
-      <translation>Das Rechenprogramm gab keine Antwort.</translation>
     </message>
     <message>
       <location filename="dock.py" />
       <source>Review of a field</source>
       <translation>Durchsicht eines Feldes</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>{0} confirmed</source>
-      <translation>{0} bestätigt</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>{0} rejected</source>
-      <translation>{0} verworfen</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>{0} added</source>
-      <translation>{0} ergänzt</translation>
     </message>
     <message>
       <location filename="dock.py" />
@@ -310,53 +220,13 @@
     </message>
     <message>
       <location filename="dock.py" />
-      <source>Choose a layer of a plan, then press the button.</source>
-      <translation>Wählen Sie einen Layer eines Plans und drücken Sie den Knopf.</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
       <source>This obstacle is not round: use QGIS's vertex tool.</source>
       <translation>Dieses Hindernis ist nicht rund: nehmen Sie das Stützpunktwerkzeug von QGIS.</translation>
     </message>
     <message>
       <location filename="dock.py" />
-      <source>{0} tracks in {1} segments, {2:.2f} km</source>
-      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
       <source>The outline has edits that are not saved: save them, too.</source>
       <translation>Der Umriss hat Änderungen, die nicht gespeichert sind: speichern Sie auch diese.</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>{0} left to look at</source>
-      <translation>{0} noch anzusehen</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>Obstacle {0}</source>
-      <translation>Hindernis {0}</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>new</source>
-      <translation>neu</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>, outline {0:.0%} certain</source>
-      <translation>, Umriss zu {0:.0%} sicher</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>radius {0:.2f} m</source>
-      <translation>Radius {0:.2f} m</translation>
-    </message>
-    <message>
-      <location filename="dock.py" />
-      <source>confidence {0:.0%}</source>
-      <translation>Sicherheit {0:.0%}</translation>
     </message>
     <message>
       <location filename="engine.py" />
@@ -427,6 +297,81 @@
       <location filename="engine_dialog.py" />
       <source>Ready: {0}, version {1}</source>
       <translation>Bereit: {0}, Version {1}</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Files and checks</source>
+      <translation>Dateien und Prüfungen</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Export for terminals</source>
+      <translation>Export für Terminals</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Import boundaries</source>
+      <translation>Feldgrenzen einlesen</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Check products</source>
+      <translation>Ergebnisse prüfen</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Compare with a truth</source>
+      <translation>Mit der Wahrheit vergleichen</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Files</source>
+      <translation>Dateien</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Errors</source>
+      <translation>Fehler</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Warnings</source>
+      <translation>Warnungen</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Findings</source>
+      <translation>Befunde</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>No fault found.</source>
+      <translation>Kein Fehler gefunden.</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Detected obstacles</source>
+      <translation>Gefundene Hindernisse</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Truth</source>
+      <translation>Wahrheit</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Picture to draw on</source>
+      <translation>Bild als Untergrund</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>Drawing of hits and misses</source>
+      <translation>Zeichnung der Treffer und Fehler</translation>
+    </message>
+    <message>
+      <location filename="file_algorithms.py" />
+      <source>The engine gave no answer.</source>
+      <translation>Das Rechenprogramm gab keine Antwort.</translation>
     </message>
     <message>
       <location filename="install.py" />
@@ -512,6 +457,61 @@
       <location filename="review.py" />
       <source>Status {0}</source>
       <translation>Status {0}</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>{0} confirmed</source>
+      <translation>{0} bestätigt</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>{0} rejected</source>
+      <translation>{0} verworfen</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>{0} added</source>
+      <translation>{0} ergänzt</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>Choose a layer of a plan, then press the button.</source>
+      <translation>Wählen Sie einen Layer eines Plans und drücken Sie den Knopf.</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>{0} tracks in {1} segments, {2:.2f} km</source>
+      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>{0} left to look at</source>
+      <translation>{0} noch anzusehen</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>Obstacle {0}</source>
+      <translation>Hindernis {0}</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>new</source>
+      <translation>neu</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>, outline {0:.0%} certain</source>
+      <translation>, Umriss zu {0:.0%} sicher</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>radius {0:.2f} m</source>
+      <translation>Radius {0:.2f} m</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>confidence {0:.0%}</source>
+      <translation>Sicherheit {0:.0%}</translation>
     </message>
     <message>
       <location filename="sources.py" />

@@ -1,0 +1,63 @@
+"""Tracks that follow edits: drawn on the map in the place of those in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from qgis.core import QgsGeometry, QgsPointXY, QgsProject, QgsWkbTypes
+
+from .map_tools import band
+
+_LINES = QgsWkbTypes.GeometryType.LineGeometry
+
+
+class Preview:
+    """Tracks that are in no file yet; the layers of those before the edits are hidden meanwhile."""
+
+    def __init__(self, canvas: Any) -> None:
+        self.canvas = canvas
+        self._bands = {
+            "segments": band(canvas, _LINES, "#ffffff", 2),
+            "gaps": band(canvas, _LINES, "#ff80ab", 2),
+        }
+        self._hidden: list[str] = []
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether layers are hidden for it."""
+        return bool(self._hidden)
+
+    def show(self, answer: Mapping[str, Any], crs: Any, layers: Mapping[str, Any]) -> None:
+        """Draw segments and gaps, x0, y0, x1, y1 each in `crs`; `layers` are those of the plan."""
+        for name, sketch in self._bands.items():
+            sketch.reset(_LINES)
+            ends = [[QgsPointXY(x0, y0), QgsPointXY(x1, y1)] for x0, y0, x1, y1 in answer[name]]
+            if ends:
+                sketch.addGeometry(QgsGeometry.fromMultiPolylineXY(ends), crs)
+        if self._hidden:
+            return
+        root = QgsProject.instance().layerTreeRoot()
+        for name in ("tracks", "segments", "gaps", "track_points"):
+            layer = layers.get(name)
+            node = None if layer is None else root.findLayer(layer.id())
+            if node is not None and node.isVisible():
+                node.setItemVisibilityChecked(False)
+                self._hidden.append(layer.id())
+
+    def clear(self) -> None:
+        """Show the layers again."""
+        for sketch in self._bands.values():
+            sketch.reset(_LINES)
+        root = QgsProject.instance().layerTreeRoot()
+        for layer_id in self._hidden:
+            node = root.findLayer(layer_id)
+            if node is not None:
+                node.setItemVisibilityChecked(True)
+        self._hidden = []
+
+    def remove(self) -> None:
+        """Leave nothing on the map."""
+        self.clear()
+        for sketch in self._bands.values():
+            self.canvas.scene().removeItem(sketch)
