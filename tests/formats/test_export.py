@@ -42,7 +42,7 @@ def test_existing_products_need_overwrite(dataset, tmp_path):
         write_dataset(dataset, tmp_path, ["gpkg"])
     assert (tmp_path / "field.gpkg").read_bytes() == before
     write_dataset(dataset, tmp_path, ["gpkg"], overwrite=True)
-    assert listing(tmp_path) == ["field.gpkg", "field.qgz"]
+    assert listing(tmp_path) == ["field.gpkg", "field.gpkg.bak", "field.qgz"]
 
 
 def test_an_input_is_never_an_output(dataset, tmp_path):
@@ -135,7 +135,7 @@ def test_a_geopackage_open_elsewhere_is_refused(dataset, tmp_path):
     finally:
         other.close()
     write_dataset(dataset, tmp_path, ["gpkg"], overwrite=True)
-    assert listing(tmp_path) == ["field.gpkg", "field.qgz"]
+    assert listing(tmp_path) == ["field.gpkg", "field.gpkg.bak", "field.qgz"]
 
 
 def test_read_only_folder(dataset, tmp_path, monkeypatch):

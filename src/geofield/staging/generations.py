@@ -58,5 +58,7 @@ def copy_whole(source: Path, target: Path) -> None:
             closing(sqlite3.connect(target)) as new,
         ):
             old.backup(new)
+            # A copy that nobody has open needs no log beside it.
+            new.execute("PRAGMA journal_mode = DELETE")
     except sqlite3.DatabaseError:
         shutil.copy2(source, target)
