@@ -5,20 +5,19 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import sys
 from pathlib import Path
 
+from fork_server import called
+
 with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as calls:
-    calls.connect(sys.argv[1])
     request = {
         "words": sys.argv[2:],
         "folder": str(Path.cwd()),
         "environment": dict(os.environ),
         "without": [],
     }
-    socket.send_fds(calls, [json.dumps(request).encode()], [0, 1, 2])
-    calls.recv(20)  # its number
+    called(calls, sys.argv[1], request, [0, 1, 2])
     sys.exit(int(calls.recv(20)))

@@ -16,6 +16,13 @@ from typing import Any
 _LARGEST_BYTES = 1_000_000
 
 
+def called(calls: socket.socket, address: str, request: dict[str, Any], files: list[int]) -> int:
+    """Ask for a process; its number. What it ended with comes next on the socket."""
+    calls.connect(address)
+    socket.send_fds(calls, [json.dumps(request).encode()], files)
+    return int(calls.recv(20))
+
+
 def served() -> list[str] | None:
     """Serve the socket whose number is the first argument.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import socket
@@ -11,6 +10,9 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
+
+from fork_server import called
 
 
 class Forks:
@@ -88,13 +90,11 @@ class Forks:
                 said.append(stream.read())
         return subprocess.CompletedProcess(list(words), code, *said)
 
-    def _code(self, request: Mapping[str, object], files: list[int], timeout_s: float) -> int:
+    def _code(self, request: dict[str, Any], files: list[int], timeout_s: float) -> int:
         """The exit code of a run; negative, the signal that ended it."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as calls:
             calls.settimeout(timeout_s)
-            calls.connect(self.address)
-            socket.send_fds(calls, [json.dumps(request).encode()], files)
-            process = int(calls.recv(20))
+            process = called(calls, self.address, request, files)
             try:
                 return int(calls.recv(20))
             except BaseException:

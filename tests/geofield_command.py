@@ -81,6 +81,6 @@ def asked() -> Iterator[list[str]]:
     """A program for shells that stands for the command, loaded once."""
     forks = Forks([sys.executable, str(_PROGRAM)], os.environ)
     try:
-        yield [sys.executable, "-IS", str(_ASKS), forks.address]
+        yield [sys.executable, "-ES", str(_ASKS), forks.address]
     finally:
         forks.end()

@@ -355,6 +355,11 @@ def test_light_imports() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_pictures_are_cut_without_what_tables_need() -> None:
+    code = "import sys, geofield.model, geofield.imagery; sys.exit('pandas' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_doctor_reports_versions(capsys: pytest.CaptureFixture[str]) -> None:
     geofield("doctor", "--json")
     facts = json.loads(capsys.readouterr().out)

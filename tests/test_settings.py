@@ -21,7 +21,7 @@ from geofield.settings import (
     load_settings,
     with_values,
 )
-from geofield.settings.whole import names_of
+from geofield.settings.sections import MODELS
 
 
 @pytest.fixture(autouse=True)
@@ -203,7 +203,7 @@ def defaults() -> dict[str, list[Any]]:
     known: dict[str, list[Any]] = {}
     for section in SECTIONS:
         values = getattr(Settings(), section)
-        for name in names_of(section):
+        for name in MODELS[section].model_fields:
             value = getattr(values, name)
             known.setdefault(name, []).append(None if value == "none" else value)
     return known

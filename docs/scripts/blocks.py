@@ -143,11 +143,6 @@ def prepare(
     return work, environment
 
 
-def run_page(path: Path, folder: Path, shared: Path | None = None, *, update: bool = False) -> int:
-    """Run a page's blocks in a folder of its own (:func:`run_pages` of it alone)."""
-    return run_pages([path], folder, shared, update=update)
-
-
 def run_pages(
     paths: Iterable[Path],
     folder: Path,

@@ -46,7 +46,7 @@ def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) 
     assert blocks.run_pages([page], tmp_path, shared, program=program) > 0
 
 
-def test_pages_of_beginners_start_the_command_from_nothing() -> None:
+def test_the_pages_of_beginners_are_there() -> None:
     assert {str(page.relative_to(ROOT)) for page in PAGES} > set(FROM_NOTHING)
 
 
@@ -83,10 +83,10 @@ def test_a_wrong_output_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     page = tmp_path / "page.md"
     page.write_text('```python\nprint(1 + 1)\n```\n\n```text title="Output"\n3\n```\n')
     with pytest.raises(blocks.BlockError, match="line 1 prints"):
-        blocks.run_page(page, tmp_path / "a")
-    blocks.run_page(page, tmp_path / "b", update=True)
+        blocks.run_pages([page], tmp_path / "a")
+    blocks.run_pages([page], tmp_path / "b", update=True)
     assert page.read_text().endswith('title="Output"\n2\n```\n')
-    blocks.run_page(page, tmp_path / "c")
+    blocks.run_pages([page], tmp_path / "c")
 
 
 def test_a_failing_command_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,7 +94,7 @@ def test_a_failing_command_is_noticed(tmp_path: Path, monkeypatch: pytest.Monkey
     page = tmp_path / "page.md"
     page.write_text("```bash\nfalse | cat\n```\n")
     with pytest.raises(blocks.BlockError, match="ends with 1"):
-        blocks.run_page(page, tmp_path / "a")
+        blocks.run_pages([page], tmp_path / "a")
 
 
 @pytest.mark.parametrize(

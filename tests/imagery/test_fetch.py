@@ -25,12 +25,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import box
 
-from geofield.errors import (
-    ImageryError,
-    ImageryWarning,
-    NetworkError,
-    OutputExistsError,
-)
+from geofield.errors import ImageryError, ImageryWarning, NetworkError, OutputExistsError
 from geofield.imagery import FetchOptions, Where, acquire, find_source, read_scene
 from geofield.imagery.cache import cache_infos, clear_cache
 from geofield.imagery.mosaic import Staging

@@ -13,8 +13,6 @@ from geofield.cli.files import OLD_PATH
 from geofield.errors import FieldError, FormatError
 
 if TYPE_CHECKING:
-    import geopandas as gpd
-
     from geofield.model import Field
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -51,35 +49,25 @@ def parcel_and_point(
         raise _missing(lat)
     from geofield.farm.place_files import CSV
     from geofield.farm.place_reader import read_table
+    from geofield.field import field_from_boundary
     from geofield.formats.foreign import layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
 
+    in_layers = path.suffix.lower() not in CSV
     try:
-        if path.suffix.lower() in CSV:
-            return _parcel(read_table(path), name, lat, lon)
-        layers = layer_names(path) if layer is None and not is_own(path) else []
+        layers = layer_names(path) if in_layers and layer is None and not is_own(path) else []
         if len(layers) > 1:
             say_note(
                 f"{path.name}: of its layers {', '.join(layers)} the first is taken for the "
                 "parcels; name another with --boundary-layer."
             )
             layer = layers[0]
-        table = read_vector(path, layer)
+        table = read_vector(path, layer) if in_layers else read_table(path)
     except FormatError as error:
+        of_layers = "`ogrinfo` shows the layers of a file; name one with --boundary-layer."
         raise FieldError(
-            f"The boundary: {error.message}",
-            hint=error.hint
-            if path.suffix.lower() in CSV
-            else "`ogrinfo` shows the layers of a file; name one with --boundary-layer.",
+            f"The boundary: {error.message}", hint=of_layers if in_layers else error.hint
         ) from None
-    return _parcel(table, name, lat, lon)
-
-
-def _parcel(
-    table: gpd.GeoDataFrame, name: str | None, lat: float | None, lon: float | None
-) -> tuple[Field, float, float]:
-    from geofield.field import field_from_boundary
-
     parcel = field_from_boundary(table, lat=lat, lon=lon, name=name)
     if lat is None or lon is None:
         lon, lat = parcel.inside_lonlat

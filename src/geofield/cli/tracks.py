@@ -158,16 +158,18 @@ def _own_plan(file: Path) -> Plan | None:
     from geofield.formats.gpkg_read import is_own
     from geofield.plan import read_plan
 
-    layer = schema.FIELD.name
-    if file.suffix.lower() != ".gpkg" or not (is_own(file) or layer in layer_names(file)):
+    if file.suffix.lower() != ".gpkg":
         return None
-    if layer in layer_names(file):
+    own, layers, layer = is_own(file), layer_names(file), schema.FIELD.name
+    if layer in layers:
         ids = pyogrio.read_dataframe(file, layer=layer, columns=["field_id"], read_geometry=False)
         # An outline cut into rows, or deleted, is a plan's that says what to do.
-        if len(ids) != 1 and not (is_own(file) and len(ids.drop_duplicates()) < 2):
+        if len(ids) != 1 and not (own and len(ids.drop_duplicates()) < 2):
             return None
+    elif not own:
+        return None
     plan = read_plan(file)
-    if schema.TRACKS.name in layer_names(file) and not is_own(file):
+    if schema.TRACKS.name in layers and not own:
         say_note(
             f"{file.name} has lost the record of what was written (as copies made by other "
             "programs do): its tracks are planned anew, whatever was changed of them."

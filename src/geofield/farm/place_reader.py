@@ -288,8 +288,10 @@ def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
     first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
     swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
     if swapped.all():
-        how = "in the file (`ogr2ogr -swapXY`)" if raw.geometry else "the columns' names"
-        hint = f"Latitude and longitude look swapped: exchange them {how}."
+        what = (
+            "the columns' names" if raw.geometry is None else "them in the file (`ogr2ogr -swapXY`)"
+        )
+        hint = f"Latitude and longitude look swapped: exchange {what}."
     elif len(wrong) < len(lat):
         hint = "Other rows are degrees: these may be in another CRS. Bring all rows into one."
     else:
@@ -322,12 +324,16 @@ def _names(
         if double:
             first = double[0]
             rows = [i + 1 for i, one in enumerate(column.to_pylist()) if one == first]
-            cut = "If they are parts of one field, merge them (QGIS: Merge Selected Features). "
+            hint = (
+                "Give each place an id of its own, or name another column "
+                "(`geofield batch --id-column`)."
+            )
+            if raw.geometry is not None:
+                hint += " Merge what are parts of one field (QGIS: Merge Selected Features)."
             raise FormatError(
                 f"{raw.name}: column {id_name!r} holds {len(double)} ids more than once, such as "
                 f"{first!r} in rows {', '.join(map(str, rows[:5]))}.",
-                hint=("" if raw.geometry is None else cut) + "Else give each place an id of its "
-                "own, or name another column (`geofield batch --id-column`).",
+                hint=hint,
             )
         ids = column.take(kept).to_pylist()
     elif None not in names and len(set(names)) == len(names) > 1 and not part.any():

@@ -190,8 +190,8 @@ def _repaired(
         raise FieldError("The boundary has no area.", hint="Draw the outline anew.")
     areas = ground_areas_m2(reproject(parts, own, metric), metric)
     at = int(np.argmax(areas))
-    if point is not None and shapely.intersects(parts, point).any():
-        at = int(np.argmax(shapely.intersects(parts, point)))
+    if point is not None and (around := shapely.intersects(parts, point)).any():
+        at = int(np.argmax(around))
     sizes = in_words(areas[at], areas.sum() - areas[at])
     why = shapely.is_valid_reason(polygon)
     return parts[at], (f"the boundary was not valid ({why}) and was repaired: {sizes}",)

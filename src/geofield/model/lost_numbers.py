@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -36,6 +35,8 @@ def known_by_shape(
     rows : GeoDataFrame
     written : TracksWritten
     """
+    import pandas as pd
+
     numbers, shapes = np.array(track_numbers(rows)), rows.geometry.to_numpy()
     most = [len(written.segments.get(no, ())) if of is schema.TRACKS else 1 for no in numbers]
     lost = shapely.get_num_geometries(shapes) > np.maximum(most, 1)
@@ -77,6 +78,8 @@ def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDat
     tracks, segments : GeoDataFrame
         Layers `tracks` and `segments` of one field.
     """
+    import pandas as pd
+
     if not segments[["track_no", "segment_no"]].isna().any(axis=None):
         return segments
     known = tracks[tracks["track_no"].notna()]

@@ -124,7 +124,7 @@ class Desk:
                 "picture": self._picture_facts(),
                 "scale": 1.0 / float(ground_scale_of(plan.field.polygon, plan.field.crs)),
                 "theme": web_theme(),
-                # Plans are saved under other names: in an export of one, edits would be replaced.
+                # A plan is saved under another name: there is one way to have a second one.
                 "formats": [
                     (one.name, one.title) for one in FORMATS.values() if one.name != "gpkg"
                 ],

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from geofield.settings.machines import Machine
 from geofield.settings.section import nearest
+from geofield.settings.sections import HOMES, MODELS
 from geofield.settings.tracks import DirectionName
-from geofield.settings.whole import SECTIONS, names_of
 
 
 def explained(error: ValidationError) -> str:
@@ -30,15 +30,15 @@ def explained(error: ValidationError) -> str:
             message = "there is no such setting"
             section = str(problem["loc"][0])
             within: Iterable[str] = ()
-            if section in SECTIONS and len(problem["loc"]) == 2:
-                within = names_of(section)
+            if section in MODELS and len(problem["loc"]) == 2:
+                within = MODELS[section].model_fields
             elif section == "machines":
                 within = Machine.model_fields
             elif len(problem["loc"]) == 1:
-                within = SECTIONS
+                within = MODELS
             near = nearest(str(problem["loc"][-1]), within)
-            home = next((each for each in SECTIONS if section in names_of(each)), None)
-            near = near if home is None else f"It belongs to {home}"
+            if section in HOMES:
+                near = f"It belongs to {HOMES[section]}"
         elif not whole and problem["type"] in ("literal_error", "value_error"):
             choices = re.findall(r"'([^']+)'", message) or get_args(DirectionName)
             near = nearest(str(problem.get("input")), choices)

@@ -14,8 +14,9 @@ from geofield.errors import SettingsError
 from geofield.settings.explain import explained
 from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
 from geofield.settings.section import Section, nearest
+from geofield.settings.sections import HOMES, MODELS, SECTIONS, Stage
 from geofield.settings.tracks import said_over
-from geofield.settings.whole import SECTIONS, Settings, Stage, names_of
+from geofield.settings.whole import Settings
 
 _KNOWN = (*SECTIONS, "machines")
 _PREFIX = "GEOFIELD_"
@@ -118,11 +119,10 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
     """
     settings = settings or Settings()
     changed: dict[str, dict[str, Any]] = {}
-    home = {name: section for section in SECTIONS for name in names_of(section)}
     for name, value in values.items():
-        if name not in home:
-            raise SettingsError(f"There is no setting {name!r}.{nearest(name, home)}")
-        changed.setdefault(home[name], {})[name] = value
+        if name not in HOMES:
+            raise SettingsError(f"There is no setting {name!r}.{nearest(name, HOMES)}")
+        changed.setdefault(HOMES[name], {})[name] = value
     try:
         sections = {}
         for section, given in changed.items():
@@ -188,12 +188,9 @@ def from_mapping(values: Mapping[str, Any]) -> Settings:
         recorded = values.get(section, {})
         if not isinstance(recorded, Mapping):
             raise SettingsError(f"The recorded settings are damaged: {section} is no section.")
-        fields = names_of(section)
+        fields = MODELS[section].model_fields
         known[section] = {name: recorded[name] for name in recorded if name in fields}
-    try:
-        return Settings(**known)
-    except ValidationError as error:
-        raise SettingsError(explained(error)) from None
+    return Settings(**known)
 
 
 def _from_environment() -> dict[str, Any]:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from geofield.errors import SettingsError
+from geofield.settings.explain import explained
 from geofield.settings.export import ExportSettings
 from geofield.settings.field import FieldSettings
 from geofield.settings.imagery import FetchSettings, ImagerySettings
 from geofield.settings.machines import Machine
 from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import Section
+from geofield.settings.sections import MODELS
 from geofield.settings.tracks import TrackSettings
 from geofield.wording import learn
 
@@ -33,6 +35,11 @@ class Settings(Section):
     tracks: TrackSettings = TrackSettings()
     export: ExportSettings = ExportSettings()
 
+    # What follows from a machine stands in `tracks`, under its name.
+    machines: dict[str, Machine] = Field({}, exclude=True, repr=False)
+    # Keys live here: never written into a product.
+    fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
+
     @model_validator(mode="wrap")
     @classmethod
     def _in_words(cls, values: Any, check: ModelWrapValidatorHandler[Self]) -> Self:
@@ -40,19 +47,10 @@ class Settings(Section):
         try:
             return check(values)
         except ValidationError as error:
-            from geofield.settings.explain import explained
-
             raise SettingsError(explained(error)) from None
-
-    # What follows from a machine stands in `tracks`, under its name.
-    machines: dict[str, Machine] = Field({}, exclude=True, repr=False)
-    # Keys live here: never written into a product.
-    fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
 
 
 UNITS = ("_m", "_deg", "_px", "_ha")
-SECTIONS = ("imagery", "field", "obstacles", "tracks", "export", "fetch")
-Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
 
 
 def option_named(name: str, field: FieldInfo) -> str:
@@ -64,16 +62,10 @@ def option_named(name: str, field: FieldInfo) -> str:
     return "--" + name.removesuffix(unit).replace("_", "-")
 
 
-def names_of(section: str) -> tuple[str, ...]:
-    """The names of a section's settings."""
-    model: type[Section] = Settings.model_fields[section].annotation  # type: ignore[assignment]
-    return tuple(model.model_fields)
-
-
 learn(
     {
         option_named(name, field)[2:]: name
-        for section in SECTIONS
-        for name, field in Settings.model_fields[section].annotation.model_fields.items()  # type: ignore[union-attr]
+        for model in MODELS.values()
+        for name, field in model.model_fields.items()
     }
 )

@@ -102,9 +102,10 @@ def column_terms(layer: str, column: schema.Column, name: str, series: pd.Series
     """The terms of a column; refuses numbers that are infinite."""
     values = series.astype(object).where(series.notna(), None).tolist()
     if column.type == "float":
-        for row in [row for row, v in enumerate(values) if v is not None and not math.isfinite(v)]:
+        wrong = [row for row, v in enumerate(values) if v is not None and not math.isfinite(v)]
+        if wrong:
             raise FormatError(
-                f"Layer {layer!r}, row {row}: {column.name} is infinite.",
+                f"Layer {layer!r}, row {wrong[0]}: {column.name} is infinite.",
                 hint="Correct the value, or leave it empty.",
             )
         return Texts([None if v is None else repr(float(v)) for v in values], "xsd:double")

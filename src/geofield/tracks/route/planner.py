@@ -113,14 +113,13 @@ def plan_route(
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
     )
-    count = len(np.unique(track_no))
+    notes, count = tracks.notes, len(np.unique(track_no))
     if pattern == "skip" and 1 < count <= skip + 1:
         note = (
             f"Of {count} tracks {skip} cannot be left out at a turn: each is followed by the next."
         )
         warnings.warn(note, TrackWarning, stacklevel=2)
-        tracks = replace(tracks, notes=(*tracks.notes, note))
-    notes = tracks.notes
+        notes = (*notes, note)
     cut_off = sum(turn.kind == "none" for turn in turns)
     if cut_off:
         note = (
