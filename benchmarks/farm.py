@@ -110,7 +110,7 @@ def parcels(folder: Path) -> list[str]:
     parts = list((folder / "farm").rglob("*.parquet"))
     size = sum(each.stat().st_size for each in parts) / PARCELS
     return [
-        f"{PARCELS} real parcels turned and moved, spacing 4 m, {CORES} Dask workers on "
+        f"{PARCELS} real parcels turned and moved, spacing 4 m, {CORES} workers on "
         f"{CORES} cores, load of the machine before: {os.getloadavg()[0]:.1f}.",
         "",
         "| work | seconds | goal |",
@@ -198,6 +198,8 @@ def _steady_s(farm: Path) -> float:
 
 def scheduler(folder: Path) -> list[str]:
     """A million places of no work through the scheduler of Dask."""
+    from distributed import Client, LocalCluster
+
     from geofield.farm import read_places
     from geofield.farm.chunk import Orders, Task
     from geofield.farm.cluster import Cluster
@@ -225,11 +227,12 @@ def scheduler(folder: Path) -> list[str]:
     chunks = -(-len(found) // size)
     orders = Orders(Store.of(folder / "none"), Job(Settings()))
     tasks = (Task(n, list(found.take(order[n * size : (n + 1) * size]))) for n in range(chunks))
-    cluster = Cluster.here(CORES, no_work)
-    begun = time.perf_counter()
-    done = sum(one.counts["done"] for one in cluster.run(tasks, orders, Control()))
-    took = time.perf_counter() - begun
-    cluster.close()
+    with LocalCluster(n_workers=CORES, threads_per_worker=1, dashboard_address=None) as machines:
+        cluster = Cluster(Client(machines, set_as_default=False), no_work)
+        begun = time.perf_counter()
+        done = sum(one.counts["done"] for one in cluster.run(tasks, orders, Control()))
+        took = time.perf_counter() - begun
+        cluster.close()
     held = psutil.Process().memory_info().rss / 1e6
     return [
         f"{done} places in {chunks} chunks of {size}, {CORES} workers, no work in them; load of "
@@ -283,8 +286,8 @@ def faults(folder: Path, count: int) -> list[str]:
         status = gpd.read_parquet(target / "status")
         lost += int((status["status"] != "done").sum()) + abs(len(status) - 1500)
     return [
-        f"{sum(hits.values())} times SIGKILL at random moments ({hits['main']} the main process "
-        f"with the scheduler, {hits['worker']} a worker, {hits['all']} all at once) in {rounds} "
+        f"{sum(hits.values())} times SIGKILL at random moments ({hits['main']} the main process, "
+        f"{hits['worker']} a worker, {hits['all']} all at once) in {rounds} "
         "runs over 1500 parcels, each started again until it was done.",
         "",
         "| what | figure | goal |",
@@ -298,7 +301,7 @@ def _kill(main: int, whom: str, chance: random.Random) -> int:
     """End a process; 1 where there was one."""
     try:
         tree = psutil.Process(main).children(recursive=True)
-        # The resource tracker and nannies are no workers: those have threads that work.
+        # One that still loads has nothing to lose.
         targets = {"main": [main], "all": [main, *(each.pid for each in tree)]}.get(whom)
         if targets is None:
             workers = [each for each in tree if each.memory_info().rss > 1.5e8]

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import geopandas as gpd
@@ -22,27 +23,18 @@ import geofield as gf
 from geofield.farm import read_farm
 from geofield_command import run_geofield
 
-GEOFIELD = Path(sys.executable).with_name("geofield")
-#: The command without the extra, as where it is not installed.
-PLAIN = [
-    sys.executable,
-    "-c",
-    "import sys; sys.modules['distributed'] = None; from geofield.cli import main; main()",
-]
-
-
+GEOFIELD = str(Path(sys.executable).with_name("geofield"))
 RECTANGLE = ((0, 0), (80, 0), (80, 60), (0, 60))
 
 
-def batch(*arguments: object, code: int = 0, plain: bool = True) -> str:
-    """Run the command, without the extra or with it; its messages."""
-    without = ["distributed"] if plain else []
+def batch(*arguments: object, code: int = 0, without: Sequence[str] = ()) -> str:
+    """Run the command; its messages."""
     return told_by(run_geofield("batch", *arguments, without=without, timeout_s=500), code)
 
 
-def batch_alone(*arguments: object, code: int = 0, plain: bool = True) -> str:
+def batch_alone(*arguments: object, code: int = 0) -> str:
     """The same as a process from the start: in another one, sets have another order."""
-    line = [*(PLAIN if plain else [str(GEOFIELD)]), "batch", *map(str, arguments)]
+    line = [GEOFIELD, "batch", *map(str, arguments)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=500, check=False)
     return told_by(done, code)
 
@@ -119,11 +111,10 @@ def test_a_restart_does_only_what_is_missing(farm: Path, tmp_path: Path) -> None
     assert layers_of(farm) == before
 
 
-@pytest.mark.slow
-def test_dask_and_two_workers_give_the_same_bytes(farm: Path, tmp_path: Path) -> None:
+def test_two_workers_give_the_same_bytes(farm: Path, tmp_path: Path) -> None:
     told = batch_alone(farm.parent / "parcels.gpkg", "--spacing", 5, "--out", tmp_path / "farm",
-                       "--workers", 2, plain=False)  # fmt: skip
-    assert "dashboard at http" in told
+                       "--workers", 2)  # fmt: skip
+    assert "2 workers on this machine" in told
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
@@ -207,7 +198,7 @@ def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> No
 
 
 def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_path: Path) -> None:
-    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+    line = [GEOFIELD, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
             str(tmp_path / "farm"), "--workers", "1"]  # fmt: skip
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     work = tmp_path / "farm" / ".work"
@@ -221,7 +212,7 @@ def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_
     assert "The same command does what is missing" in said
     done = len(read_farm(tmp_path / "farm"))
     assert 0 < done < 60
-    batch(*line[4:])
+    batch(*line[2:])
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
@@ -229,7 +220,7 @@ def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_
 def test_a_run_that_is_ended_at_once_goes_on_later(
     number: signal.Signals, farm: Path, tmp_path: Path
 ) -> None:
-    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+    line = [GEOFIELD, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
             str(tmp_path / "farm"), "--workers", "2"]  # fmt: skip
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 120
@@ -239,7 +230,7 @@ def test_a_run_that_is_ended_at_once_goes_on_later(
     process.communicate(timeout=60)
     assert process.returncode in (1, -signal.SIGKILL)
     assert len(read_farm(tmp_path / "farm")) < 60
-    batch(*line[4:])
+    batch(*line[2:])
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
@@ -256,7 +247,7 @@ def test_a_worker_killed_while_it_writes_leaves_nothing(farm: Path, tmp_path: Pa
         "        return plain(self, target)\n"
         "    pathlib.Path.replace = bad\n"
     )
-    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+    line = [GEOFIELD, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
             str(tmp_path / "farm"), "--workers", "1"]  # fmt: skip
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "bad")}
     process = subprocess.Popen(line, stderr=subprocess.DEVNULL, env=environment)
@@ -267,7 +258,7 @@ def test_a_worker_killed_while_it_writes_leaves_nothing(farm: Path, tmp_path: Pa
     process.wait()
     assert list(tmp_path.glob("farm/tracks/chunk=0000/.*.tmp"))
     (tmp_path / "farm" / ".half.tmp").write_bytes(b"of the record")
-    batch(*line[4:])
+    batch(*line[2:])
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
@@ -293,7 +284,7 @@ def test_a_run_killed_at_its_end_is_finished_by_the_next(farm: Path, tmp_path: P
         "    module.finish = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "bad")}
-    ended = subprocess.run([*PLAIN, "batch", *map(str, line)], env=environment, check=False)
+    ended = subprocess.run([GEOFIELD, "batch", *map(str, line)], env=environment, check=False)
     assert ended.returncode == -signal.SIGKILL
     assert layers_of(mine) != layers_of(farm)
     batch(*line)
@@ -340,7 +331,7 @@ def test_a_bad_field_does_not_take_others_with_it(
     body: str, options: tuple[str, ...], status: str, words: str, tmp_path: Path
 ) -> None:
     places = parcels(tmp_path / "p.gpkg", 10)
-    line = [*PLAIN, "batch", str(places), "--out", str(tmp_path / "farm"), "--workers", "1"]
+    line = [GEOFIELD, "batch", str(places), "--out", str(tmp_path / "farm"), "--workers", "1"]
     done = subprocess.run([*line, *options], capture_output=True, text=True, timeout=300,
                           check=False, env=killing(tmp_path / "bad", body))  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -350,7 +341,7 @@ def test_a_bad_field_does_not_take_others_with_it(
     assert row["status"] == status
     assert words in row["error"]
     # And without what was bad, it is done.
-    batch(*line[4:], "--retry")
+    batch(*line[2:], "--retry")
     assert len(read_farm(tmp_path / "farm")) == 10
 
 
@@ -400,7 +391,6 @@ def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
         (("p.gpkg", "--out", "thesis"), 1, "not empty"),
         (("p.gpkg", "--spacing", "-1", "--out", "farm"), 2, "spacing_m"),
         (("p.gpkg", "--out", "p.gpkg"), 1, "p.gpkg"),
-        (("p.gpkg", "--scheduler", "tcp://127.0.0.1:9", "--out", "farm"), 1, "does not answer"),
         (("p.gpkg", "--scheduler", "x", "--workers", "2", "--out", "farm"), 2, "not both"),
         (("two.gpkg", "--out", "farm"), 1, "--layer"),
     ],
@@ -418,11 +408,18 @@ def test_bad_input_is_told_and_leaves_nothing(
     Path("points.csv").write_text("lat,lon\n35.07,33.53\n")
     Path("thesis").mkdir()
     Path("thesis/text.txt").write_text("years of work")
-    said = batch(*arguments, code=code, plain=False)
+    said = batch(*arguments, code=code)
     assert words in said
     left = set(Path("farm").rglob("*")) if Path("farm").exists() else set()
     assert not {path for path in left if path.suffix == ".parquet"}
     assert [each.name for each in Path("thesis").iterdir()] == ["text.txt"]
+
+
+def test_a_cluster_needs_the_extra(tmp_path: Path) -> None:
+    words = (parcels(tmp_path / "p.gpkg", 4), "--scheduler", "tcp://127.0.0.1:9")
+    said = batch(*words, "--out", tmp_path / "farm", code=1, without=["distributed"])
+    assert "pip install geofield[batch]" in said
+    assert not list((tmp_path / "farm").rglob("*"))
 
 
 def test_parcels_without_shape_fail_alone(tmp_path: Path) -> None:
@@ -522,7 +519,7 @@ def test_workers_that_cannot_do_the_work_are_refused(
 def test_workers_that_are_killed_do_no_harm(farm: Path, tmp_path: Path) -> None:
     import psutil
 
-    line = [*PLAIN, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
+    line = [GEOFIELD, "batch", str(farm.parent / "parcels.gpkg"), "--spacing", "5", "--out",
             str(tmp_path / "farm"), "--workers", "2"]  # fmt: skip
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     killed = 0

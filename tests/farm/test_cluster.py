@@ -152,79 +152,20 @@ def test_a_farm_stays_whole_where_nobody_can_do_the_work(tmp_path: Path) -> None
     assert len(read_farm(farm)) == 4
 
 
-#: A stop that comes when the first of the workers is begun.
-STOPPED_MAKING = """
-import os, signal, sys
-from distributed import Nanny
-make = Nanny.__init__
-def stopped(self, *args, **given):
-    make(self, *args, **given)
-    os.kill(os.getpid(), signal.SIGTERM)
-Nanny.__init__ = stopped
-from geofield.cli import main
-if __name__ == "__main__":
-    main(["batch", *sys.argv[1:]])
-"""
-
-
-def test_a_stop_while_a_cluster_is_made(tmp_path: Path) -> None:
-    words = [str(parcels(tmp_path / "p.gpkg", 4)), "--workers", "2", "--out", "farm"]
-    line = [sys.executable, "-c", STOPPED_MAKING, *words]
-    done = subprocess.run(
-        line, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False
-    )
-    assert done.returncode == 1, done.stderr
-    said = [each for each in done.stderr.splitlines() if each]
-    assert said == ["Places     4 of p.gpkg", "Stopped; nothing half-written is left."]
-
-
-#: What Dask says when a connection ends.
-SAID = ("import logging", "said = logging.getLogger('distributed.batched').info")
-
-
-def with_a_cluster(made: str, *lines: str) -> subprocess.CompletedProcess[str]:
-    """A process that makes a cluster, `own`, and runs these lines."""
-    head = "from geofield.farm.cluster import Cluster, Store\nif __name__ == '__main__':"
-    script = "\n    ".join((head, f"own = {made}", *lines))
-    line = [sys.executable, "-c", script]
-    return subprocess.run(line, capture_output=True, text=True, timeout=100, check=True)
-
-
-def test_workers_of_this_machine_keep_their_memory() -> None:
-    done = with_a_cluster(
-        "Cluster.here(1)",
-        "import os",
-        "print(own._client.run(os.getenv, 'MALLOC_TRIM_THRESHOLD_'))",
-        "print(own._client.run(os.getenv, 'OMP_NUM_THREADS'))",
-        "own.close()",
-    )
-    trim, threads = (text.rpartition(": ")[2] for text in done.stdout.splitlines())
-    # With the limit that Dask sets, pictures take a third longer.
-    assert (trim, threads) == ("None}", "'1'}")
-
-
-def test_the_end_of_our_own_cluster_is_not_talked_of() -> None:
-    done = with_a_cluster(
-        "Cluster.here(1)",
-        *SAID,
-        "end = own._own[-1].close",
-        "own._own[-1].close = lambda **given: (end(**given), said('a comm is closed'))",
-        "own.close()",
-        "said('a cluster of somebody else')",
-    )
-    assert "a comm is closed" not in done.stderr
-    assert "a cluster of somebody else" in done.stderr
-
-
 def test_a_given_cluster_is_told_of_in_our_words(daskers: Daskers, tmp_path: Path) -> None:
+    """Of the end of a connection Dask says nothing in between, and later what it likes."""
     daskers.hire()
-    done = with_a_cluster(
-        f"Cluster.at({daskers.address!r}, Store({str(tmp_path)!r}))",
-        *SAID,
-        "said('a comm is closed')",
-        "own.close()",
-        "said('a cluster of somebody else')",
+    script = (
+        "import logging\n"
+        "from geofield.farm.cluster import Cluster, Store\n"
+        "said = logging.getLogger('distributed.batched').info\n"
+        f"own = Cluster.at({daskers.address!r}, Store({str(tmp_path)!r}))\n"
+        "said('a comm is closed')\n"
+        "own.close()\n"
+        "said('a cluster of somebody else')\n"
     )
+    line = [sys.executable, "-c", script]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=100, check=True)
     assert "a comm is closed" not in done.stderr
     assert "a cluster of somebody else" in done.stderr
 

@@ -34,8 +34,7 @@ SIDE_M = 120.0
 
 
 def geofield(*arguments: object, code: int = 0) -> str:
-    # Who does the work is nothing to edits: a cluster takes four seconds to begin.
-    done = run_geofield(*arguments, without=["distributed"])
+    done = run_geofield(*arguments)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stderr

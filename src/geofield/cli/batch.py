@@ -294,15 +294,15 @@ def _imagery(
 
 def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
     """Who does the work; said, with the address of a dashboard."""
-    from geofield.farm.pool import Pool, cores
-
     engine: Engine
-    if _has_dask():
+    if scheduler is None:
+        from geofield.farm.pool import Pool, cores
+
+        engine = Pool(workers or cores())
+    elif _has_dask():
         from geofield.farm.cluster import Cluster
 
-        engine = Cluster.at(scheduler, store) if scheduler else Cluster.here(workers or cores())
-    elif scheduler is None:
-        engine = Pool(workers or cores())
+        engine = Cluster.at(scheduler, store)
     else:
         raise GeofieldError(
             "A Dask cluster needs the extra: pip install geofield[batch]",

@@ -1,4 +1,4 @@
-"""A Dask cluster as engine: one of this machine, or any that exists (extra `batch`).
+"""A Dask cluster that somebody started, as engine (extra `batch`).
 
 Workers write into the farm's folder themselves; through the scheduler go only the places of a
 chunk, and back how many of them went well.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import signal
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -17,7 +15,7 @@ from typing import Any
 from geofield import __version__
 from geofield.errors import GeofieldError, NetworkError
 from geofield.farm.chunk import Done, Orders, Task, plan_chunk
-from geofield.farm.engine import ONE_THREAD, Control, Patience, one_thread
+from geofield.farm.engine import Control, Patience, one_thread
 from geofield.farm.marks import WORK
 from geofield.farm.store import Store
 from geofield.staging import unstopped
@@ -30,57 +28,19 @@ _CONNECT_S = 15
 class Cluster:
     """A Dask cluster.
 
-    `own` is closed with the engine: nothing of a cluster that was given; `after` is called when all
-    of it is. `work` is what workers do with a chunk, for measuring the scheduler alone.
+    `client` is closed with the engine, and `after` called then. `work` is what workers do with a
+    chunk, for measuring the scheduler alone.
     """
 
     def __init__(
         self,
         client: Any,
-        own: list[Any] | None = None,
         work: Callable[[Task, Orders], Done] | None = None,
         after: Callable[[], None] | None = None,
     ) -> None:
         self._client = client
-        self._own = own or []
         self._after = after or (lambda: None)
         self._work = work or _work
-
-    @classmethod
-    def here(cls, workers: int, work: Callable[[Task, Orders], Done] | None = None) -> Cluster:
-        """A cluster of processes on this machine."""
-        import dask
-        from distributed import Client, LocalCluster
-
-        # A chunk that ends a worker is handed back at once; which place it was, its marks tell.
-        dask.config.set({"distributed.scheduler.allowed-failures": 0})
-        # Dask has the C library hand memory back at every turn; pictures need it again at the next,
-        # and a place takes a third longer.
-        dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ONE_THREAD)})
-        # Nor do its workers look a hundred times a second where their one thread is.
-        dask.config.set({"distributed.worker.profile.enabled": False})
-        made = None
-        try:
-            # Dask cannot end what is half made, and takes a second to make it.
-            with unstopped():
-                # Before the cluster is there, which gives back the messages while it still ends.
-                give_back = _held_messages()
-                cluster = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    env=ONE_THREAD,
-                    memory_limit=0,
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=50,
-                )
-                client = Client(cluster, set_as_default=False)
-                made = cls(client, [client, cluster], work, give_back)
-        except BaseException:
-            if made is not None:
-                made.close()
-            raise
-        return made
 
     @classmethod
     def at(cls, address: str, store: Store) -> Cluster:
@@ -104,7 +64,7 @@ class Cluster:
                 f"The scheduler {address} does not answer ({type(error).__name__}).",
                 hint="Start one with `dask scheduler`, and name its address: tcp://HOST:8786.",
             ) from None
-        cluster = cls(client, [client], after=give_back)
+        cluster = cls(client, after=give_back)
         try:
             cluster.check(store)
         except BaseException:
@@ -204,26 +164,14 @@ class Cluster:
                     future.cancel()
 
     def close(self) -> None:
-        """Leave the cluster; end it where it is our own.
+        """Leave the cluster.
 
         A stop waits until that is done: what is left half closed Dask closes when Python ends, and
         waits ten seconds for it.
         """
-        with unstopped():
-            for each in self._own:
-                for nanny in getattr(each, "workers", {}).values():
-                    # Native code does not listen: it is not asked.
-                    nanny.auto_restart = False
-                    with contextlib.suppress(OSError, AttributeError, TypeError):
-                        os.kill(nanny.pid, signal.SIGKILL)
-            ended = True
-            for each in self._own:
-                try:
-                    each.close(timeout=10)
-                except (TimeoutError, OSError):
-                    ended = False  # it goes on ending, and talks of it
-            if ended:
-                self._after()
+        with unstopped(), contextlib.suppress(TimeoutError, OSError):
+            self._client.close(timeout=10)
+            self._after()  # else it goes on ending, and talks of it
 
 
 def _held_messages() -> Callable[[], None]:

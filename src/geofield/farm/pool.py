@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import IO, Any
 
@@ -19,6 +19,8 @@ from geofield.farm.chunk import Done, Orders, Task
 from geofield.farm.engine import ONE_THREAD, Control, Patience
 from geofield.farm.worker import receive, send
 
+#: What a worker is started with.
+PROGRAM: Sequence[str] = (sys.executable, "-m", "geofield.farm.worker")
 #: Workers that end before they are ready: more of them are no accident.
 _FALSE_STARTS = 3
 _GONE = object()
@@ -117,7 +119,7 @@ class _Worker:
         errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the worker
         path = os.pathsep.join(part for part in sys.path if part)
         process = subprocess.Popen(
-            [sys.executable, "-m", "geofield.farm.worker"],
+            PROGRAM,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=errors,
