@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import sys
 from pathlib import Path
@@ -19,5 +20,7 @@ with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as calls:
         "environment": dict(os.environ),
         "without": [],
     }
-    called(calls, sys.argv[1], request, [0, 1, 2])
+    process = called(calls, sys.argv[1], request, [0, 1, 2])
+    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(each, lambda number, _: os.kill(process, number))
     sys.exit(int(calls.recv(20)))

@@ -11,6 +11,7 @@ import select
 import socket
 import sys
 import warnings
+from contextlib import suppress
 from typing import Any
 
 _LARGEST_BYTES = 1_000_000
@@ -24,7 +25,7 @@ def called(calls: socket.socket, address: str, request: dict[str, Any], files: l
 
 
 def served() -> list[str] | None:
-    """Serve the socket whose number is the first argument.
+    """Serve the socket whose number is the first argument; its address is the second.
 
     Returns, in a new process for each request, the words of that request, and None at the end.
     """
@@ -57,7 +58,8 @@ def _answered(calls: socket.socket) -> list[str]:
         os.close(file)
     calls.send(str(process).encode())
     _, status = os.waitpid(process, 0)
-    calls.send(str(os.waitstatus_to_exitcode(status)).encode())
+    with suppress(BrokenPipeError):  # who asked for it has been ended
+        calls.send(str(os.waitstatus_to_exitcode(status)).encode())
     os._exit(0)
 
 

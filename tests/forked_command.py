@@ -1,4 +1,4 @@
-"""The command with all of geofield loaded, for `geofield_command`.
+"""The command and its workers with all of geofield loaded, for `geofield_command`.
 
 It has one thread of Python and starts none before it forks. The other one that it has, of
 pyarrow's allocator, knows of forks.
@@ -11,8 +11,13 @@ import importlib
 import os
 import pkgutil
 import sys
+from pathlib import Path
 
 from fork_server import served
+
+#: The word for a process that plans fields for `batch`.
+WORKER = "a worker"
+_ASKS = Path(__file__).with_name("asked_command.py")
 
 #: What geofield loads when it needs it, for most commands.
 LIBRARIES = (
@@ -40,11 +45,18 @@ def load() -> None:
 def main() -> None:
     """Load, and run the command in a process of its own each time."""
     load()
+    address = sys.argv[2]
     words = served()
-    if words is not None:
-        sys.argv[:] = ["geofield", *words]
-        from geofield.cli import main as command
+    if words is None:
+        return
+    from geofield.cli import main as command
+    from geofield.farm import pool, worker
 
+    if words == [WORKER]:
+        worker.main()
+    else:
+        pool.PROGRAM = (sys.executable, "-ES", str(_ASKS), address, WORKER)
+        sys.argv[:] = ["geofield", *words]
         command()
 
 

@@ -21,7 +21,7 @@ class Forks:
     Parameters
     ----------
     line : sequence of str
-        Its command line; the number of a socket is added.
+        Its command line; the number of a socket and its address are added.
     environment : mapping
         What its libraries may read while they load.
     """
@@ -35,7 +35,7 @@ class Forks:
             door.bind(self.address)
             door.listen()
             self._process = subprocess.Popen(
-                [*line, str(door.fileno())],
+                [*line, str(door.fileno()), self.address],
                 env=self.environment,
                 pass_fds=[door.fileno()],
                 stdin=subprocess.PIPE,  # ends with this process

@@ -10,8 +10,7 @@ import atexit
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from forks import Forks
@@ -76,11 +75,9 @@ def run_geofield(
     return done
 
 
-@contextmanager
-def asked() -> Iterator[list[str]]:
-    """A program for shells that stands for the command, loaded once."""
-    forks = Forks([sys.executable, str(_PROGRAM)], os.environ)
-    try:
-        yield [sys.executable, "-ES", str(_ASKS), forks.address]
-    finally:
-        forks.end()
+def asking() -> list[str]:
+    """A program that stands for the command, loaded once, in shells and for processes that go on.
+
+    It ends as the command does and hands signals on, but for a kill.
+    """
+    return [sys.executable, "-ES", str(_ASKS), _forks(dict(os.environ)).address]

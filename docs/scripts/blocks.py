@@ -10,8 +10,9 @@ A block with a file name as its title (``toml title="geofield.toml"``) is writte
 file first, below what an earlier page put there. ``python docs/scripts/blocks.py --update
 PAGE...`` writes the outputs anew.
 
-Each page is run in a folder of its own, for a reader who comes straight to it, and those of
-:func:`course` also one after another in one folder, for a reader who goes through them all.
+Each page is run in a folder of its own, for a reader who comes straight to it. Who goes through
+all of :func:`course` in one folder finds that no page writes what another one wrote; ``--course``
+does so.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ _FENCE = re.compile(
 )
 _TITLE = re.compile(r'title="([^"]*)"')
 _OUTPUTS = ("Output", "For example")
+#: What stands behind an option or a sign that names a file to write, or between quotes.
+_WRITTEN = re.compile(r"(?:--out|-o|>)[ =]([\w./-]+)|[\"']([\w-]+(?:\.\w+|/))[\"']")
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,16 @@ def course() -> list[Path]:
     ]
     last = max(at for at, page in enumerate(ordered) if page.parent.name == "how-to")
     return [page for page in ordered[: last + 1] if page in runnable]
+
+
+def written(page: Path) -> set[str]:
+    """Names, without their endings, that the blocks of a page write in their folder.
+
+    `geofield` is not among them: its file of settings grows from page to page.
+    """
+    blocks = [block.body for block in read_blocks(page.read_text("utf-8")) if not block.is_output]
+    found = [name for body in blocks for names in _WRITTEN.findall(body) for name in names]
+    return {re.split(r"[./]", name)[0] for name in found} - {"", "geofield"}
 
 
 def real_data() -> Path | None:

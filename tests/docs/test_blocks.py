@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from geofield_command import asked
+from geofield.settings import load_settings
+from geofield_command import asking
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs" / "scripts"))
@@ -16,51 +16,45 @@ sys.path.insert(0, str(ROOT / "docs" / "scripts"))
 import blocks  # noqa: E402
 
 PAGES = blocks.pages()
-#: One after another: a page that starts a cluster names its port.
-IN_TURN = pytest.mark.xdist_group("cluster of the documentation")
-
 
 #: Here the command starts from nothing, as a reader's does; loaded once, it takes half the time.
 FROM_NOTHING = ("README.md", "docs/tutorial.md", "docs/how-to/install.md")
 
 
-@pytest.fixture(scope="session")
-def loaded() -> Iterator[list[str]]:
-    with asked() as program:
-        yield program
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [
-        pytest.param(page, marks=[IN_TURN] if "--scheduler" in page.read_text("utf-8") else [])
-        for page in PAGES
-    ],
+    PAGES,
     ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_blocks_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     shared = request.getfixturevalue("shared") if blocks.needs_shared(page) else None
     nothing = str(page.relative_to(ROOT)) in FROM_NOTHING
-    program = blocks.COMMAND if nothing else request.getfixturevalue("loaded")
+    program = blocks.COMMAND if nothing else asking()
     assert blocks.run_pages([page], tmp_path, shared, program=program) > 0
+    left = {each.name.split(".")[0] for each in (tmp_path / "geofield").iterdir()}
+    assert page not in blocks.course() or left - {"sample_data", "geofield"} <= blocks.written(page)
 
 
 def test_the_pages_of_beginners_are_there() -> None:
     assert {str(page.relative_to(ROOT)) for page in PAGES} > set(FROM_NOTHING)
 
 
-@pytest.mark.slow
-@IN_TURN
-def test_a_reader_goes_through_all_of_them_in_one_folder(tmp_path: Path, loaded: list[str]) -> None:
-    names = [page.relative_to(blocks.DOCS).as_posix() for page in blocks.course()]
-    assert names[0] == "tutorial.md"
+def test_a_reader_can_go_through_all_of_them_in_one_folder(tmp_path: Path) -> None:
+    course = blocks.course()
+    assert course[0] == blocks.DOCS / "tutorial.md"
     how_to = {page for page in PAGES if page.parent.name == "how-to"}
     assert len(how_to) > 8
-    assert how_to < set(blocks.course())
-    shared = blocks.real_data()
-    course = [page for page in blocks.course() if shared or not blocks.needs_shared(page)]
-    assert blocks.run_pages(course, tmp_path, shared, program=loaded) > 40
+    assert how_to < set(course)
+    # What each of them leaves is known by its names: see test_blocks_run.
+    names = [name for page in course for name in blocks.written(page)]
+    assert {name for name in names if names.count(name) > 1} == set()
+    with (tmp_path / "geofield.toml").open("w") as file:
+        for page in course:
+            for block in blocks.read_blocks(page.read_text("utf-8")):
+                file.write(block.body if block.title == "geofield.toml" else "")
+    settings = load_settings(tmp_path / "geofield.toml")
+    assert {"drill", "sprayer"} <= set(settings.machines)
 
 
 def test_a_file_of_settings_grows_from_page_to_page(

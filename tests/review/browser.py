@@ -6,9 +6,8 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,11 +19,18 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
+from geofield_command import asking
+
 
 @contextmanager
-def served(plan_path: Path, *options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """The address that the command prints, and its process."""
-    command = [sys.executable, "-m", "geofield", "review", str(plan_path), "--no-browser"]
+def served(
+    plan_path: Path, *options: str, program: Sequence[str] = ()
+) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The address that the command prints, and its process.
+
+    `program` is the command; one whose libraries are loaded when not given.
+    """
+    command = [*(program or asking()), "review", str(plan_path), "--no-browser"]
     process = subprocess.Popen(
         [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

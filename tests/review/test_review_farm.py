@@ -35,7 +35,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = ["--spacing", "4", "--workers", "1", "--out", str(folder / "farm")]
     picture = shutil.copy(SAMPLES / "field_1.tif", folder / "field_1.tif")
     seeds = SAMPLES / "seeds.csv"
-    run_geofield("batch", seeds, picture, *options, without=["distributed"], check=True)
+    run_geofield("batch", seeds, picture, *options, check=True)
     return folder
 
 

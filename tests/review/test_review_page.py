@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import signal
 import sqlite3
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -28,6 +29,7 @@ from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import DirectionName
 
+GEOFIELD = str(Path(sys.executable).with_name("geofield"))
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
 
 
@@ -294,7 +296,7 @@ def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
 def test_edits_come_back_after_the_server_is_killed(
     driver: webdriver.Chrome, plan_path: Path
 ) -> None:
-    with served(plan_path) as (address, process):
+    with served(plan_path, program=[GEOFIELD]) as (address, process):
         page = Page(driver, address)
         page.press("j", "r")
         page.wait(lambda: page.judged() == 1)
