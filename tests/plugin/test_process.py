@@ -41,13 +41,8 @@ def process(qgis_environment):
     return run
 
 
-@pytest.mark.parametrize("where", ["sample", "real chip"])
-def test_all_algorithms_one_after_the_other(process, request, tmp_path, where):
+def test_all_algorithms_one_after_the_other(process, tmp_path):
     picture, point, truth = SAMPLE, POINT, ROOT / "sample_data" / "field_1.gpkg"
-    if where == "real chip":
-        picture = _chip(request.getfixturevalue("shared"))
-        lon, lat = _middle(picture)
-        point, truth = f"{lon},{lat} [EPSG:4326]", tmp_path / "source.gpkg"
     cut = process("imagery", IMAGERY=picture, POINT=point, SIZE_M=90, OUTPUT=tmp_path / "cut.tif")
     assert Path(cut["OUTPUT"]).is_file()
     plan = tmp_path / "plan.gpkg"
@@ -70,7 +65,7 @@ def test_all_algorithms_one_after_the_other(process, request, tmp_path, where):
     assert len(read_dataset(routed).table("route")) > 0
     (planned,) = (tmp_path / "tracks").glob("*.gpkg")
     made = read_dataset(planned)
-    assert len(made.table("obstacles")) > (10 if where == "sample" else 0)
+    assert len(made.table("obstacles")) > 10
     out = tmp_path / "export"
     process("export", PLAN=f"{planned}|layername=field", FORMATS=["isoxml", "kml"], OUTPUT=out)
     (task,) = out.rglob("TASKDATA.XML")

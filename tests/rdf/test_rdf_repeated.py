@@ -51,6 +51,15 @@ def tracks(tmp_path_factory):
     return paths
 
 
+@pytest.fixture(scope="module")
+def text_of(tmp_path_factory):
+    """The text of a short file of tracks and points, by syntax."""
+    folder, options = tmp_path_factory.mktemp("short"), {"rdf_profile": "geosparql", "points": True}
+    paths = [writer(long_plan(1000), folder, options=options)[-1] for writer in WRITERS.values()]
+    assert None not in map(by_pattern, paths)
+    return {path.suffix: path.read_text() for path in paths}
+
+
 @pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("profile", write.PROFILES)
 def test_the_pattern_tells_what_the_parser_tells(tracks, profile, suffix):
@@ -79,8 +88,8 @@ def test_points_of_a_plan_with_a_headland_and_a_route_stand_last(tmp_path, profi
     assert told(graph) == parsed(path)
 
 
-def test_points_in_a_comment_are_none(tracks, tmp_path):
-    text, point = tracks["geosparql", ".rdf"].read_text(), "\n\t<gf:TrackPoint "
+def test_points_in_a_comment_are_none(text_of, tmp_path):
+    text, point = text_of[".rdf"], "\n\t<gf:TrackPoint "
     first, last, end = text.index(point), text.rindex(point), text.rindex("\n</rdf:RDF>")
     # Twice in another notation: as many as a run leaves for the parser.
     other = text[last:end].replace(point, f"{point} ")
@@ -132,10 +141,10 @@ OTHERS = {
     ("suffix", "name"), [(suffix, name) for suffix, each in OTHERS.items() for name in each]
 )
 def test_any_other_form_tells_what_the_parser_tells_or_is_left_to_it(
-    tracks, tmp_path, suffix, name
+    text_of, tmp_path, suffix, name
 ):
     old, new = OTHERS[suffix][name]
-    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
+    text, path = text_of[suffix], tmp_path / f"tracks{suffix}"
     assert old in text
     path.write_bytes(text.replace(old, new, 1).encode(errors="surrogateescape"))
     graph = by_pattern(path)
@@ -145,16 +154,16 @@ def test_any_other_form_tells_what_the_parser_tells_or_is_left_to_it(
 
 @pytest.mark.parametrize("host", ["example.org:x", "a@b@c"])
 @pytest.mark.parametrize("suffix", [".rdf", ".ttl", ".nt"])
-def test_names_that_the_parser_refuses_are_refused(tracks, tmp_path, suffix, host):
+def test_names_that_the_parser_refuses_are_refused(text_of, tmp_path, suffix, host):
     path = tmp_path / f"tracks{suffix}"
-    text = tracks["geosparql", suffix].read_text()
+    text = text_of[suffix]
     path.write_text(text.replace("https://example.org/", f"https://{host}/"))
     assert by_pattern(path) is None
 
 
 @pytest.mark.parametrize("suffix", [".ttl", ".nt"])
-def test_of_two_values_the_first_in_the_file_stays_the_first(tracks, tmp_path, suffix):
-    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
+def test_of_two_values_the_first_in_the_file_stays_the_first(text_of, tmp_path, suffix):
+    text, path = text_of[suffix], tmp_path / f"tracks{suffix}"
     point = re.search(r"<[^<>]*/point/7>", text)
     assert point is not None
     after = re.search(r"\.\n(?=<[^<>]*/point/9>)", text)
@@ -191,8 +200,8 @@ def test_of_two_values_the_first_in_the_file_stays_the_first(tracks, tmp_path, s
         (".jsonld", '"onSegment": "https:', '"onSegment": "gf:'),
     ],
 )
-def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, suffix, old, new):
-    text, path = tracks["geosparql", suffix].read_text(), tmp_path / f"tracks{suffix}"
+def test_rows_of_another_form_are_read_in_their_place(text_of, tmp_path, suffix, old, new):
+    text, path = text_of[suffix], tmp_path / f"tracks{suffix}"
     assert old in text
     path.write_text(text.replace(old, new, 1))
     graph = load(path)
@@ -202,10 +211,10 @@ def test_rows_of_another_form_are_read_in_their_place(tracks, tmp_path, suffix, 
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_names_that_another_place_may_change_are_left_to_the_parser(tracks, tmp_path, suffix):
+def test_names_that_another_place_may_change_are_left_to_the_parser(text_of, tmp_path, suffix):
     # "urn:x/7" is whole, "x:7" among such may be a short form.
     path = tmp_path / f"tracks{suffix}"
-    text = tracks["geosparql", suffix].read_text()
+    text = text_of[suffix]
     path.write_text(text.replace("https://example.org/", "urn:x:"))
     assert by_pattern(path) is None
     assert told(load(path)) == parsed(path)
