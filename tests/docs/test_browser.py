@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_site import site
 
-__all__ = ["site"]
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("site")]
 
 WIDTHS_PX = {"phone": 390, "desktop": 1440}
