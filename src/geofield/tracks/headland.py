@@ -18,6 +18,9 @@ _MIN_PIECE_M = 1e-3
 #: A border is moved without what stands out less than this: where many vertices lie closer than
 #: GEOS rounds a buffer, it takes up to 15 times longer over them.
 _STANDS_OUT_M = 1e-3
+#: At some widths GEOS loses whole parts of a mitred border (libgeos/geos#1047), and not at others
+#: as near: what is moved farther leaves less, so that the largest of these is whole.
+_FARTHER_M = np.array([0.0, 1e-4, 2e-4])
 #: What a headland is wider than its passes is not worth a word below this.
 _REST_M = 0.05
 
@@ -30,12 +33,13 @@ def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometr
     """
     moved = outline if holes else Polygon(outline.exterior)
     plain = shapely.simplify(moved, _STANDS_OUT_M, preserve_topology=False)
-    inner = shapely.buffer(
+    tried = shapely.buffer(
         plain if plain.is_valid and not plain.is_empty else moved,
-        -width,
+        -width - _FARTHER_M,
         join_style="mitre",
         mitre_limit=MITRE_LIMIT,
     )
+    inner = tried[np.argmax(shapely.area(tried))]
     return inner if holes or not outline.interiors else shapely.intersection(inner, outline)
 
 
