@@ -3,7 +3,8 @@
 Shortest ways are exact: the way around a few shapes alone is never longer than the way around
 all, so that once it is free of every shape it is the shortest. Shapes come in only
 when the way found so far runs into them (the visibility graph of Lozano-Perez and Wesley 1979,
-grown lazily).
+grown lazily). A way turns at a corner only where it grazes the shape there, so that of all lines
+between corners few are looked along.
 """
 
 from __future__ import annotations
@@ -27,6 +28,24 @@ _AROUND_M = 0.02
 """Ways keep this distance from corners, so that rounding never takes them inside."""
 _CORNERS = 16
 _SHELL = -1
+_GRAZES = 1e-9
+"""Lines along an edge count as grazing its corners, whatever their last digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Corners:
+    """Places (n, 2) where ways may turn, and the border's directions into and out of each."""
+
+    places: FloatArray
+    into: FloatArray
+    out: FloatArray
+
+    def graze(self, at: NDArray[np.int64], along: FloatArray) -> NDArray[np.bool_]:
+        """Whether lines at corners have the shape there on one side of them."""
+        square = np.einsum("ij,ij->i", along, along)
+        return np.asarray(
+            _cross(self.into[at], along) * _cross(self.out[at], along) <= _GRAZES * square
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +92,7 @@ class Passage:
         corners += [
             _corners_of(shapely.buffer(each, _AROUND_M, join_style="mitre")) for each in solid
         ]
-        self._corners: dict[int, FloatArray] = dict(enumerate(corners))
+        self._corners: dict[int, _Corners] = dict(enumerate(corners))
         inner = shapely.buffer(shell, margin_m - _AROUND_M, join_style="mitre")
         self._corners[_SHELL] = _corners_of(inner, inward=True)
         self._sights: dict[tuple[int, int], _Sight] = {}
@@ -112,7 +131,7 @@ class Passage:
         self, start: FloatArray, goal: FloatArray, around: list[int]
     ) -> tuple[FloatArray | None, list[int]]:
         """Shortest way around some shapes only, and which shapes it meets."""
-        groups = [np.stack((start, goal)), *(self._corners[shape] for shape in around)]
+        groups = [np.stack((start, goal)), *(self._corners[shape].places for shape in around)]
         first = np.cumsum([0, *map(len, groups)])
         rows, columns, lengths, sights = [], [], [], []
         keys = [None, *around]
@@ -120,7 +139,7 @@ class Passage:
             for j in range(i, len(keys)):
                 two = keys[j]
                 if one is None or two is None:
-                    sight = self._look(groups[i], groups[j], same=i == j)
+                    sight = self._look(groups[i], groups[j], *_pairs(groups[i], groups[j], i == j))
                 else:
                     sight = self._between(one, two)
                 blocked = np.isin(sight.shape, around)
@@ -152,14 +171,16 @@ class Passage:
         """Look between the corners of two shapes; remembered."""
         key = (one, two)
         if key not in self._sights:
-            self._sights[key] = self._look(self._corners[one], self._corners[two], same=one == two)
+            of, to = self._corners[one], self._corners[two]
+            a, b = _pairs(of.places, to.places, one == two)
+            along = to.places[b] - of.places[a]
+            kept = of.graze(a, along) & to.graze(b, along)
+            self._sights[key] = self._look(of.places, to.places, a[kept], b[kept])
         return self._sights[key]
 
-    def _look(self, one: FloatArray, two: FloatArray, *, same: bool) -> _Sight:
-        if same:
-            a, b = np.triu_indices(len(one), 1)
-        else:
-            a, b = (each.ravel() for each in np.indices((len(one), len(two))))
+    def _look(
+        self, one: FloatArray, two: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]
+    ) -> _Sight:
         if not len(a):
             none = np.empty(0, np.int64)
             return _Sight(none, none, np.empty(0), none, none)
@@ -177,20 +198,43 @@ class Passage:
         )
 
 
-def _circle_corners(x: float, y: float, radius: float) -> FloatArray:
+def _pairs(
+    one: FloatArray, two: FloatArray, same: bool
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Each place of one with each of the other, or each two of the same once."""
+    if same:
+        return np.triu_indices(len(one), 1)
+    a, b = np.indices((len(one), len(two)))
+    return a.ravel(), b.ravel()
+
+
+def _circle_corners(x: float, y: float, radius: float) -> _Corners:
     angle = np.arange(_CORNERS) * 2.0 * np.pi / _CORNERS
-    return np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle)))
+    return _turning(np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle))))
 
 
-def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> FloatArray:
+def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> _Corners:
     """Corners that stick out of a shape: only there can a shortest way around it turn.
 
     Or those that stick into it: of the border, within which ways are.
     """
-    found = [np.empty((0, 2))]
-    for part in shapely.get_parts(shape):
-        ring = shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
-        into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-        left = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] > 0.0
-        found.append(ring[left != inward])
-    return np.concatenate(found)
+    rings = shapely.get_exterior_ring(shapely.orient_polygons(shapely.get_parts(shape)))
+    found = [_turning(shapely.get_coordinates(ring)[:-1], inward=inward) for ring in rings]
+    none = np.empty((0, 2))
+    return _Corners(*(
+        np.concatenate([none, *(getattr(each, name) for each in found)])
+        for name in ("places", "into", "out")
+    ))  # fmt: skip
+
+
+def _turning(ring: FloatArray, *, inward: bool = False) -> _Corners:
+    """The corners of a ring at which it turns to the left, or `inward` those to the right."""
+    ahead = np.roll(ring, -1, axis=0) - ring
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-12)[:, None]
+    into = np.roll(ahead, 1, axis=0)
+    turns = (_cross(into, ahead) > 0.0) != inward
+    return _Corners(ring[turns], into[turns], ahead[turns])
+
+
+def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
+    return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
