@@ -18,6 +18,8 @@ from geofield import schema
 from geofield.crs import ground_areas_m2, transformer, utm_crs
 from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane
+from geofield.formats.export import dropped
+from geofield.formats.registry import format_named
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
 from geofield_command import run_geofield
@@ -165,6 +167,19 @@ def test_headland_of_agopengps(tmp_path):
     write_dataset(make_dataset(points=False), tmp_path / "bare", ["agopengps"])
     (file,) = (tmp_path / "bare").rglob("Headland.txt")
     assert file.read_text().split() == ["$Headland"]
+
+
+def test_a_headland_around_several_parts_is_told_of_agopengps(tmp_path):
+    dataset = crowded()
+    told = "the headland's line around all but the field's largest part"
+    assert told not in dropped(dataset, format_named("agopengps"))
+    strip = dataset.table("headland")
+    x = strip.geometry.iloc[0].centroid.x
+    across = shapely.box(x - 5, strip.total_bounds[1], x + 5, strip.total_bounds[3])
+    parted = strip.set_geometry(strip.union(across).intersection(dataset.table("field").geometry))
+    dataset = dataclasses.replace(dataset, tables=dataset.tables | {"headland": parted})
+    assert told in dropped(dataset, format_named("agopengps"))
+    assert told not in dropped(dataset, format_named("isoxml"))
 
 
 @pytest.mark.parametrize(("lon", "lat"), [(11.98, 50.0), (15.0, 70.0), (-70.0, -54.0)])

@@ -221,6 +221,7 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(
             Drop("the breaks in tracks (it has whole lines)", "gaps"),
             Drop("holes in obstacles", "polygons"),
+            Drop("the headland's line around all but the field's largest part", "parts"),
             *_TERMINAL_DROPS,
         ),
         precision_m=0.005,

@@ -16,6 +16,7 @@ from geofield.formats.gpkg_guests import replace_plan
 from geofield.formats.many import distinct, field_ids, joined
 from geofield.formats.names import safe_name
 from geofield.formats.registry import FORMATS, Format, format_named
+from geofield.formats.terminal import main_field
 from geofield.model import Dataset
 from geofield.model.obstacles import active
 from geofield.staging import staged_folder
@@ -199,6 +200,8 @@ def _present(dataset: Dataset, when: str) -> bool:
     obstacles = dataset.table(schema.OBSTACLES.name)
     if when == "polygons":
         return bool(obstacles["radius_m"].isna().any())
+    if when == "parts":
+        return len(main_field(dataset, dataset.table(schema.FIELD.name).geometry.iloc[0])) > 1
     if when == "passed":
         return len(active(obstacles)) < len(obstacles)
     layer, _, column = when.partition(".")

@@ -30,7 +30,8 @@ class Drop:
     when : str
         Which datasets have it: a layer (``gaps``), a column with values
         (``obstacles.confidence``), ``provenance``, ``polygons`` (obstacles that are not
-        circles) or ``passed`` (obstacles that are not driven around).
+        circles), ``passed`` (obstacles that are not driven around) or ``parts`` (a headland that
+        leaves the field in several).
     """
 
     words: str
