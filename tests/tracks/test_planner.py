@@ -663,3 +663,18 @@ def test_a_step_that_fills_the_disk_is_refused_with_one_that_does_not():
     step_m = float(refused.value.hint.split()[-2])
     tracks = plan_tracks(box(0, 0, 200, 120), crs=CRS, spacing_m=6.0, step_m=step_m)
     assert len(tracks.lines) == 20
+
+
+@pytest.mark.parametrize("direction", ["dominant", "longest_edge", "fewest", "fewest_turns"])
+def test_a_ring_may_begin_anywhere_and_run_either_way(direction: str) -> None:
+    """Of a rectangle two edges are the longest, of a round field none is."""
+    plain, round_field = box(0, 0, 97, 61.3), shapely.Point(X, Y).buffer(60, quad_segs=90)
+    for field in (plain, affinity.rotate(plain, 20), round_field):
+        ring = shapely.get_coordinates(field)[:-1]
+        rings = [np.roll(each, n, axis=0) for n in range(4) for each in (ring, ring[::-1])]
+        one, *others = (
+            plan_tracks(Polygon(each), crs=CRS, spacing_m=4, direction=direction).segments.geometry
+            for each in rings
+        )
+        assert all(len(each) == len(one) for each in others)
+        assert all(each.geom_equals_exact(one, 1e-4).all() for each in others)

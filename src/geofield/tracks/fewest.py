@@ -61,7 +61,7 @@ def fewest_direction(
         # Short ones, too: a heading is not better for what it leaves undriven.
         pieces, _ = clip_tracks(positions, turned)
         tracks, count = float(len(positions)), float(len(pieces))
-        width = float(turned.va.max() - turned.va.min())
+        width = round(float(turned.va.max() - turned.va.min()), 6)
         # Of equals, the one across which the field is narrowest.
         score = (count, tracks, width) if turns else (tracks, count, width)
         if best is None or score < best[0]:
@@ -83,6 +83,7 @@ def fewest_tracks(area: BaseGeometry, strips: Strips, scale: float = 1.0) -> int
 
 def candidate_angles(area: BaseGeometry, tolerance: float = 1.0) -> FloatArray:
     """Directions to try, radians counter-clockwise from the CRS's x axis, 0 <= angle < pi."""
+    area = shapely.normalize(area)
     parts = shapely.get_parts([area.simplify(tolerance), area.convex_hull])
     rings = [ring for ring in shapely.get_exterior_ring(parts) if ring is not None]
     edges = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])

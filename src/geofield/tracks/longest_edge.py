@@ -73,6 +73,11 @@ def own_edges(
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Vertices of the outer ring, and which edges from them are the picture's."""
     ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
+    # Of edges that are as long the first one counts, whichever vertex a file begins with.
+    xy = shapely.get_coordinates(ring)[:-1]
+    first = int(np.lexsort((xy[:, 1].round(3), -xy[:, 0].round(3)))[0])
+    xy = np.roll(xy, -first, axis=0)
+    ring = shapely.linearrings(xy)
     if shapely.get_num_coordinates(ring) > 400:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
         ring = shapely.simplify(ring, tolerance / 4.0)
@@ -150,7 +155,7 @@ def _longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) ->
         ahead = distance >= reach[active] - tolerance
         good = inside & ahead & ~near
         if good.any():
-            lengths = np.where(good, distance, -1.0)
+            lengths = np.where(good, distance, -1.0).round(6)
             top = int(np.argmax(lengths))
             if lengths[top] > best_length:
                 best_length, best_first, best_count = float(lengths[top]), int(active[top]), step
@@ -161,6 +166,6 @@ def _longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) ->
         active = active[ahead & (low[active] <= high[active])]
     if best_length < 0.0:
         # A field smaller than the tolerance: its longest single edge.
-        lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T)
+        lengths = np.hypot(*(np.roll(xy, -1, axis=0) - xy).T).round(6)
         return int(np.argmax(np.where(barred, -1.0, lengths))), 1
     return best_first, best_count
