@@ -12,6 +12,7 @@ import shapely
 
 from geofield import schema
 from geofield.errors import TrackError, TrackWarning
+from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks import plan_route, plan_tracks
 from geofield.tracks.route.order import track_order
@@ -158,8 +159,6 @@ def test_start_chooses_the_corner() -> None:
 
 def test_shortest_ways_are_shortest() -> None:
     """Around one circle the length is known: two tangents and an arc."""
-    from geofield.model.obstacles import ObstacleShapes
-
     shapes = ObstacleShapes(
         np.array([[50.0, 50.0, 10.0]]), np.array([1]), np.empty(0, dtype=object), np.empty(0, int)
     )
@@ -238,3 +237,12 @@ def test_round_outlines_cost_no_more_than_circles() -> None:
     drawn = processor_s(circles.buffer(5.0, quad_segs=32))
     # 18 where ways are looked for between all corners, 3 between those that they graze.
     assert drawn < 8.0 * processor_s(circles)
+
+
+def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:
+    ring = shapely.get_coordinates(shapely.segmentize(shapely.box(0, 0, 600, 400), 1.0))[:-1]
+    ring += np.random.default_rng(1).normal(0.0, 1e-4, ring.shape)
+    none = ObstacleShapes(np.empty((0, 3)), np.empty(0), np.empty(0, object), np.empty(0))
+    passage = Passage(shapely.Polygon(ring), none)
+    # 1007, and so 500 000 lines to look along, where each vertex is one.
+    assert len(passage._corners[-1].places) == 0

@@ -26,6 +26,8 @@ TOUCH_M = 2e-3
 """Ways may touch what they go around: checks look this much inside of it."""
 _AROUND_M = 0.02
 """Ways keep this distance from corners, so that rounding never takes them inside."""
+_STRAIGHT_M = 0.005
+"""What strays less from a line has no corner there, as the vertices along a straight border."""
 _CORNERS = 16
 _SHELL = -1
 _GRAZES = 1e-9
@@ -218,7 +220,8 @@ def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> _Corners:
 
     Or those that stick into it: of the border, within which ways are.
     """
-    rings = shapely.get_exterior_ring(shapely.orient_polygons(shapely.get_parts(shape)))
+    plain = shapely.simplify(shapely.get_parts(shape), _STRAIGHT_M)
+    rings = shapely.get_exterior_ring(shapely.orient_polygons(plain))
     found = [_turning(shapely.get_coordinates(ring)[:-1], inward=inward) for ring in rings]
     none = np.empty((0, 2))
     return _Corners(*(
