@@ -378,6 +378,14 @@ def test_a_machine_whose_passes_overlap_stays_within_the_border(
     assert max(kept) < 3.0 + spacing_m if last_strip == "leave" else max(kept) == pytest.approx(3.0)
 
 
+def test_a_pass_of_a_headland_narrower_than_half_the_machine_stays_within_the_border() -> None:
+    for width_m, headland_m in ((None, 2.0), (13.0, 6.0)):
+        how: Any = {"crs": CRS, "spacing_m": 6.0, "width_m": width_m}
+        planned = plan_tracks(box(0, 0, 200, 121), headland_m=headland_m, **how)
+        assert planned.headland_tracks is not None
+        assert planned.headland_tracks["offset_m"].tolist() == [(width_m or 6.0) / 2]
+
+
 def test_a_headland_is_told_to_be_worked_as_far_as_its_passes_reach() -> None:
     how: Any = {"crs": CRS, "spacing_m": 5.0, "width_m": 6.0}
     assert not plan_tracks(box(0, 0, 200, 120), headland_m=11.0, **how).notes

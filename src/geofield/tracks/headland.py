@@ -103,7 +103,9 @@ def headland_track_table(
     cuts stays closed.
     """
     passes = _passes(width_m, spacing_m)
-    offsets_m = [min(first_m + index * spacing_m, width_m) for index in range(passes)]
+    # In a headland narrower than half the machine, too, that stays within the border.
+    last_m = max(first_m, width_m)
+    offsets_m = [min(first_m + index * spacing_m, last_m) for index in range(passes)]
     areas = [inset(outline, offset_m * scale, holes=holes) for offset_m in offsets_m]
     blocked = _blocked(shapes, shapely.union_all(shapely.boundary(areas)))
     rows: list[tuple[int, int, float]] = []
