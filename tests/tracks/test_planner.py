@@ -378,6 +378,16 @@ def test_a_machine_whose_passes_overlap_stays_within_the_border(
     assert max(kept) < 3.0 + spacing_m if last_strip == "leave" else max(kept) == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("direction", [90.0, 270.0, "longest_edge"])
+def test_only_whole_strips_are_left_on_either_side_of_a_place(direction: Any) -> None:
+    for y in np.arange(20.0, 26.0):
+        how: Any = {"crs": CRS, "spacing_m": 6.0, "direction": direction, "last_strip": "leave"}
+        planned = plan_tracks(box(0, 0, 200, 100), through=(X + 9.0, Y + y), **how)
+        across = planned.segments.geometry.bounds["miny"].to_numpy() - Y
+        assert min(*across, *(100.0 - across)) >= 3.0 - 1e-2
+        assert len(across) == 1 + (y - 3.0) // 6.0 + (97.0 - y) // 6.0
+
+
 def test_a_pass_of_a_headland_narrower_than_half_the_machine_stays_within_the_border() -> None:
     for width_m, headland_m in ((None, 2.0), (13.0, 6.0)):
         how: Any = {"crs": CRS, "spacing_m": 6.0, "width_m": width_m}

@@ -128,9 +128,9 @@ def track_positions(
     `last_strip` is what becomes of the rest at the far side. ``overrun``: tracks as far as the
     field goes (the study's rule), so that the last strip may reach beyond the border by up to half
     a spacing, or a rest narrower than that stays unworked; ``leave``: only strips that lie wholly
-    inside; ``shift``: one more track, moved back until its strip ends at the far side; ``spread``:
-    the spacing shrinks evenly until strips fill the field exactly, those of a given width from
-    border to border.
+    inside, but for one at `first_m`; ``shift``: one more track, moved back until its strip ends at
+    the far side; ``spread``: the spacing shrinks evenly until strips fill the field exactly, those
+    of a given width from border to border.
     """
     if last_strip not in LAST_STRIPS:
         raise TrackError(
@@ -141,6 +141,8 @@ def track_positions(
     # machine would drive outside for nothing. What was asked for stays.
     idle = half - spacing_m + SNAP_M if half > spacing_m else -SNAP_M
     low, high = near_m + idle, far_m - idle
+    if last_strip == "leave":
+        low = near_m + half - SNAP_M
     if near_m - SNAP_M <= first_m <= far_m + SNAP_M:
         low, high = min(low, first_m), max(high, first_m)
     index = np.ceil((low - first_m) / spacing_m)
