@@ -20,7 +20,8 @@ from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane
 from geofield.formats.export import dropped
 from geofield.formats.registry import format_named
-from geofield.model import Field
+from geofield.formats.terminal import main_field
+from geofield.model import Dataset, Field, Provenance
 from geofield.model.obstacles import circle_polygons
 from geofield_command import run_geofield
 
@@ -167,6 +168,20 @@ def test_headland_of_agopengps(tmp_path):
     write_dataset(make_dataset(points=False), tmp_path / "bare", ["agopengps"])
     (file,) = (tmp_path / "bare").rglob("Headland.txt")
     assert file.read_text().split() == ["$Headland"]
+
+
+def test_the_line_at_which_machines_turn_has_no_spikes_along_a_hole():
+    corner = np.array([500_000.0, 5_600_000.0])
+    plain, hole = shapely.box(0, 0, 200, 100), shapely.box(85, 3, 95, 50)
+    for turned_deg in range(0, 90, 3):
+        place = {"angle": turned_deg, "origin": (100, 50)}
+        field = shapely.affinity.rotate(plain - shapely.affinity.rotate(hole, 7), **place)
+        field = shapely.transform(field, lambda c: c + corner)
+        tracks = gf.plan_tracks(field, crs=32632, spacing_m=6, headland_m=6)
+        dataset = Dataset({"headland": tracks.headland}, tracks.crs, "", Provenance())
+        # A hole reaches through the headland: the field's edge along it is the main area's, too.
+        (main,) = main_field(dataset, field)
+        assert main.distance(shapely.Polygon(field.exterior).exterior) > 5.99
 
 
 def test_a_headland_around_several_parts_is_told_of_agopengps(tmp_path):
