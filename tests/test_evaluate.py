@@ -185,8 +185,8 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
     for place, more in (("hits.png", []), ("scene.png", ["--overwrite"])):
         (tmp_path / "scene.png").write_bytes(b"mine")
         scene = ["--scene", str(tmp_path / "scene.png"), "--draw", str(tmp_path / place)]
-        with pytest.raises(SystemExit, match="1"):
-            main(["evaluate", *arguments, *scene, *more])
+        with pytest.raises(SystemExit, match="1"):  # before the layer is looked for
+            main(["evaluate", *arguments, *scene, *more, "--layer", "none"])
         assert ("is there already" if not more else "is an input") in capsys.readouterr().err
         assert (tmp_path / "scene.png").read_bytes() == b"mine"
     with pytest.raises(SystemExit, match="0"):

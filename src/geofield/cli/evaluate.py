@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,24 +83,27 @@ def evaluate(
         _refuse_other_pictures(picture)
     elif scene_file is not None:
         say_note("--scene changes nothing without --draw, which names the picture to write.")
-    found = read_obstacles(detected, layer, metric=True)
-    true = read_obstacles(truth, truth_layer)
-    options: dict[str, Any] = {"distance_m": distance_m, "seed": seed}
-    if driving:
-        plan = read_plan(detected)
-        if plan.tracks is None:
-            raise ObstacleError(
-                f"{detected.name} has no tracks.", hint="Plan them with geofield tracks first."
-            )
-        # Everything in the plan's own CRS, in which its tracks were planned.
-        found, crs = found.to_crs(plan.field.crs), plan.field.crs
-        options |= {"segments": plan.tracks.segments.to_crs(crs), "area": plan.field.polygon}
-    result = compare(found, true, **options)
+    inputs = [each for each in (detected, truth, scene_file) if each is not None]
+    # Entered first: what may not be replaced is refused before the work.
+    drawing = replacing(picture, overwrite=overwrite, inputs=inputs) if picture else nullcontext()
+    with drawing as place:
+        found = read_obstacles(detected, layer, metric=True)
+        true = read_obstacles(truth, truth_layer)
+        options: dict[str, Any] = {"distance_m": distance_m, "seed": seed}
+        if driving:
+            plan = read_plan(detected)
+            if plan.tracks is None:
+                raise ObstacleError(
+                    f"{detected.name} has no tracks.", hint="Plan them with geofield tracks first."
+                )
+            # Everything in the plan's own CRS, in which its tracks were planned.
+            found, crs = found.to_crs(plan.field.crs), plan.field.crs
+            options |= {"segments": plan.tracks.segments.to_crs(crs), "area": plan.field.polygon}
+        result = compare(found, true, **options)
+        if place is not None:
+            draw_matches(found, true, result, place, scene_file, area=options.get("area"))
     score = result.pooled
     if picture is not None:
-        inputs = [each for each in (detected, truth, scene_file) if each is not None]
-        with replacing(picture, overwrite=overwrite, inputs=inputs) as place:
-            draw_matches(found, true, result, place, scene_file, area=options.get("area"))
         say(f"Drawn to {picture}: hits green, missed blue, false red.")
     if as_json:
         figures = {"distance_m": distance_m, **score.as_dict(), "false_kinds": result.false_kinds}
