@@ -226,6 +226,13 @@ def test_map_scene_and_report_are_products_like_others(tmp_path, simulated, simu
     )
     assert done.returncode == 1
     assert "There is no picture" in done.stderr
+    plan, bare, whole = tmp_path / "run" / "field.gpkg", tmp_path / "bare", tmp_path / "whole"
+    done = geofield("export", plan, "-f", "map", "--out", bare)
+    assert "Shown without the picture, which is not beside the plan" in done.stderr
+    done = geofield("export", plan, "-f", "map", "--picture", simulated_tif, "--out", whole)
+    assert done.stderr.splitlines() == [str(whole / "map.png")]
+    maps = [(folder / "map.png").read_bytes() for folder in (bare, whole, tmp_path / "run")]
+    assert maps[0] != maps[1] == maps[2]
 
 
 def test_what_a_person_edited_is_what_others_read(plan_file, tmp_path):

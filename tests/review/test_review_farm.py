@@ -60,6 +60,11 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     assert desk.picture is not None  # it lies beside the farm
     assert desk.export("kml")["files"] == [f"export/{desk.path.stem}/{desk.path.stem}.kml"]
     assert [path.name for path in (farm / "export").iterdir()] == [desk.path.stem]
+    pages = (["export", farm, "-f", "html", "--out", farm / folder] for folder in ("a", "b"))
+    run_geofield(*next(pages), check=True)
+    assert "data:image/" in next((farm / "a").glob("*.html")).read_text()
+    (farm.parent / "field_1.tif").rename(farm.parent / "elsewhere.tif")
+    assert "Shown without the picture" in run_geofield(*next(pages), check=True).stderr
     number = int(desk.session.plan.obstacles["obstacle_no"].iloc[0])  # type: ignore[index]
     desk.edit({"do": "status", "no": number, "status": "rejected"})
     assert "rejected" not in statuses(farm, shown[0])

@@ -1554,6 +1554,11 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <location filename="description.json" />
+      <source>Picture to show, or a folder of some; by default that beside PLAN, or the farm's.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Customer</source>
       <translation>Kunde</translation>

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import tempfile
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.farm import say_waiting
-from geofield.cli.files import FOLDER, PATH, claim_folder, tell_unsaved
+from geofield.cli.files import FOLDER, OLD_PATH, PATH, claim_folder, tell_unsaved
+from geofield.errors import GeofieldError
+
+if TYPE_CHECKING:
+    from geofield.model import Dataset
 
 
 @click.command(
@@ -30,6 +36,11 @@ Examples (on the project's own sample):
 @click.option("--out", "folder", required=True, type=FOLDER, help="Folder for the products.")
 @click.option("--stem", default="field", show_default=True, help="Name of single files.")
 @click.option("--crs", help="CRS of PLAN where the file does not say it, e.g. EPSG:32633.")
+@click.option(
+    "--picture",
+    type=OLD_PATH,
+    help="Picture to show, or a folder of some; by default that beside PLAN, or the farm's.",
+)
 @click.option("--customer", help="Customer's name, for terminals.")
 @click.option("--farm", help="Farm's name, for terminals.")
 @click.option(
@@ -58,6 +69,7 @@ def export(
     folder: Path,
     stem: str,
     crs: str | None,
+    picture: Path | None,
     further: tuple[str, ...],
     overwrite: bool,
     as_json: bool,
@@ -73,6 +85,7 @@ def export(
     together or not at all; what a format cannot carry is said once.
     """
     from geofield.farm import is_farm, read_farm
+    from geofield.farm.pictures import pictures_of
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.many import apart
@@ -88,17 +101,26 @@ def export(
         raise click.UsageError(f"No chosen format knows {flag}. {unknown[1]}")
     products = [product.replace("{stem}", stem) for each in chosen for product in each.files]
     claim_folder(folder, {product.partition("/")[0] for product in products})
-    datasets = []
+    datasets: list[Dataset] = []
+    pictured = any(each.pictured for each in chosen)
+    cuts = click.get_current_context().with_resource(
+        tempfile.TemporaryDirectory(prefix="geofield-")
+    )
     for plan_file in plan_files:
+        below = picture
         if is_farm(plan_file):
             say_waiting(plan_file)
-            datasets += [plan.to_dataset() for plan in read_farm(plan_file)]
-            continue
-        tell_unsaved(plan_file.parent, (plan_file.name,))
-        dataset = read_dataset(plan_file, crs=crs)
-        for note in dataset.notes:
-            say(note)
-        datasets += apart(dataset)
+            own = [plan.to_dataset() for plan in read_farm(plan_file)]
+            below = picture or pictures_of(plan_file)
+        else:
+            tell_unsaved(plan_file.parent, (plan_file.name,))
+            dataset = read_dataset(plan_file, crs=crs)
+            for note in dataset.notes:
+                say(note)
+            own = apart(dataset)
+        if pictured and below is not None:
+            own = [_on(below, each, cuts, asked=picture is not None) for each in own]
+        datasets += own
     written = write_datasets(
         datasets,
         folder,
@@ -113,6 +135,24 @@ def export(
         return
     for path in written:
         say(str(path))
+
+
+def _on(picture: Path, dataset: Dataset, cuts: str, *, asked: bool) -> Dataset:
+    """The dataset with its part of the picture, unless nobody asked for it and it has none."""
+    from geofield.imagery import write_scene
+    from geofield.plan import Plan
+    from geofield.settings import Settings
+    from geofield.windows import scene_of_plan
+
+    plan = Plan.from_dataset(dataset)
+    try:
+        scene = scene_of_plan(picture, plan, plan.settings or Settings())
+    except GeofieldError:
+        if asked:
+            raise
+        return dataset
+    place = Path(tempfile.mkdtemp(dir=cuts)) / "scene.tif"
+    return replace(dataset, scene_path=write_scene(scene, place))
 
 
 def _named(text: str) -> tuple[str, str]:

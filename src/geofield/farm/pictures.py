@@ -1,4 +1,4 @@
-"""The user's own pictures of a farm: whether places lie in them at all."""
+"""The user's own pictures of a farm: where they are, and whether places lie in them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import shapely
 
 from geofield.crs import LONLAT, reproject
 from geofield.errors import ImageryError
+from geofield.farm.folder import Record
 from geofield.farm.places import Places
+from geofield.farm.store import Store
 from geofield.grid import Grid
 from geofield.settings import Settings
 from geofield.windows import grid_of
@@ -54,3 +56,11 @@ def _shows_outlines(grid: Grid, places: Places) -> bool:
 def _inside(grid: Grid, lat: np.ndarray, lon: np.ndarray) -> np.ndarray:
     x, y = grid.from_lonlat(lon, lat)
     return np.asarray((x >= 0) & (y >= 0) & (x <= grid.width_px) & (y <= grid.height_px))
+
+
+def pictures_of(folder: Path) -> Path | None:
+    """The pictures that the farm was planned on, beside it or in the current folder."""
+    record = Record.read(Store.of(folder))
+    name = str(((record and record.imagery) or {}).get("imagery", ""))
+    places = (folder.parent / name, Path(name)) if name else ()
+    return next((place for place in places if place.exists()), None)

@@ -263,6 +263,7 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(_ORIGIN,),
         crs="the picture's own",
         automatic=True,
+        pictured=True,
     ),
     Format(
         "map",
@@ -273,6 +274,7 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(_ORIGIN,),
         crs="metric",
         automatic=True,
+        pictured=True,
     ),
     Format(
         "map-svg",
@@ -282,6 +284,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.mapping.plot:write_svg",
         drops=(_ORIGIN,),
         crs="metric",
+        pictured=True,
     ),
     Format(
         "map-pdf",
@@ -291,6 +294,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.mapping.plot:write_pdf",
         drops=(_ORIGIN,),
         crs="metric",
+        pictured=True,
     ),
     Format(
         "report",
@@ -309,5 +313,6 @@ CATALOGUE: tuple[Format, ...] = (
         suffixes=(".html",),
         drops=(_ORIGIN,),
         crs="metric",
+        pictured=True,
     ),
 )

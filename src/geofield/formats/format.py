@@ -90,6 +90,8 @@ class Format:
     steers : bool
         Whether machines are steered along its lines: of tracks that run through an obstacle it is
         not written.
+    pictured : bool
+        Whether it shows the picture of a plan.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself.
@@ -113,6 +115,7 @@ class Format:
     fields: Literal["one", "apart", "many", "joined"] = "one"
     steers: bool = False
     several: str | None = None
+    pictured: bool = False
 
     def load_writer(self) -> Writer:
         """The writer, imported."""

@@ -33,9 +33,6 @@ from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
 from geofield.windows import scene_of_plan
 
-#: Formats that show the picture.
-_PICTURED = ("scene", "map", "map-svg", "map-pdf", "html")
-
 
 class Desk:
     """A plan, from a GeoPackage of geofield, on the desk.
@@ -199,7 +196,7 @@ class Desk:
 
     def export(self, name: str) -> dict[str, Any]:
         """Write the plan as edited in another format, into a folder of its own beside it."""
-        from geofield.formats import write_dataset
+        from geofield.formats import format_named, write_dataset
         from geofield.imagery import write_scene
 
         folder, stem = self._exports()
@@ -210,7 +207,7 @@ class Desk:
         ):
             warnings.simplefilter("always", GeofieldWarning)
             dataset = self.session.plan.to_dataset()
-            if self._picture_path is not None and name in _PICTURED:
+            if self._picture_path is not None and format_named(name).pictured:
                 scene = picture_beside(self.path)
                 if scene != self._picture_path:
                     cut = self._scene_of(self.session.plan)

@@ -15,9 +15,9 @@ from typing import Any
 from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.farm import read_farm
 from geofield.farm.finish import renew_unless_edited
-from geofield.farm.folder import Record
 from geofield.farm.marks import CHANGED
 from geofield.farm.overview import OVERVIEW
+from geofield.farm.pictures import pictures_of
 from geofield.farm.put_back import put_back
 from geofield.farm.reviewed import name_of
 from geofield.farm.store import Store
@@ -136,7 +136,7 @@ def farm_desks(folder: Path, picture: Path | None) -> list[tuple[str, Callable[[
         _likely=found["certainty"].astype(float).fillna(1.0),
     )
     found = found.sort_values(["_begun", "reviewed", "_sure", "_likely"], kind="stable")
-    below = _picture_of(folder)
+    below = pictures_of(folder)
     return [
         (_title(row), partial(FarmDesk, folder, str(row.field_id), picture, below))
         for row in found.itertuples()
@@ -151,11 +151,3 @@ def _title(row: Any) -> str:
     name = row.name if row.name in ("", row.field_id) else f"{row.name} ({row.field_id})"
     mark = "✓" if row.reviewed else "?" if row.status == "doubtful" else ""
     return " ".join(part for part in (name or row.field_id, mark) if part)
-
-
-def _picture_of(folder: Path) -> Path | None:
-    """The pictures that the farm was planned on, beside it or in the current folder."""
-    record = Record.read(Store.of(folder))
-    name = str(((record and record.imagery) or {}).get("imagery", ""))
-    places = (folder.parent / name, Path(name)) if name else ()
-    return next((place for place in places if place.exists()), None)
