@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,15 @@ def test_the_truth_lies_where_the_picture_shows_it(seed: int) -> None:
     x, y = made.scene.grid.from_lonlat(made.lon, made.lat)
     assert made.field.polygon_px(made.scene.grid).contains(shapely.Point(x, y))
     assert min(np.hypot(made.obstacles["x_px"] - x, made.obstacles["y_px"] - y)) > 5
+
+
+def test_a_crown_is_held_against_those_around_it_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[None] = []
+    distance = math.hypot
+    monkeypatch.setattr(math, "hypot", lambda *xy: compared.append(None) or distance(*xy))
+    made = simulate_field(4, SimulationSettings(width_px=512, height_px=512, obstacles=200))
+    assert len(made.obstacles) == 200
+    assert len(compared) < 10_000  # 63 847 with all others
 
 
 def test_equal_brightness_means_equal_grey_levels_and_other_colours() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -167,6 +169,9 @@ def _crowns(rng: np.random.Generator, settings: SimulationSettings, outline: Pol
     low, high = (r / settings.resolution_m for r in settings.radius_m)
     x0, y0, x1, y1 = outline.bounds
     placed: list[tuple[float, float, float]] = []
+    # By squares so wide that what touches a crown stands in its own or in one beside it.
+    wide, near = 2 * high + 3, defaultdict[tuple[int, int], list[tuple[float, float, float]]](list)
+    shapely.prepare(outline)
     for attempt in range(400 * max(wanted, 1)):
         if len(placed) == wanted:
             break
@@ -174,11 +179,14 @@ def _crowns(rng: np.random.Generator, settings: SimulationSettings, outline: Pol
         shrink = 1.0 - 0.6 * attempt / (400 * wanted)
         radius = max(low, math.exp(rng.uniform(math.log(low), math.log(high))) * shrink)
         x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
-        point = Point(x, y)
-        if not outline.contains(point) or outline.exterior.distance(point) < radius + 3:
+        column, row = int(x // wide), int(y // wide)
+        if any(math.hypot(x - a, y - b) <= radius + r + 3 for a, b, r in near[column, row]):
             continue
-        if all(math.hypot(x - a, y - b) > radius + r + 3 for a, b, r in placed):
+        inside = shapely.contains_xy(outline, x, y)
+        if inside and outline.exterior.distance(Point(x, y)) >= radius + 3:
             placed.append((x, y, radius))
+            for i, j in itertools.product((-1, 0, 1), repeat=2):
+                near[column + i, row + j].append(placed[-1])
     return np.array(placed, float).reshape(-1, 3)
 
 
