@@ -23,6 +23,7 @@ from geofield.crs import LONLAT, ground_scale_of, transformer
 from geofield.errors import FormatWarning, ObstacleError
 from geofield.grid import Grid
 from geofield.model.copies import without_copies
+from geofield.model.merged_rows import unmerged
 from geofield.model.obstacle_numbers import lost_numbers, possible_numbers
 from geofield.model.obstacles import (
     FloatArray,
@@ -62,7 +63,8 @@ def reconcile(
     A row without a number, or with a number that another row has (a copy of that one), was drawn:
     it becomes `added` (unless another status was chosen) and gets the next free number; a safety
     margin typed for it grows what was drawn, a radius makes it a circle. One that lies exactly
-    on its original is no further obstacle (`geofield.model.copies`). Points and lines become
+    on its original is no further obstacle (`geofield.model.copies`); of merged rows each is what it
+    was (`geofield.model.merged_rows`). Points and lines become
     areas (`geofield.model.resized.widened`). Rows without a shape are dropped.
 
     Parameters
@@ -88,7 +90,7 @@ def reconcile(
     """
     table = _with_shapes(obstacles)
     record = (from_earlier_version(table) if written is None else written).by_number
-    table = without_copies(table, record)
+    table = without_copies(unmerged(table, record), record)
     rows = _Rows.of(table)
     _fill_lost_numbers(rows, list(record.values()))
     known, before = _known(rows, record)
