@@ -287,7 +287,7 @@ def _find(
     field, wide = grow_field(
         read, lat=lat, lon=lon, size_m=first_m, largest_m=max(6400.0, first_m), **options
     )
-    tell_guesses(wide, told=scene.guesses)
+    tell_guesses(wide, after=scene)
     return field, wide
 
 

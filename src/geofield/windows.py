@@ -7,7 +7,6 @@ was drawn, and the further points that were clicked: what it does not show is no
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,10 @@ if TYPE_CHECKING:
 
 #: Side of the first window where nobody asked for one, ground metres.
 WINDOW_M = 400.0
+_BLANK = (
+    "A part of the picture is pure black and counts as ground: is the file damaged, or does the "
+    "picture end there? `gdal_edit.py -a_nodata 0 PICTURE` says that nothing is seen there."
+)
 #: Ground shown around an outline.
 _AROUND_M = 25.0
 
@@ -73,11 +76,19 @@ def _refuse_whole(boundary: Field, grid: Grid) -> None:
     )
 
 
-def tell_guesses(scene: Scene, *, told: Sequence[str] = ()) -> None:
-    """Warn of what had to be guessed about a picture and was not told before."""
-    for guess in scene.guesses:
+def tell_guesses(scene: Scene, *, after: Scene | None = None) -> None:
+    """Warn of what had to be guessed about a picture and was not told `after` another scene."""
+    told = () if after is None else _guesses(after)
+    for guess in _guesses(scene):
         if guess not in told:
             warnings.warn(guess, ImageryWarning, stacklevel=3)
+
+
+def _guesses(scene: Scene) -> tuple[str, ...]:
+    from geofield.imagery.fill import has_blank
+
+    blank = scene.scaling is None and has_blank(scene.bands, scene.valid)
+    return (*scene.guesses, *([_BLANK] if blank else ()))
 
 
 def _read(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 import rasterio
 from affine import Affine
 
+from geofield import plan_field
 from geofield.imagery import SceneReader, read_scene
 
 from .pictures import EAST, NORTH, ground, write
@@ -94,3 +96,18 @@ def test_ground_is_not_taken_for_a_fill(tmp_path: Path) -> None:
     black = ground()
     black[:, :12] = 0  # bytes are not scaled, and stay as they are
     assert read_scene(write(tmp_path / "b.tif", black, photometric="RGB")).valid.all()
+
+
+def test_pure_black_that_no_tag_explains_is_told(tmp_path: Path, sample: Path) -> None:
+    """As of a file that was copied in part, whose pieces were not compressed."""
+    with rasterio.open(sample / "field_1.tif") as file:
+        values, profile = file.read(), file.profile
+    values[:, 300:400, 200:300] = 0
+    for name, tags, count in (("black", {}, 1), ("told", {"nodata": 0}, 0)):
+        picture = tmp_path / f"{name}.tif"
+        with rasterio.open(picture, "w", **{**profile, "driver": "GTiff", **tags}) as file:
+            file.write(values)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            plan_field(picture, lat=35.075373, lon=33.531142, spacing_m=6)
+        assert sum("pure black" in str(one.message) for one in caught) == count
