@@ -224,16 +224,21 @@ def _work_on(plan: Plan) -> Iterator[str]:
         yield "columns of your own"
 
 
-def refuse_lost_obstacles(plan: Plan) -> None:
-    """A layer of obstacles that is gone, with a person's work in it, is a slip and no word."""
+def refuse_lost_obstacles(plan: Plan, *, searched: bool = True) -> None:
+    """A layer of obstacles that is gone is a slip and no word, with a person's work in it.
+
+    Where they are not `searched` for again it is with any: tracks would run through them.
+    """
     written = plan.evidence.written
     if plan.obstacles is not None or written is None:
         return
     said = sum(row.kept for row in written.rows) + len(written.removed)
-    if said:
+    lost = f"{said} that a person reviewed, drew or took away" if said else ""
+    if not (said or searched):
+        lost = f"{len(written.rows)} that were found" if written.rows else ""
+    if lost:
         raise ObstacleError(
-            f"The layer `obstacles` of {plan.field.name} is gone, with {said} that a person "
-            "reviewed, drew or took away.",
+            f"The layer `obstacles` of {plan.field.name} is gone, with {lost}.",
             hint="Give it back its name, or `geofield undo`; to have none, delete its rows alone.",
         )
 

@@ -329,7 +329,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
 def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
-    refuse_lost_obstacles(plan)
+    refuse_lost_obstacles(plan, searched=False)
     obstacles, said = None, still_said(plan, settings)
     evidence = replace(plan.evidence, track_edits=read_track_edits(plan), said_tracks=said)
     if plan.obstacles is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -47,12 +48,17 @@ def test_nothing_to_undo(folder: Path) -> None:
 
 
 def test_a_layer_that_is_gone_is_no_word(folder: Path, made: SimulatedField) -> None:
-    file = folder / "out/field.gpkg"
+    file, rename = folder / "out/field.gpkg", "ALTER TABLE obstacles RENAME TO trees"
+    found = shutil.copy(file, folder / "found.gpkg")
+    subprocess.run(["ogrinfo", "-q", found, "-sql", rename], check=True)
+    # Nobody's work: a search finds them again, but tracks ran through all of them.
+    done = run_geofield("tracks", found, "-o", found)
+    assert done.returncode == 1
+    assert "`obstacles` of" in done.stderr
+    assert "that were found" in done.stderr
     rewritten(file, "obstacles", lambda table: table[~at(table, 6)])
     geofield("tracks", file, "--spacing", 6, "-o", file)
-    subprocess.run(
-        ["ogrinfo", "-q", file, "-sql", "ALTER TABLE obstacles RENAME TO trees"], check=True
-    )
+    subprocess.run(["ogrinfo", "-q", file, "-sql", rename], check=True)
     written = file.read_bytes()
     where = ["--lat", made.lat, "--lon", made.lon]
     for stage in (

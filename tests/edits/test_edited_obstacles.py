@@ -139,10 +139,12 @@ def test_a_word_in_the_table_alone(folder: Path, made: SimulatedField) -> None:
             "status = NULL WHERE obstacle_no = 2",
             "status = 'maybe' WHERE obstacle_no = 3",
             "radius_m = 7 WHERE obstacle_no = 4",
+            "kind = 'Baum' WHERE obstacle_no > 5 AND obstacle_no < 10",
         ):
             connection.execute(f"UPDATE obstacles SET {change}")
     told = run(folder, made, "--overwrite")
     assert "'maybe' is none of detected" in told
+    assert "and 3 more: kind 'Baum' is none of tree, other" in told
     after = rows(plan_in(folder))
     assert after["status"][[1, 2, 3, 4]].tolist() == [
         "rejected",

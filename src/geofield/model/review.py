@@ -223,16 +223,19 @@ def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> N
     """Write `status` and `kind` as the schema spells them, empty ones as they were written."""
     for name, allowed in (("status", schema.STATUSES), ("kind", schema.KINDS)):
         values = rows.at[name]
+        unknown: dict[str, list[str]] = {}
         for row, value in enumerate(values.tolist()):
             word = None if pd.isna(value) else str(value).strip().lower()
             if word and word not in allowed:
-                warnings.warn(
-                    f"{rows.name_of(row)}: {name} {value!r} is none of {', '.join(allowed)} and "
-                    "is not used.",
-                    FormatWarning,
-                    stacklevel=3,
-                )
+                unknown.setdefault(repr(value), []).append(rows.name_of(row))
             values[row] = word if word in allowed else None
+        for said, names in unknown.items():
+            warnings.warn(
+                f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {name} {said} is "
+                f"none of {', '.join(allowed)} and is not used.",
+                FormatWarning,
+                stacklevel=3,
+            )
         for row, old in zip(known.tolist(), before, strict=True):
             if values[row] is None:
                 values[row] = getattr(old, name)
