@@ -775,6 +775,14 @@ def test_columns_are_known_in_any_case(folder: Path) -> None:
     assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["rejected", "added"]
 
 
+def test_shapes_of_one_part_among_several_are_no_edit(folder: Path) -> None:
+    for layer in ("field", "obstacles", "segments"):
+        path = folder / "farm" / "farm.gpkg"
+        table = pyogrio.read_dataframe(path, layer=layer)
+        pyogrio.write_dataframe(table, path, layer=layer, promote_to_multi=True)
+    assert "as edited" not in _batch(folder)
+
+
 def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path) -> None:
     """An edit that was taken back there was passed over without a word."""
     _edit(folder, "obstacles", _third("rejected"))

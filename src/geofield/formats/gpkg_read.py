@@ -138,7 +138,15 @@ def in_own_terms(
             f"{path.name}: layer {of.name!r} is no longer in {crs.name}.",
             hint="Export the layer in the CRS of the other layers, then repeat.",
         )
-    return _as_spelled(of, frame.set_crs(crs, allow_override=True))
+    frame = _as_spelled(of, frame.set_crs(crs, allow_override=True))
+    # Other programs write a lone part as one of several, which is no edit.
+    alone = frame.geom_type.eq(f"Multi{of.geometry}") & frame.count_geometries().eq(1)
+    if not alone.any():
+        return frame
+    import shapely
+
+    shapes = frame.geometry.to_numpy()
+    return frame.set_geometry(frame.geometry.mask(alone, shapely.get_geometry(shapes, 0)))
 
 
 def _exact(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
