@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 import rasterio
 
-from geofield.cli.main import COMMANDS
+from geofield.cli.main import COMMANDS, main
 from geofield.simulate import SimulatedField
 from geofield_command import run_geofield
 
@@ -265,3 +265,20 @@ def test_a_library_that_ends_badly_takes_no_exit_code_with_it(
     assert done.returncode == code, done.stderr
     assert "GeoPackage" in done.stdout if code == 0 else done.stderr
     assert (tmp_path / "ended").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--resolution", "0,5", "'0,5' is no number: write 0.5."),
+        ("--resolution", "2m", "'2m' is no number: write 2."),
+        ("--lat", "N35", "'N35' is no number, such as 4.5."),
+        ("--fields", "2.5", "'2.5' is no whole number, such as 4."),
+    ],
+)
+def test_what_is_no_number_is_told_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, words: str
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["simulate", option, value, "--out", str(tmp_path / "new")])
+    assert words in " ".join(capsys.readouterr().err.split())

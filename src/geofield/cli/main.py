@@ -10,6 +10,7 @@ import errno
 import gc
 import importlib
 import os
+import re
 import sys
 import warnings
 from contextlib import ExitStack
@@ -109,6 +110,20 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
         say_note(str(message))
 
 
+_NO_NUMBER = re.compile(r"'(.*)' is not a valid (float|integer)(?: range)?\.")
+
+
+def _as_number(found: re.Match[str]) -> str:
+    """What click says of a value that is no number, with how one is written."""
+    given, kind = found.groups()
+    if kind == "integer":
+        return f"{given!r} is no whole number, such as 4."
+    digits = re.fullmatch(r"(-?\d+)(?:[.,](\d+))?\s*m?", given)
+    if digits is None:
+        return f"{given!r} is no number, such as 4.5."
+    return f"{given!r} is no number: write {'.'.join(filter(None, digits.groups()))}."
+
+
 def _end_stopped() -> NoReturn:
     stop_no_more()
     click.echo("Stopped; nothing half-written is left.", err=True)
@@ -190,6 +205,7 @@ def _run(args: list[str] | None) -> None:
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
         except click.ClickException as error:
+            error.message = _NO_NUMBER.sub(_as_number, error.message)
             error.show()
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt):
