@@ -200,6 +200,10 @@ def test_missing_and_unknown_files(tmp_path):
     (tmp_path / "x.abc").write_text("?")
     with pytest.raises(FormatError, match="is not known"):
         read_dataset(tmp_path / "x.abc")
+    (tmp_path / "x.tif").write_bytes(b"II*\0")
+    with pytest.raises(FormatError, match=r"x.tif is a picture") as told:
+        read_dataset(tmp_path / "x.tif")
+    assert "geofield run" in str(told.value)
     (tmp_path / "x.gpkg").write_text("not a database, only text that is long enough" * 10)
     with pytest.raises(FormatError, match="not a GeoPackage"):
         read_dataset(tmp_path / "x.gpkg")

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from geofield.errors import FormatError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
+from geofield.strangers import check_vector
 
 __all__ = ["FORMATS", "Drop", "Format", "detect", "format_named", "product_file"]
 
@@ -66,6 +67,7 @@ def detect(path: Path | str) -> Format:
             return each
     if place.name in ("Field.txt", "Boundary.txt", "TrackLines.txt"):
         return format_named("agopengps")
+    check_vector(place)
     raise FormatError(
         f"The format of {place} is not known.",
         hint=f"Known: {', '.join(sorted(s for f in FORMATS.values() for s in f.suffixes))}.",
