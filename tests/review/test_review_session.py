@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import numpy as np
@@ -407,6 +407,30 @@ def test_an_edit_that_the_disk_does_not_take_is_kept_and_noted_later(plan_path: 
     again = Desk(plan_path)
     assert str(again.brought_back).startswith("3 edits")
     assert again.session.plan == desk.session.plan
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_half_a_copy_of_the_opened_plan_stops_no_review(
+    plan_path: Path, monkeypatch: pytest.MonkeyPatch, killed: bool
+) -> None:
+    def half(source: Path, target: Path) -> None:
+        target.write_bytes(source.read_bytes()[:500_000])
+        raise OSError(28, "No space left on device")
+
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    monkeypatch.setattr(shutil, "copyfile", half)
+    with pytest.raises(GeofieldError, match="No space left"):
+        desk.save()
+    monkeypatch.undo()
+    if killed:
+        with suppress(OSError):
+            half(plan_path, desk.journal.opened)
+    desk.save()
+    desk.edit({"do": "status", "no": 4, "status": "rejected"})
+    # Killed here.
+    again = Desk(plan_path)
+    assert [row(again.session.plan, number)["status"] for number in (3, 4)] == ["rejected"] * 2
 
 
 def test_a_second_session_on_a_plan_takes_no_notes_of_the_first_away(plan_path: Path) -> None:

@@ -142,7 +142,11 @@ class Journal:
     def before_saving(self) -> None:
         """Keep the plan as it was opened, so that what was done on it can be undone."""
         if self._kept and not self.opened.exists():
-            shutil.copyfile(self.plan_path, self.opened)
+            try:
+                shutil.copyfile(self.plan_path, self.opened)
+            except OSError:
+                self.opened.unlink(missing_ok=True)  # half of it, on a full disk
+                raise
 
     def saved(self) -> None:
         """The edits so far lie in the plan now."""
@@ -203,7 +207,9 @@ class Journal:
             return []
         first = entries[0][0].get("plan")
         marks = [entry["saved"] for entry, _ in entries if "saved" in entry]
-        whole = not marks or (self.opened.exists() and content_of(read_plan(self.opened)) == first)
+        whole = not marks
+        with suppress(GeofieldError):  # gone, or only half was written when the session was killed
+            whole = whole or content_of(read_plan(self.opened)) == first
         if whole and [first, *marks][-1] == self._plan:
             return entries
         self._elsewhere = [entry for entry, _ in entries[1:]]
