@@ -288,3 +288,17 @@ def test_a_folder_beside_that_vanishes_meanwhile_is_no_matter(tmp_path, monkeypa
     with staged_folder(tmp_path, overwrite=True) as staging:
         (staging / "product.txt").write_text("whole", encoding="utf-8")
     assert (tmp_path / "product.txt").read_text(encoding="utf-8") == "whole"
+
+
+def test_a_disk_that_fills_under_a_database_is_told(tmp_path: Path) -> None:
+    def write() -> None:
+        with (
+            staged_folder(tmp_path) as folder,
+            closing(sqlite3.connect(folder / "field.gpkg")) as file,
+        ):
+            file.execute("PRAGMA max_page_count = 1")
+            file.execute("CREATE TABLE field (name)")
+
+    with pytest.raises(FormatError, match="The disk is full"):
+        write()
+    assert not list(tmp_path.iterdir())

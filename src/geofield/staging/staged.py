@@ -8,6 +8,7 @@ are swept by the next one (see `leftovers`).
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -71,6 +72,10 @@ def staged_folder(
                 _publish(work, target, staging, overwrite, inputs, before)
         except OSError as error:
             raise cannot_write(target, error) from error
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
+                raise
+            raise cannot_write(target, OSError(errno.ENOSPC, str(error))) from error
 
 
 @contextmanager
