@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import geopandas as gpd
 import pytest
@@ -60,6 +61,15 @@ def test_words_columns_and_place_tell_obstacles_from_fields(tmp_path, trees, fie
     assert back.table("field").area.iloc[0] == pytest.approx(20_000)
     assert f"{trees}: 4 polygons" in said
     assert f"{field}: 1 polygon taken as the field" in said
+
+
+def test_a_field_in_an_archive_is_called_after_the_archive(tmp_path):
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    write(folder / "a.shp", [BOX])
+    archive = shutil.make_archive(str(tmp_path / "North meadow"), "zip", folder)
+    _, _, back = imported(tmp_path, archive)
+    assert list(back.table("field")["name"]) == ["North meadow"]
 
 
 def test_one_tree_in_a_file_of_its_own(tmp_path):

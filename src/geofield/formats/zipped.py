@@ -55,7 +55,9 @@ def unpacked(path: Path) -> Iterator[Path]:
     """
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
+            # What has no name of its own is called after the folder.
+            folder = Path(name) / path.stem
+            folder.mkdir()
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             size = sum(entry.file_size for entry in entries)
             if size > MAX_BYTES:
