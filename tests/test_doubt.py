@@ -16,7 +16,7 @@ from PIL import Image
 
 import geofield as gf
 from geofield import theme
-from geofield.formats.qgis.project import frame_strip
+from geofield.formats.qgis.layer_style import frame_strip
 from geofield.imagery import write_scene
 from geofield.model.field import FieldQuality
 from geofield.model.frame import along_frame, shown_ground

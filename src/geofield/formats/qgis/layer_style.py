@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
-from geofield.formats.qgis.looks import LOOKS, Look, field_rules
+import shapely
+
+from geofield import schema
+from geofield.formats.qgis.looks import LOOKS, field_rules
 from geofield.formats.qgis.symbols import (
     QGIS_VERSION,
     document,
@@ -15,6 +17,8 @@ from geofield.formats.qgis.symbols import (
     rule_renderer,
 )
 from geofield.formats.xml import node
+from geofield.model import Dataset
+from geofield.model.frame import NEAR_PX, edge_strip
 from geofield.schema import Column, Layer, unit_in_words
 
 #: QGIS's numbers of what is drawn.
@@ -44,29 +48,10 @@ _MAP = (
 WEB_MAP = _MAP.format(lat=_LAT, lon=_LON)
 
 
-def look_of(layer: Layer) -> Look:
-    """The look of a layer; a plain one for layers that nobody gave one."""
-    plain = {"Point": "track_points", "Polygon": "headland", "MultiPolygon": "headland"}
-    return LOOKS.get(layer.name) or LOOKS[plain.get(layer.geometry, "segments")]
-
-
-def style_elements(
-    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, tracks_stand: bool = True
-) -> list[ET.Element]:
-    """The elements that a QML file and a project's layer have in common.
-
-    Parameters
-    ----------
-    layer : Layer
-    frame : str
-        The picture's, as :func:`geofield.formats.qgis.looks.field_rules` takes it.
-    obstacle_doubts : sequence of str
-        What the picture did not allow when obstacles were looked for, in words.
-    tracks_stand : bool
-        Whether tracks that are edited in the file stand in a later run.
-    """
-    look = look_of(layer)
-    rules = field_rules(frame) if layer.name == "field" else look.rules
+def style_of(layer: Layer, dataset: Dataset) -> list[ET.Element | dict[str, str]]:
+    """The attributes and elements that a QML file and a project's layer have in common."""
+    look = LOOKS[layer.name]
+    rules = field_rules(frame_strip(dataset)) if layer.name == "field" else look.rules
     aliases = (
         node("alias", index=str(index), field=column.name, name=heading(column))
         for index, column in enumerate(layer.columns, start=1)
@@ -76,11 +61,24 @@ def style_elements(
         node("default", field=name, expression=value, applyOnUpdate="0")
         for name, value in first.items()
     )
-    open_ = _open_to_edit(layer, tracks_stand=tracks_stand) or ()
+    closed = layer.name in _OF_TRACKS and not dataset.tracks_stand
+    open_ = None if closed else EDITABLE.get(layer.name)
     editable = (
-        node("field", name=name, editable=str(int(name in open_))) for name in layer.column_names
+        node("field", name=name, editable=str(int(name in (open_ or ()))))
+        for name in layer.column_names
     )
+    attributes = {
+        "version": QGIS_VERSION,
+        "hasScaleBasedVisibilityFlag": "1" if look.max_scale else "0",
+        # QGIS calls the largest denominator minScale.
+        "minScale": str(look.max_scale or 100_000_000),
+        "maxScale": "0",
+        "labelsEnabled": "1" if look.labels else "0",
+        # The next planning makes the other layers anew: nothing typed there could stand.
+        "readOnly": "1" if open_ is None else "0",
+    }
     return [
+        attributes,
         rule_renderer(rules, layer.name),
         *([rule_labels(look.labels, layer.name)] if look.labels else []),
         node("blendMode", "0"),
@@ -91,44 +89,29 @@ def style_elements(
         node("editable", *editable),
         _actions(),
         node("previewExpression", " || ' / ' || ".join(f'"{name}"' for name in layer.key)),
-        node("mapTip", map_tip(layer, obstacle_doubts)),
+        node("mapTip", map_tip(layer, dataset)),
     ]
 
 
-def style_attributes(layer: Layer, *, tracks_stand: bool = True) -> dict[str, str]:
-    """The attributes that a QML file and a project's layer have in common."""
-    look = look_of(layer)
-    return {
-        "version": QGIS_VERSION,
-        "hasScaleBasedVisibilityFlag": "1" if look.max_scale else "0",
-        # QGIS calls the largest denominator minScale.
-        "minScale": str(look.max_scale or 100_000_000),
-        "maxScale": "0",
-        "labelsEnabled": "1" if look.labels else "0",
-        # The next planning makes the other layers anew: nothing typed there could stand.
-        "readOnly": "1" if _open_to_edit(layer, tracks_stand=tracks_stand) is None else "0",
-    }
-
-
-def _open_to_edit(layer: Layer, *, tracks_stand: bool) -> tuple[str, ...] | None:
-    """The columns that a person may change; None where a layer is not to be edited at all."""
-    if layer.name in _OF_TRACKS and not tracks_stand:
-        return None
-    return EDITABLE.get(layer.name)
-
-
-def qml(
-    layer: Layer, frame: str = "", obstacle_doubts: Sequence[str] = (), *, tracks_stand: bool = True
-) -> str:
-    """The style of a layer as a QML document, made as :func:`style_elements`."""
+def qml(layer: Layer, dataset: Dataset) -> str:
+    """The style of a layer as a QML document."""
     root = node(
         "qgis",
         {"styleCategories": "AllStyleCategories"},
-        style_attributes(layer, tracks_stand=tracks_stand),
-        *style_elements(layer, frame, obstacle_doubts, tracks_stand=tracks_stand),
+        *style_of(layer, dataset),
         node("layerGeometryType", _GEOMETRY[layer.geometry.removeprefix("Multi")]),
     )
     return document(root)
+
+
+def frame_strip(dataset: Dataset) -> str:
+    """A narrow strip along the picture's edge, WKT; empty where the outline is not of it."""
+    field, grid = dataset.table(schema.FIELD.name), dataset.grid
+    if grid is None or not len(field) or field["method"].iloc[0] == "boundary":
+        return ""
+    near = NEAR_PX * grid.ground_resolution_m
+    strip = edge_strip(grid, dataset.crs, dataset.provenance.shown_px, near)
+    return str(shapely.to_wkt(strip, rounding_precision=3))
 
 
 def heading(column: Column) -> str:
@@ -137,12 +120,13 @@ def heading(column: Column) -> str:
     return f"{column.title} ({unit})" if unit and column.unit != "1" else column.title
 
 
-def map_tip(layer: Layer, obstacle_doubts: Sequence[str] = ()) -> str:
+def map_tip(layer: Layer, dataset: Dataset) -> str:
     """What is shown over a shape, with the link to a web map."""
-    tip = look_of(layer).tip
+    tip = LOOKS[layer.name].tip
     if layer.name == "field":
         # QGIS would take [% for the beginning of an expression.
-        said = (html.escape(each).replace("%", "&#37;") for each in obstacle_doubts)
+        doubts = dataset.provenance.obstacle_doubts
+        said = (html.escape(each).replace("%", "&#37;") for each in doubts)
         tip += "".join(f"<br><b>Obstacles:</b> {each}" for each in said)
     return f'{tip}<br><a href="{WEB_MAP}">Open this spot in a web map</a>'
 

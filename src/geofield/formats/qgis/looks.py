@@ -116,7 +116,159 @@ _FIRST = "start_point(extend(geometry_n($geometry, 1), {0}, 0))"
 _LAST = "end_point(extend(geometry_n($geometry, num_geometries($geometry)), 0, {0}))"
 _END_OFFSET_M = 2.5
 
+#: Every layer, from top to bottom in the project.
 LOOKS: dict[str, Look] = {
+    "places": Look(
+        (
+            Rule(
+                "Place without a plan",
+                "marker",
+                (marker("circle", _UNFIT, _WHITE, 3.5),),
+                '"error" IS NOT NULL',
+            ),
+        ),
+        (
+            Label(
+                '"field_id"',
+                8,
+                _WHITE,
+                "120,0,0,230",
+                filter='"error" IS NOT NULL',
+                max_scale=REGION_SCALE,
+                above=True,
+            ),
+        ),
+        tip=f'<b>[% {_shown("name")} %]</b> [% {_shown("field_id")} %]: [% "status" %]'
+        f"[% if(\"error\" IS NULL, '', '<br>' || {_shown('error')} || ' ' || "
+        f"coalesce({_shown('hint')}, '')) %]",
+    ),
+    "obstacles": Look(
+        (
+            _obstacle_rule("Confirmed", "confirmed"),
+            _obstacle_rule("Detected", "detected"),
+            _obstacle_rule("Possible, not avoided", "possible"),
+            _obstacle_rule("Added by a person", "added"),
+            _obstacle_rule("Rejected by a person", "rejected"),
+        ),
+        (
+            Label(
+                'to_string("obstacle_no")',
+                8,
+                _WHITE,
+                "120,0,0,230",
+                geometry="point_on_surface($geometry)",
+                filter="\"status\" IS NULL OR \"status\" NOT IN ('rejected', 'possible')",
+                max_scale=2500,
+            ),
+        ),
+        max_scale=REGION_SCALE,
+        tip='<b>Obstacle [% "obstacle_no" %]</b>: '
+        f"[% {_shown('kind')} %], [% {_shown('status')} %]"
+        "[% if(\"confidence\" IS NULL, '', ', confidence ' || round(\"confidence\", 2)) %]"
+        "<br>[% if(\"radius_m\" IS NULL, '', 'radius ' || round(\"radius_m\", 1) || ' m + ') %]"
+        'margin [% round(coalesce("buffer_m", 0), 1) %] m',
+    ),
+    "track_points": Look(
+        (Rule("Track point", "marker", (marker("circle", _WHITE, "0,60,80,255", 0.9),)),),
+        (Label('to_string("point_no")', 6, _DARK, "255,255,255,200", max_scale=120),),
+        max_scale=500,
+        tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
+    ),
+    "gaps": Look(
+        (Rule("Gap", "line", (line(_GAP, 0.35, dash="1.2;1.2"),)),),
+        max_scale=5000,
+        tip='<b>Gap [% "gap_no" %] of track [% "track_no" %]</b>: [% "cause" %], '
+        '[% round("length_m", 1) %] m',
+    ),
+    "tracks": Look(
+        (
+            Rule("Track", "line", (line(_BLACK, 0.4), line(_DRIVE, 0.22)), min_scale=1000),
+            Rule(
+                "Track with direction",
+                "line",
+                (
+                    line("0,40,60,160", 0.6),
+                    line(_DRIVE, 0.35),
+                    arrows(_DRIVE, every_m=20, size_m=1.8),
+                ),
+                max_scale=1000,
+            ),
+        ),
+        tuple(
+            Label(
+                'to_string("track_no")',
+                7,
+                "0,60,80,255",
+                _PAPER,
+                geometry=end.format(_END_OFFSET_M),
+                max_scale=4000,
+            )
+            for end in (_FIRST, _LAST)
+        ),
+        max_scale=REGION_SCALE,
+        tip='<b>Track [% "track_no" %]</b>: [% round("length_m", 1) %] m, '
+        'heading [% round("heading_deg", 1) % 180 %]°<br>[% "segment_count" %] segments, '
+        '[% "gap_count" %] gaps',
+    ),
+    "turns": Look(
+        (
+            Rule("Turn", "line", (line(_BLACK, 0.45), line(_TURN, 0.25)), "\"fits\" = 'yes'"),
+            Rule("Turn that does not fit", "line", (line(_UNFIT, 0.6),), "\"fits\" = 'no'"),
+        ),
+        max_scale=5000,
+        tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
+        '[% "kind" %], fits: [% "fits" %]',
+    ),
+    "route": Look(
+        (
+            Rule(
+                "Route",
+                "line",
+                (line(_BLACK, 0.45), line(_TURN, 0.25), arrows(_TURN, every_m=30, size_m=1.6)),
+            ),
+        ),
+        max_scale=REGION_SCALE,
+        visible=False,
+        tip='<b>Route, step [% "sequence" %]</b>: [% "kind" %], after [% round("start_m", 0) %] m',
+    ),
+    "headland_tracks": Look(
+        (Rule("Headland track", "line", (line(_HEADLAND, 0.35),)),),
+        max_scale=REGION_SCALE,
+        tip='<b>Headland pass [% "pass_no" %]</b>: [% round("length_m", 1) %] m',
+    ),
+    "segments": Look(
+        (Rule("Segment", "line", (line("120,255,120,255", 0.3),)),),
+        max_scale=REGION_SCALE,
+        visible=False,
+        tip='<b>Track [% "track_no" %], segment [% "segment_no" %]</b>: '
+        '[% round("length_m", 1) %] m',
+    ),
+    "headland": Look(
+        (Rule("Headland", "fill", (fill(_rgba(theme.HEADLAND, 40), _HEADLAND, 0.25),)),),
+        max_scale=REGION_SCALE,
+        tip='<b>Headland</b>, [% round("width_m", 1) %] m wide',
+    ),
+    "alternatives": Look(
+        (
+            Rule(
+                "Outline that may be meant",
+                "fill",
+                (fill("0,0,0,0", "255,60,220,255", 0.5, line="dash"),),
+            ),
+        ),
+        (
+            Label(
+                "to_string(\"alternative_no\") || ': ' || "
+                "to_string(round(100 * \"certainty\")) || ' %'",
+                8,
+                "255,60,220,255",
+                _PAPER,
+            ),
+        ),
+        visible=False,
+        tip='<b>Outline [% "alternative_no" %]</b>: [% round(100 * "certainty") %] % certain, '
+        '[% round("area_ha", 2) %] ha; taken with geofield field --choose',
+    ),
     "field": Look(
         field_rules(""),
         (
@@ -151,171 +303,4 @@ LOOKS: dict[str, Look] = {
         "[% if(\"doubts\" IS NULL, '', '<br><b>Check the outline:</b> ' || "
         f"{_shown('doubts')}) %]",
     ),
-    "obstacles": Look(
-        (
-            _obstacle_rule("Confirmed", "confirmed"),
-            _obstacle_rule("Detected", "detected"),
-            _obstacle_rule("Possible, not avoided", "possible"),
-            _obstacle_rule("Added by a person", "added"),
-            _obstacle_rule("Rejected by a person", "rejected"),
-        ),
-        (
-            Label(
-                'to_string("obstacle_no")',
-                8,
-                _WHITE,
-                "120,0,0,230",
-                geometry="point_on_surface($geometry)",
-                filter="\"status\" IS NULL OR \"status\" NOT IN ('rejected', 'possible')",
-                max_scale=2500,
-            ),
-        ),
-        max_scale=REGION_SCALE,
-        tip='<b>Obstacle [% "obstacle_no" %]</b>: '
-        f"[% {_shown('kind')} %], [% {_shown('status')} %]"
-        "[% if(\"confidence\" IS NULL, '', ', confidence ' || round(\"confidence\", 2)) %]"
-        "<br>[% if(\"radius_m\" IS NULL, '', 'radius ' || round(\"radius_m\", 1) || ' m + ') %]"
-        'margin [% round(coalesce("buffer_m", 0), 1) %] m',
-    ),
-    "tracks": Look(
-        (
-            Rule("Track", "line", (line(_BLACK, 0.4), line(_DRIVE, 0.22)), min_scale=1000),
-            Rule(
-                "Track with direction",
-                "line",
-                (
-                    line("0,40,60,160", 0.6),
-                    line(_DRIVE, 0.35),
-                    arrows(_DRIVE, every_m=20, size_m=1.8),
-                ),
-                max_scale=1000,
-            ),
-        ),
-        tuple(
-            Label(
-                'to_string("track_no")',
-                7,
-                "0,60,80,255",
-                _PAPER,
-                geometry=end.format(_END_OFFSET_M),
-                max_scale=4000,
-            )
-            for end in (_FIRST, _LAST)
-        ),
-        max_scale=REGION_SCALE,
-        tip='<b>Track [% "track_no" %]</b>: [% round("length_m", 1) %] m, '
-        'heading [% round("heading_deg", 1) % 180 %]°<br>[% "segment_count" %] segments, '
-        '[% "gap_count" %] gaps',
-    ),
-    "segments": Look(
-        (Rule("Segment", "line", (line("120,255,120,255", 0.3),)),),
-        max_scale=REGION_SCALE,
-        visible=False,
-        tip='<b>Track [% "track_no" %], segment [% "segment_no" %]</b>: '
-        '[% round("length_m", 1) %] m',
-    ),
-    "gaps": Look(
-        (Rule("Gap", "line", (line(_GAP, 0.35, dash="1.2;1.2"),)),),
-        max_scale=5000,
-        tip='<b>Gap [% "gap_no" %] of track [% "track_no" %]</b>: [% "cause" %], '
-        '[% round("length_m", 1) %] m',
-    ),
-    "track_points": Look(
-        (Rule("Track point", "marker", (marker("circle", _WHITE, "0,60,80,255", 0.9),)),),
-        (Label('to_string("point_no")', 6, _DARK, "255,255,255,200", max_scale=120),),
-        max_scale=500,
-        tip='<b>Point [% "point_no" %]</b>: track [% "track_no" %], segment [% "segment_no" %]',
-    ),
-    "alternatives": Look(
-        (
-            Rule(
-                "Outline that may be meant",
-                "fill",
-                (fill("0,0,0,0", "255,60,220,255", 0.5, line="dash"),),
-            ),
-        ),
-        (
-            Label(
-                "to_string(\"alternative_no\") || ': ' || "
-                "to_string(round(100 * \"certainty\")) || ' %'",
-                8,
-                "255,60,220,255",
-                _PAPER,
-            ),
-        ),
-        visible=False,
-        tip='<b>Outline [% "alternative_no" %]</b>: [% round(100 * "certainty") %] % certain, '
-        '[% round("area_ha", 2) %] ha; taken with geofield field --choose',
-    ),
-    "headland": Look(
-        (Rule("Headland", "fill", (fill(_rgba(theme.HEADLAND, 40), _HEADLAND, 0.25),)),),
-        max_scale=REGION_SCALE,
-        tip='<b>Headland</b>, [% round("width_m", 1) %] m wide',
-    ),
-    "headland_tracks": Look(
-        (Rule("Headland track", "line", (line(_HEADLAND, 0.35),)),),
-        max_scale=REGION_SCALE,
-        tip='<b>Headland pass [% "pass_no" %]</b>: [% round("length_m", 1) %] m',
-    ),
-    "turns": Look(
-        (
-            Rule("Turn", "line", (line(_BLACK, 0.45), line(_TURN, 0.25)), "\"fits\" = 'yes'"),
-            Rule("Turn that does not fit", "line", (line(_UNFIT, 0.6),), "\"fits\" = 'no'"),
-        ),
-        max_scale=5000,
-        tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
-        '[% "kind" %], fits: [% "fits" %]',
-    ),
-    "places": Look(
-        (
-            Rule(
-                "Place without a plan",
-                "marker",
-                (marker("circle", _UNFIT, _WHITE, 3.5),),
-                '"error" IS NOT NULL',
-            ),
-        ),
-        (
-            Label(
-                '"field_id"',
-                8,
-                _WHITE,
-                "120,0,0,230",
-                filter='"error" IS NOT NULL',
-                max_scale=REGION_SCALE,
-                above=True,
-            ),
-        ),
-        tip=f'<b>[% {_shown("name")} %]</b> [% {_shown("field_id")} %]: [% "status" %]'
-        f"[% if(\"error\" IS NULL, '', '<br>' || {_shown('error')} || ' ' || "
-        f"coalesce({_shown('hint')}, '')) %]",
-    ),
-    "route": Look(
-        (
-            Rule(
-                "Route",
-                "line",
-                (line(_BLACK, 0.45), line(_TURN, 0.25), arrows(_TURN, every_m=30, size_m=1.6)),
-            ),
-        ),
-        max_scale=REGION_SCALE,
-        visible=False,
-        tip='<b>Route, step [% "sequence" %]</b>: [% "kind" %], after [% round("start_m", 0) %] m',
-    ),
 }
-
-#: From top to bottom in the project.
-ORDER = (
-    "places",
-    "obstacles",
-    "track_points",
-    "gaps",
-    "tracks",
-    "turns",
-    "route",
-    "headland_tracks",
-    "segments",
-    "headland",
-    "alternatives",
-    "field",
-)

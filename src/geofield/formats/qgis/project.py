@@ -7,19 +7,17 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import shapely
 from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import origin
-from geofield.formats.qgis.layer_style import look_of, style_attributes, style_elements
-from geofield.formats.qgis.looks import ORDER
+from geofield.formats.qgis.layer_style import style_of
+from geofield.formats.qgis.looks import LOOKS
 from geofield.formats.qgis.symbols import QGIS_VERSION, document
 from geofield.formats.xml import node
 from geofield.model import Dataset
-from geofield.model.frame import NEAR_PX, edge_strip
 
 #: White space around the field in the first view, as a share of its size.
 MARGIN = 0.08
@@ -37,10 +35,11 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
     gpkg_name : str
         File name of the GeoPackage.
     """
-    layers = sorted(dataset.layers(working=True), key=lambda each: _place(each.name))
+    from_top = list(LOOKS)
+    layers = sorted(dataset.layers(working=True), key=lambda each: from_top.index(each.name))
     scene = dataset.scene_path
     names = [each.name for each in layers] + (["scene"] if scene else [])
-    frame, view = frame_strip(dataset), _first_view(dataset)
+    view = _first_view(dataset)
     pictures = [] if scene is None else [_raster_layer(dataset, scene)]
     root = node(
         "qgis",
@@ -66,7 +65,7 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
         node("layerorder", *(node("layer", id=_ID.format(name)) for name in names)),
         node(
             "projectlayers",
-            *(_vector_layer(each, dataset, gpkg_name, frame) for each in layers),
+            *(_vector_layer(each, dataset, gpkg_name) for each in layers),
             *pictures,
         ),
         _properties(),
@@ -90,20 +89,6 @@ def qgz_bytes(xml: str, stem: str, timestamp: str) -> bytes:
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr(info, xml.encode())
     return buffer.getvalue()
-
-
-def frame_strip(dataset: Dataset) -> str:
-    """A narrow strip along the picture's edge, WKT; empty where the outline is not of it."""
-    field, grid = dataset.table(schema.FIELD.name), dataset.grid
-    if grid is None or not len(field) or field["method"].iloc[0] == "boundary":
-        return ""
-    near = NEAR_PX * grid.ground_resolution_m
-    strip = edge_strip(grid, dataset.crs, dataset.provenance.shown_px, near)
-    return str(shapely.to_wkt(strip, rounding_precision=3))
-
-
-def _place(name: str) -> int:
-    return ORDER.index(name) if name in ORDER else len(ORDER)
 
 
 def _system(crs: CRS) -> ET.Element:
@@ -131,7 +116,7 @@ def _layer_tree(
             name=layer.title,
             source=_source(gpkg_name, layer.name),
             providerKey="ogr",
-            checked="Qt::Checked" if look_of(layer).visible else "Qt::Unchecked",
+            checked="Qt::Checked" if LOOKS[layer.name].visible else "Qt::Unchecked",
             expanded="1" if layer.name == "obstacles" else "0",
         )
         group.append(leaf)
@@ -154,20 +139,18 @@ def _source(gpkg_name: str, layer: str) -> str:
     return f"./{gpkg_name}|layername={layer}"
 
 
-def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str, frame: str) -> ET.Element:
+def _vector_layer(layer: schema.Layer, dataset: Dataset, gpkg_name: str) -> ET.Element:
     shape = layer.geometry.removeprefix("Multi").removesuffix("String")
-    stand = dataset.tracks_stand
     return node(
         "maplayer",
         {"type": "vector", "geometry": shape, "autoRefreshEnabled": "0"},
-        style_attributes(layer, tracks_stand=stand),
         node("id", _ID.format(layer.name)),
         node("datasource", _source(gpkg_name, layer.name)),
         node("layername", layer.title),
         node("abstract", layer.description),
         node("srs", _system(dataset.crs)),
         node("provider", "ogr", encoding="UTF-8"),
-        *style_elements(layer, frame, dataset.provenance.obstacle_doubts, tracks_stand=stand),
+        *style_of(layer, dataset),
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree as ET
 
-from geofield.formats.qgis.layer_style import look_of
+from geofield.formats.qgis.looks import LOOKS
 from geofield.formats.qgis.symbols import Rule, SymbolLayer
 from geofield.formats.xml import node
 from geofield.schema import Layer
@@ -25,7 +25,7 @@ def sld(layer: Layer) -> str:
     """The style of a layer as an SLD document."""
     ET.register_namespace("sld", SLD)
     ET.register_namespace("ogc", OGC)
-    style = _sld("FeatureTypeStyle", *map(_rule, look_of(layer).rules))
+    style = _sld("FeatureTypeStyle", *map(_rule, LOOKS[layer.name].rules))
     user = _sld("UserStyle", _sld("Title", layer.title), style)
     named = _sld("NamedLayer", _sld("Name", layer.name), user)
     root = _sld("StyledLayerDescriptor", named, version="1.0.0")

@@ -6,7 +6,6 @@ import json
 import sqlite3
 
 from geofield.formats.qgis.layer_style import qml
-from geofield.formats.qgis.project import frame_strip
 from geofield.formats.qgis.sld import sld
 from geofield.model import Dataset
 
@@ -33,7 +32,6 @@ _PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, c
 def add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str) -> None:
     """The table `layer_styles`: one default style per layer, as QML and SLD."""
     connection.execute(_STYLES)
-    frame, doubts = frame_strip(dataset), dataset.provenance.obstacle_doubts
     for layer in dataset.layers(working=True):
         connection.execute(
             "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
@@ -42,7 +40,7 @@ def add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str)
             (
                 layer.name,
                 layer.title[:30],
-                qml(layer, frame, doubts, tracks_stand=dataset.tracks_stand),
+                qml(layer, dataset),
                 sld(layer),
                 layer.description,
                 timestamp,
