@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -14,7 +14,7 @@ from geofield import schema
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.avoided import avoided
 from geofield.formats.origin import imagery_day, lineage
-from geofield.formats.xml import write_xml
+from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
 
 GPX = "http://www.topografix.com/GPX/1/1"
@@ -24,42 +24,40 @@ DECIMALS = 9
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``{stem}.gpx``."""
-    root = ET.Element(
-        "gpx",
-        {
-            "version": "1.1",
-            "creator": dataset.provenance.software or "geofield",
-            "xmlns": GPX,
-            "xmlns:xsi": _SCHEMA,
-            "xsi:schemaLocation": f"{GPX} {GPX}/gpx.xsd",
-        },
-    )
-    metadata = ET.SubElement(root, "metadata")
-    ET.SubElement(metadata, "name").text = dataset.name
-    ET.SubElement(metadata, "desc").text = lineage(dataset)
     day = imagery_day(dataset)
-    if day is not None:
-        ET.SubElement(metadata, "time").text = f"{day}T00:00:00Z"
+    metadata = [node("name", dataset.name), node("desc", lineage(dataset))]
+    metadata += [node("time", f"{day}T00:00:00Z")] if day is not None else []
+    about = {
+        "version": "1.1",
+        "creator": dataset.provenance.software or "geofield",
+        "xmlns": GPX,
+        "xmlns:xsi": _SCHEMA,
+        "xsi:schemaLocation": f"{GPX} {GPX}/gpx.xsd",
+    }
+    root = node("gpx", about, node("metadata", *metadata), *_waypoints(dataset), *_tracks(dataset))
+    path = folder / f"{stem}.gpx"
+    write_xml(root, path)
+    return [path]
+
+
+def _waypoints(dataset: Dataset) -> Iterator[ET.Element]:
     obstacles = avoided(dataset)
     centres = shapely.centroid(np.asarray(obstacles.geometry.to_numpy(), dtype=object))
     places = shapely.get_coordinates(to_lonlat(centres, dataset.crs))
     for row, (lon, lat) in zip(obstacles.to_dict("records"), places, strict=True):
-        point = ET.SubElement(root, "wpt", _position(lon, lat))
-        ET.SubElement(point, "name").text = f"Obstacle {row['obstacle_no']}"
-        ET.SubElement(point, "desc").text = _describe(row)
+        name = node("name", f"Obstacle {row['obstacle_no']}")
+        yield node("wpt", _position(lon, lat), name, node("desc", _describe(row)))
+
+
+def _tracks(dataset: Dataset) -> Iterator[ET.Element]:
     table = dataset.table(schema.TRACKS.name)
     shapes = to_lonlat(exact_geometry(schema.TRACKS, table), dataset.crs)
     for number, shape in zip(table["track_no"], shapes, strict=True):
-        track = ET.SubElement(root, "trk")
-        ET.SubElement(track, "name").text = f"Track {number}"
-        ET.SubElement(track, "number").text = str(number)
-        for part in shape.geoms:
-            segment = ET.SubElement(track, "trkseg")
-            for lon, lat in part.coords:
-                ET.SubElement(segment, "trkpt", _position(lon, lat))
-    path = folder / f"{stem}.gpx"
-    write_xml(root, path)
-    return [path]
+        segments = (
+            node("trkseg", *(node("trkpt", _position(lon, lat)) for lon, lat in part.coords))
+            for part in shape.geoms
+        )
+        yield node("trk", node("name", f"Track {number}"), node("number", str(number)), *segments)
 
 
 def _position(lon: float, lat: float) -> dict[str, str]:
