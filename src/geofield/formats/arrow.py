@@ -66,6 +66,11 @@ def to_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
     return np.asarray(reproject(geometry, crs, LONLAT), dtype=object)
 
 
+def cut_lonlat(geometry: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
+    """The same, those across 180 cut there."""
+    return split(to_lonlat(geometry, crs))
+
+
 def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:
     """The geometries of a table as a layer wants them.
 
@@ -161,8 +166,8 @@ def arrow_table(
     import pyarrow as pa
 
     geometry = exact_geometry(of, table)
-    if lonlat and len(geometry):
-        geometry = split(to_lonlat(geometry, CRS(table.crs)))
+    if lonlat:
+        geometry = cut_lonlat(geometry, CRS(table.crs))
     if decimals is not None:
         geometry = _rounded(geometry, decimals)
     columns = {column.name: arrow_values(column, table[column.name]) for column in of.columns}

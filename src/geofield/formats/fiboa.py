@@ -15,8 +15,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m
-from geofield.formats.antimeridian import split
-from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.arrow import cut_lonlat, exact_geometry
 from geofield.formats.geoparquet import GEOMETRY, write_geoparquet
 from geofield.formats.origin import lineage
 from geofield.model import Dataset
@@ -41,7 +40,7 @@ def write(
     placed: list[Any] = []
     for dataset in datasets:
         table = dataset.table(schema.FIELD.name)
-        placed += list(split(to_lonlat(exact_geometry(schema.FIELD, table), dataset.crs)))
+        placed += list(cut_lonlat(exact_geometry(schema.FIELD, table), dataset.crs))
         rows += [
             _properties(row, shape, dataset)
             for row, shape in zip(table.to_dict("records"), table.geometry, strict=True)

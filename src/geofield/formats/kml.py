@@ -12,8 +12,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema, theme
-from geofield.formats.antimeridian import split
-from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.arrow import cut_lonlat, exact_geometry
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.formats.origin import lineage
 from geofield.formats.xml import node, write_xml
@@ -132,7 +131,7 @@ def _style(name: str, colour: str, width: float, fill: str | None) -> ET.Element
 
 def _folder(layer: Layer, dataset: Dataset) -> ET.Element:
     table = dataset.table(layer.name)
-    shapes = split(to_lonlat(exact_geometry(layer, table), dataset.crs))
+    shapes = cut_lonlat(exact_geometry(layer, table), dataset.crs)
     folder = node("Folder", node("name", layer.name))
     for row, shape in zip(table.to_dict("records"), shapes, strict=True):
         data = node("SchemaData", schemaUrl=f"#schema_{layer.name}")

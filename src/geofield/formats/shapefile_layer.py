@@ -22,8 +22,7 @@ from shapely.geometry import mapping
 from geofield import schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.antimeridian import split
-from geofield.formats.arrow import disk_hint, exact_geometry, to_lonlat
+from geofield.formats.arrow import cut_lonlat, disk_hint, exact_geometry
 from geofield.model import Dataset
 
 TEXT_BYTES = 254
@@ -84,8 +83,7 @@ def schema_layer(
     columns |= {column.shapefile: (column.type, list(table[column.name])) for column in of.columns}
     for name in schema.own_columns(of, table):
         columns[_short(str(name), columns)] = _own(table[name])
-    placed = split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes
-    return ShapefileLayer(path, of.geometry, columns, placed)
+    return ShapefileLayer(path, of.geometry, columns, cut_lonlat(shapes, dataset.crs))
 
 
 def _short(name: str, taken: Iterable[str]) -> str:
@@ -176,7 +174,7 @@ def check_limits(layer: ShapefileLayer) -> None:
                 hint="Shorten it, or use GeoPackage.",
             )
         record += _WIDTHS.get(kind, max(_TEXT_WIDTH, len(longest.encode())))
-    points = int(shapely.get_num_coordinates(layer.shapes).sum()) if len(layer.shapes) else 0
+    points = int(shapely.get_num_coordinates(layer.shapes).sum())
     count = len(layer.shapes)
     size = max(100 + 64 * count + 16 * points, 1000 + record * count)
     if size > FILE_BYTES:

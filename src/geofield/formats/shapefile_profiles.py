@@ -14,8 +14,7 @@ import shapely
 
 from geofield import schema
 from geofield.crs import ground_areas_m2
-from geofield.formats.antimeridian import split
-from geofield.formats.arrow import to_lonlat
+from geofield.formats.arrow import cut_lonlat
 from geofield.formats.avoided import avoided, passed_through
 from geofield.formats.names import line_names, safe_name
 from geofield.formats.shapefile_layer import Column, ShapefileLayer, schema_layer
@@ -122,8 +121,7 @@ def _layer(
     shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
     if geometry == "Point":
         shapes = shapely.centroid(shapes)
-    placed = split(to_lonlat(shapes, dataset.crs)) if len(shapes) else shapes
-    return ShapefileLayer(path, geometry, columns, placed)
+    return ShapefileLayer(path, geometry, columns, cut_lonlat(shapes, dataset.crs))
 
 
 #: By the name the user writes.
