@@ -28,7 +28,6 @@ from shapely.geometry import box
 from geofield.errors import ImageryError, ImageryWarning, NetworkError, OutputExistsError
 from geofield.imagery import FetchOptions, Where, acquire, find_source, read_scene
 from geofield.imagery.cache import cache_infos, clear_cache
-from geofield.imagery.mosaic import Staging
 from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.sources.xyz import XYZSource
 from geofield.imagery.terms import Terms
@@ -179,7 +178,7 @@ def test_a_mosaic_is_not_built_in_memory(tmp_path: Path) -> None:
     code = (
         "import sys, numpy as np\n"
         "from pathlib import Path\n"
-        "from geofield.imagery.mosaic import Staging, stage_to_cog\n"
+        "from geofield.imagery.mosaic import stage_rows, stage_to_cog\n"
         "from geofield.imagery.tiling import TilePyramid\n"
         "block = TilePyramid.web_mercator().block_around(18, lat=35.0, lon=33.5, size_px=9000)\n"
         "strip = np.random.default_rng(1).integers(0, 255, (256, 256 * block.columns, 3), 'u1')\n"
@@ -191,9 +190,9 @@ def test_a_mosaic_is_not_built_in_memory(tmp_path: Path) -> None:
         "def peak():\n"
         "    return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0])\n"
         "before = peak()\n"
-        "staging = Staging(Path(sys.argv[1]) / 'rows.tif', block)\n"
-        "staging.fill(rows())\n"
-        "stage_to_cog(staging.path, Path(sys.argv[1]) / 'a.tif', {})\n"
+        "staged = Path(sys.argv[1]) / 'rows.tif'\n"
+        "stage_rows(staged, block, rows())\n"
+        "stage_to_cog(staged, Path(sys.argv[1]) / 'a.tif', {})\n"
         "print((peak() - before) // 1024)\n"
     )
     if not Path("/proc/self/status").exists():
@@ -684,11 +683,11 @@ def test_an_existing_product_is_refused_before_anything_is_fetched(tmp_path: Pat
 
 
 def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Staging, rows: Any) -> None:
-        self.path.write_bytes(b"half")
+    def full(path: Path, *_: Any) -> None:
+        path.write_bytes(b"half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Staging, "fill", full)
+    monkeypatch.setattr("geofield.imagery.acquisition.stage_rows", full)
     with serving() as server, pytest.raises(Exception, match="disk is full"):
         acquire(_named(server), HERE, tmp_path / "a.tif", options=FAST)
     assert list(tmp_path.iterdir()) == []

@@ -20,7 +20,7 @@ from geofield.grid import Grid
 from geofield.imagery.cache import TileCache
 from geofield.imagery.client import Client
 from geofield.imagery.fetch import FetchReport, Progress, TileFetcher, absence_error
-from geofield.imagery.mosaic import Staging, stage_to_cog
+from geofield.imagery.mosaic import stage_rows, stage_to_cog
 from geofield.imagery.opening import FetchOptions
 from geofield.imagery.scene import read_scene
 from geofield.imagery.sources.base import PictureSource, Source, TileSource
@@ -141,20 +141,21 @@ def acquire(
     with ExitStack() as stack:
         temporary = stack.enter_context(replacing(path, overwrite=overwrite))
         fetcher = _fetcher(source, options, stack)
-        staging = Staging(temporary.with_suffix(".rows.tif"), block)
+        staged = temporary.with_suffix(".rows.tif")
         stack.callback(_remove_siblings, temporary)
         # Closed before the cache is: what has arrived when the work stops is still kept.
-        staging.fill(stack.enter_context(closing(fetcher.rows(block, progress))))
+        rows = stack.enter_context(closing(fetcher.rows(block, progress)))
+        missing_px = stage_rows(staged, block, rows)
         report = fetcher.report
         # A file of one's own shows what it shows, as any picture; a server may have had more.
         masked = options.missing == "mask" or not (report.failed or isinstance(source, TileSource))
         if report.absent and (not masked or report.absent == report.wanted):
             raise absence_error(source, report, offline=options.offline)
-        _tell_nothing(source, block, staging.missing_px, report)
+        _tell_nothing(source, block, missing_px, report)
         provenance = _provenance(source, block, report)
         if progress is not None:
             progress(block.count, block.count, "writing")
-        stage_to_cog(staging.path, temporary, source_tags(provenance))
+        stage_to_cog(staged, temporary, source_tags(provenance))
     return Acquired(Path(path), block.grid, provenance, report)
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from rasterio.enums import Resampling
 from rasterio.windows import Window
 
-from geofield.grid import Grid
 from geofield.imagery.gdal import gdal_env, to_rasterio
 from geofield.imagery.tiling import Block
 from geofield.imagery.write import COG_OPTIONS
@@ -28,74 +27,67 @@ _CACHE_MB = 96
 Rows = Iterator[tuple[int, NDArray[np.uint8], NDArray[np.bool_] | None]]
 
 
-class Staging:
-    """The plain GeoTIFF that rows are put into."""
+def stage_rows(path: Path, block: Block, rows: Rows) -> int:
+    """Write every row, cut to the wanted window, into a plain GeoTIFF.
 
-    def __init__(self, path: Path, block: Block) -> None:
-        self.path = path
-        self.block = block
-        self.grid: Grid = block.grid
-        #: Pixels that no tile has.
-        self.missing_px = 0
-        self._masked = False
+    A mask is begun with the first pixel that is missing: most mosaics need none.
 
-    def fill(self, rows: Rows) -> None:
-        """Write every row, cut to the wanted window.
+    Returns
+    -------
+    int
+        How many pixels no tile has.
+    """
+    column, first, width, height = block.window
+    tile_height = block.level.tile_px[1]
+    missing_px = 0
+    with (
+        gdal_env(GDAL_CACHEMAX=_CACHE_MB, GDAL_TIFF_INTERNAL_MASK=True),
+        rasterio.open(
+            path,
+            "w",
+            driver="GTiff",
+            width=width,
+            height=height,
+            count=3,
+            dtype="uint8",
+            crs=to_rasterio(block.crs),
+            transform=block.grid.transform,
+            photometric="RGB",
+            interleave="pixel",
+            tiled=True,
+            blockxsize=512,
+            blockysize=512,
+            BIGTIFF="IF_SAFER",
+            SPARSE_OK=True,
+        ) as file,
+    ):
+        for row, strip, valid in rows:
+            top = row * tile_height - first
+            start, stop = max(top, 0), min(top + tile_height, height)
+            if stop <= start:
+                continue
+            inner = np.s_[start - top : stop - top, column : column + width]
+            window = Window(0, start, width, stop - start)
+            part = strip[inner]
+            there = np.ones(part.shape[:2], bool) if valid is None else valid[inner]
+            if valid is not None:
+                part = np.where(there[..., None], part, np.uint8(0))
+            file.write(np.moveaxis(part, -1, 0), window=window)
+            absent_px = int(np.count_nonzero(~there))
+            if absent_px and not missing_px:
+                _begin_mask(file, start)
+            missing_px += absent_px
+            if missing_px:
+                file.write_mask(there.astype(np.uint8) * 255, window=window)
+    return missing_px
 
-        A mask is begun with the first pixel that is missing: most mosaics need none.
-        """
-        column, first, width, height = self.block.window
-        tile_height = self.block.level.tile_px[1]
-        with (
-            gdal_env(GDAL_CACHEMAX=_CACHE_MB, GDAL_TIFF_INTERNAL_MASK=True),
-            rasterio.open(
-                self.path,
-                "w",
-                driver="GTiff",
-                width=width,
-                height=height,
-                count=3,
-                dtype="uint8",
-                crs=to_rasterio(self.grid.crs),
-                transform=self.grid.transform,
-                photometric="RGB",
-                interleave="pixel",
-                tiled=True,
-                blockxsize=512,
-                blockysize=512,
-                BIGTIFF="IF_SAFER",
-                SPARSE_OK=True,
-            ) as file,
-        ):
-            for row, strip, valid in rows:
-                top = row * tile_height - first
-                start, stop = max(top, 0), min(top + tile_height, height)
-                if stop <= start:
-                    continue
-                inner = np.s_[start - top : stop - top, column : column + width]
-                window = Window(0, start, width, stop - start)
-                part = strip[inner]
-                if valid is not None:
-                    part = np.where(valid[inner][..., None], part, np.uint8(0))
-                file.write(np.moveaxis(part, -1, 0), window=window)
-                self._mask(file, window, None if valid is None else valid[inner])
 
-    def _mask(self, file: Any, window: Window, valid: NDArray[np.bool_] | None) -> None:
-        if valid is not None and valid.all():
-            valid = None
-        if valid is not None:
-            self.missing_px += valid.size - int(np.count_nonzero(valid))
-        if valid is not None and not self._masked:
-            self._masked = True
-            width, top = self.grid.width_px, int(window.row_off)
-            for start in range(0, top, 256):
-                rows = min(256, top - start)
-                above = Window(0, start, width, rows)
-                file.write_mask(np.full((rows, width), 255, np.uint8), window=above)
-        if self._masked:
-            shape = (int(window.height), int(window.width))
-            mask = np.full(shape, 255, np.uint8) if valid is None else valid.astype(np.uint8) * 255
-            file.write_mask(mask, window=window)
+def _begin_mask(file: Any, rows: int) -> None:
+    """Write a mask that hides nothing of so many rows."""
+    for start in range(0, rows, 256):
+        shape = (min(256, rows - start), file.width)
+        window = Window(0, start, shape[1], shape[0])
+        file.write_mask(np.full(shape, 255, np.uint8), window=window)
 
 
 def stage_to_cog(staged: Path, target: Path, tags: Mapping[str, str]) -> None:
