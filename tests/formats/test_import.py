@@ -80,6 +80,13 @@ def test_one_tree_in_a_file_of_its_own(tmp_path):
     assert "pappel: its polygon lies in another one: taken as an obstacle" in said
 
 
+def test_numbers_that_no_obstacle_can_have_are_told_and_replaced_at_once(tmp_path):
+    trees = write(tmp_path / "trees.geojson", TREES, number=[0, 3_000_000_000, 2])
+    _, said, back = imported(tmp_path, write(tmp_path / "field.shp", [BOX]), trees)
+    assert "0, 3000000000 is no whole number from 1" in said
+    assert back.table("obstacles")["obstacle_no"].tolist() == [2, 3, 4]
+
+
 def test_columns_tell_circles_of_a_person(tmp_path):
     folder = tmp_path / "stick"
     folder.mkdir()

@@ -16,7 +16,8 @@ from geofield import schema
 from geofield.crs import LONLAT, grid_north_deg, ground_lengths_m, transformer
 from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
-from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons
+from geofield.model.obstacle_numbers import possible_numbers
+from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -140,11 +141,14 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
             x[is_point], y[is_point], radius[is_point] + margin[is_point], crs
         )
     lon, lat = transformer(crs, LONLAT).transform(x, y)
+    numbers = numbers_like(frame, NUMBER_COLUMNS)
+    numbers[pd.Series(numbers).duplicated()] = np.nan
+    counted = numbered(possible_numbers(frame.assign(obstacle_no=numbers)))
     data: dict[str, Any] = {
         name: numbers_like(frame, (name,)) for name in ("confidence", "x_px", "y_px", "radius_px")
     }
     data |= {
-        "obstacle_no": _whole_numbers(numbers_like(frame, NUMBER_COLUMNS)),
+        "obstacle_no": list(counted["obstacle_no"]),
         "kind": _one_of(frame, path, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
         "status": _one_of(frame, path, "status", schema.STATUSES, np.full(count, "added")),
         "radius_m": radius,
@@ -241,20 +245,6 @@ def _numbers_in_names(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:
 def _countable(values: np.ndarray) -> Any:
     """Which numbers are whole, and not too large to count with."""
     return (values == np.round(values)) & (values >= 0) & (values <= _LARGEST)
-
-
-def _whole_numbers(values: np.ndarray) -> list[int]:
-    """Obstacle numbers: those of the file where they are whole; the next free ones for others."""
-    numbers: list[int] = []
-    whole = _countable(values)
-    free = int(np.max(values, where=whole, initial=0)) + 1
-    taken: set[int] = set()
-    for value, good in zip(values, whole, strict=True):
-        number = int(value) if good and int(value) not in taken else free
-        free += number == free
-        taken.add(number)
-        numbers.append(number)
-    return numbers
 
 
 def _one_of(
