@@ -49,17 +49,9 @@ def content_of(dataset: Dataset) -> dict[str, Any]:
         "scene": None if dataset.scene_path is None else dataset.scene_path.name,
         "software": dataset.provenance.software,
         "source": dataclasses.asdict(dataset.provenance.source),
-        "settings": _plain(dataset.provenance.settings),
-        "evidence": _plain(dataset.provenance.evidence),
+        "settings": dict(dataset.provenance.settings),
+        "evidence": dict(dataset.provenance.evidence),
     }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
