@@ -7,6 +7,7 @@ whose ring jumps from 180 to -180 would go round the earth. Reading joins either
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -29,33 +30,12 @@ _SNAP_DEG = 1.1e-7
 
 def unwrapped(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     """Shapes in degrees, those that jump at 180 with longitudes from 0 to 360 instead."""
-    shapes = np.asarray(shapes, dtype=object)
-    jumps = _jumps(shapes)
-    if jumps.any():
-        shapes = shapes.copy()
-        shapes[jumps] = shapely.transform(shapes[jumps], _positive)
-    return shapes
+    return _where_jumping(shapes, lambda whole: whole)
 
 
 def split(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     """Shapes in degrees, those that jump at 180 cut there into multi-part ones."""
-    shapes = np.asarray(shapes, dtype=object)
-    jumps = np.flatnonzero(_jumps(shapes))
-    if len(jumps):
-        shapes = shapes.copy()
-        whole = unwrapped(shapes[jumps])
-        if not shapely.is_valid(whole).all():
-            raise FormatError(
-                "A shape that reaches longitude 180 is not valid in degrees; one that goes round "
-                "a pole never is.",
-                hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
-            )
-        west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
-        for row, parts in zip(
-            jumps, zip(shapely.intersection(whole, _EAST), west, strict=True), strict=True
-        ):
-            shapes[row] = _collected(parts)
-    return shapes
+    return _where_jumping(shapes, _split)
 
 
 def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
@@ -63,14 +43,7 @@ def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
 
     Of other CRS they are handed back as they are.
     """
-    shapes = np.asarray(shapes, dtype=object)
-    if not crs.is_geographic:
-        return shapes
-    jumps = np.flatnonzero(_jumps(shapes))
-    if len(jumps):
-        shapes = shapes.copy()
-        shapes[jumps] = [_joined(shape) for shape in unwrapped(shapes[jumps])]
-    return shapes
+    return _where_jumping(shapes, _joined) if crs.is_geographic else np.asarray(shapes, object)
 
 
 def seamless(shapes: NDArray[np.object_]) -> CRS:
@@ -106,18 +79,37 @@ def extent_box(west: float, south: float, east: float, north: float) -> Any:
     return shapely.multipolygons([shapely.box(left, south, right, north) for left, right in sides])
 
 
-def _joined(shape: Any) -> Any:
-    parts = shapely.get_parts(shape)
-    if len(parts) == 1:
-        return shape
-    whole = shapely.union_all(shapely.transform(parts, _on_the_meridian))
-    return shapely.line_merge(whole) if shapely.get_dimensions(whole) == 1 else whole
-
-
-def _jumps(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
+def _where_jumping(
+    shapes: NDArray[np.object_], change: Callable[[Any], Any]
+) -> NDArray[np.object_]:
+    """Shapes, those that jump at 180 changed from what they are with longitudes up to 360."""
+    shapes = np.asarray(shapes, dtype=object)
     bounds = shapely.bounds(shapes).reshape(-1, 4)
     with np.errstate(invalid="ignore"):
-        return np.asarray((bounds[:, 2] - bounds[:, 0] > _WIDEST_DEG) & (bounds[:, 0] < 0))
+        jumps = (bounds[:, 2] - bounds[:, 0] > _WIDEST_DEG) & (bounds[:, 0] < 0)
+    if jumps.any():
+        shapes = shapes.copy()
+        shapes[jumps] = [change(each) for each in shapely.transform(shapes[jumps], _positive)]
+    return shapes
+
+
+def _split(whole: Any) -> Any:
+    if not shapely.is_valid(whole):
+        raise FormatError(
+            "A shape that reaches longitude 180 is not valid in degrees; one that goes round a "
+            "pole never is.",
+            hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
+        )
+    west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
+    return _collected(shapely.intersection(whole, _EAST), west)
+
+
+def _joined(whole: Any) -> Any:
+    parts = shapely.get_parts(whole)
+    if len(parts) == 1:
+        return whole
+    whole = shapely.union_all(shapely.transform(parts, _on_the_meridian))
+    return shapely.line_merge(whole) if shapely.get_dimensions(whole) == 1 else whole
 
 
 def _positive(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -134,7 +126,7 @@ def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.where(near, 180.0, lonlat[:, 0]), lonlat[:, 1]])
 
 
-def _collected(pieces: tuple[Any, Any]) -> Any:
+def _collected(*pieces: Any) -> Any:
     """The pieces of both sides as one shape; what only touches the meridian has no piece."""
     dimension = max(int(shapely.get_dimensions(piece)) for piece in pieces)
     parts = [
