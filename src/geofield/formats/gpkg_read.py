@@ -86,22 +86,14 @@ class PointsInFile:
         """The batches, as tables of layer `track_points`."""
         import geopandas as gpd
         import pyarrow as pa
-        import shapely
         from pyogrio.raw import open_arrow
 
-        crs = CRS.from_wkt(self.crs_wkt)
-        layer = schema.TRACK_POINTS
-        with open_arrow(self.path, layer=layer.name, batch_size=BATCH_ROWS) as (meta, source):
-            geometry = meta["geometry_name"] or "wkb_geometry"
+        layer, crs = schema.TRACK_POINTS, CRS.from_wkt(self.crs_wkt)
+        with open_arrow(self.path, layer=layer.name, batch_size=BATCH_ROWS) as (_, source):
             for batch in pa.RecordBatchReader.from_stream(source):
-                if not batch.num_rows:
-                    continue
-                table = pa.Table.from_batches([batch])
-                shapes = shapely.from_wkb(table[geometry].to_numpy())
-                frame = gpd.GeoDataFrame(
-                    table.drop_columns(geometry).to_pandas(), geometry=shapes, crs=crs
-                )
-                yield _own_table(layer, frame, crs, self.path)
+                if batch.num_rows:
+                    frame = gpd.GeoDataFrame.from_arrow(batch).rename_geometry("geometry")
+                    yield _own_table(layer, frame, crs, self.path)
 
 
 def scene_beside(path: Path) -> Path | None:
