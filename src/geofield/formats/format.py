@@ -94,7 +94,7 @@ class Format:
         Whether it shows the picture of a plan.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
-        of the format itself.
+        of the format itself. A `FormatError` is a finding, too.
     """
 
     name: str

@@ -77,7 +77,12 @@ def validate_file(path: Path | str) -> list[Finding]:
     found = detect(place)
     place = product_file(place, found)
     check = found.load_validator()
-    findings = list(check(place)) if check is not None else []
+    findings: list[Finding] = []
+    try:
+        for each in check(place) if check is not None else ():
+            findings.append(each)
+    except FormatError as error:
+        findings.append(Finding("error", place.name, str(error)))
     if found.reader is None:
         if check is None:
             findings.append(Finding("warning", place.name, f"there is no check for {found.title}"))

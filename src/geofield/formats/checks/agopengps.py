@@ -21,11 +21,7 @@ _EXPECTED = ("Field.txt", "Boundary.txt", "TrackLines.txt")
 
 def check(path: Path) -> Iterator[Finding]:
     """Findings in the folder of a field."""
-    try:
-        folder = field_folder(path)
-    except FormatError as error:
-        yield Finding("error", path.name, str(error))
-        return
+    folder = field_folder(path)
     for name in _EXPECTED:
         if not (folder / name).is_file():
             yield Finding("warning", folder.name, f"{name} is missing")

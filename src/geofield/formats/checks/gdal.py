@@ -9,19 +9,13 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
-from geofield.errors import FormatError
 from geofield.formats.foreign import layer_names, read_vector
 from geofield.formats.validation import Finding
 
 
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a file, layer by layer."""
-    try:
-        names = layer_names(path)
-        frames = {name: read_vector(path, name) for name in names}
-    except FormatError as error:
-        yield Finding("error", path.name, str(error))
-        return
+    frames = {name: read_vector(path, name) for name in layer_names(path)}
     if not any(len(frame) for frame in frames.values()):
         yield Finding("warning", path.name, "it holds no shapes")
     for name, frame in frames.items():

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from geofield.errors import FormatError
 from geofield.formats.isoxml.codes import DESIGNATOR
 from geofield.formats.isoxml.read import task_file
 from geofield.formats.validation import Finding
@@ -49,12 +48,8 @@ _ORDER_V4 = ("PLN", "LSG", "PNT", "GGP")
 
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a ``TASKDATA.XML`` or the folder that holds it."""
-    try:
-        file = task_file(path)
-        root = read_xml(file)
-    except FormatError as error:
-        yield Finding("error", path.name, str(error))
-        return
+    file = task_file(path)
+    root = read_xml(file)
     if file.name != "TASKDATA.XML":
         yield Finding("error", file.name, "terminals look for TASKDATA.XML in capitals")
     if root.tag != "ISO11783_TaskData":
