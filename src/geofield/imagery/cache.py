@@ -89,11 +89,21 @@ class TileCache:
         if not source.pyramid.levels[0].wraps:
             # Tiles that are not Web Mercator's: only geofield reads those.
             self._metadata["crs"] = source.pyramid.crs.to_wkt()
-        self._connection = self._opened()
+        self._connection: sqlite3.Connection | None = None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ImageryError(
+                f"The cache folder {self.path.parent} cannot be made: {error.strerror}.",
+                hint="Choose another with --cache-dir, or use --no-cache.",
+            ) from None
+        self._guarded(lambda db: None)
 
     def close(self) -> None:
         """Close the file."""
-        self._connection.close()
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
 
     def get_row(
         self, zoom: int, row: int, columns: Iterable[int], *, stale: bool = False
@@ -202,22 +212,6 @@ class TileCache:
         level = self._pyramid.level(zoom)
         return level.scheme_zoom, level.rows - 1 - row
 
-    def _opened(self) -> sqlite3.Connection:
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ImageryError(
-                f"The cache folder {self.path.parent} cannot be made: {error.strerror}.",
-                hint="Choose another with --cache-dir, or use --no-cache.",
-            ) from None
-        try:
-            return self._connected()
-        except sqlite3.DatabaseError as error:
-            if not _is_damage(error):
-                raise _unusable(self.path, error) from None
-            self._set_aside()
-            return self._connected()
-
     def _connected(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level="IMMEDIATE")
         try:
@@ -235,16 +229,19 @@ class TileCache:
     def _guarded(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """Do the work in one transaction, with a new file where this one is damaged."""
         try:
-            with self._connection as connection:
-                return work(connection)
+            return self._done(work)
         except sqlite3.DatabaseError as error:
             if not _is_damage(error):
                 raise _unusable(self.path, error) from None
-            self._connection.close()
+            self.close()
             self._set_aside()
+            return self._done(work)
+
+    def _done(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        if self._connection is None:
             self._connection = self._connected()
-            with self._connection as connection:
-                return work(connection)
+        with self._connection as connection:
+            return work(connection)
 
     def _set_aside(self) -> None:
         number = 1
