@@ -27,7 +27,8 @@ WEB_MERCATOR = CRS.from_epsg(3857)
 #: One map of all fields (PDC Mercator): its seam runs through the Atlantic, not along 180 degrees.
 PACIFIC = CRS.from_epsg(3832)
 
-_GEOD = Geod(ellps="WGS84")
+#: Lengths, directions and areas on the ground.
+GEOD = Geod(ellps="WGS84")
 #: Arms of the cross that the scale is measured with: long against the digits of a coordinate,
 #: short against the earth.
 _ARM_M = 50.0
@@ -175,7 +176,7 @@ def grid_north_deg(crs: CRS, x: float, y: float) -> float:
     convergence; up to about 2 degrees within a UTM zone at mid latitudes).
     """
     lon, lat = transformer(crs, LONLAT).transform([x, x], [y - 50.0, y + 50.0])
-    azimuth, _, _ = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
+    azimuth, _, _ = GEOD.inv(lon[0], lat[0], lon[1], lat[1])
     return float(azimuth)
 
 
@@ -205,8 +206,8 @@ def side_of_cross_m(lon: Any, lat: Any) -> Any:
 
     The ends of the first are in the first two rows, those of the second, across it, in the others.
     """
-    azimuth_x, _, along_x = _GEOD.inv(lon[0], lat[0], lon[1], lat[1])
-    azimuth_y, _, along_y = _GEOD.inv(lon[2], lat[2], lon[3], lat[3])
+    azimuth_x, _, along_x = GEOD.inv(lon[0], lat[0], lon[1], lat[1])
+    azimuth_y, _, along_y = GEOD.inv(lon[2], lat[2], lon[3], lat[3])
     sine = np.sin(np.radians(np.subtract(azimuth_y, azimuth_x)))
     return np.sqrt(np.abs(np.multiply(along_x, along_y) * sine))
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from pyproj import Geod
 
-from geofield.crs import LONLAT, transformer
+from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import FieldError, ImageryWarning, PointOutsideError
 
 if TYPE_CHECKING:
@@ -164,9 +163,8 @@ def grid_of(path: str | Path, settings: Settings, **point: float) -> Grid:
 
 def reach_m(lat: float, lon: float, settings: Settings, outline: Field | None) -> float:
     """Side of a window around a point that shows an outline and all further points, metres."""
-    ellipsoid = Geod(ellps="WGS84")
     away_m = [
-        1.05 * ellipsoid.line_length((lon, x), (lat, y))
+        1.05 * GEOD.line_length((lon, x), (lat, y))
         for x, y in (*settings.field.include, *settings.field.exclude)
     ]
     if outline is not None:

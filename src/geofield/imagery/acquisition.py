@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import Geod
 from shapely.geometry.base import BaseGeometry
 
+from geofield.crs import GEOD
 from geofield.errors import ImageryError, ImageryWarning
 from geofield.grid import Grid
 from geofield.imagery.cache import TileCache
@@ -320,7 +320,7 @@ def _across_m(area: BaseGeometry, lat: float, lon: float) -> float:
     """The side of a square around a point that holds an area's box however it is turned."""
     west, south, east, north = area.bounds
     lons, lats = [west, west, east, east], [south, north, south, north]
-    _, _, radii = Geod(ellps="WGS84").inv(lons, lats, [lon] * 4, [lat] * 4)
+    _, _, radii = GEOD.inv(lons, lats, [lon] * 4, [lat] * 4)
     return float(max(2.0 * np.max(radii), 1.0))
 
 

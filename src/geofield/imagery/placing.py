@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from pyproj import CRS, Geod
+from pyproj import CRS
 from rasterio.transform import from_gcps
 from rasterio.vrt import WarpedVRT
 
-from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.crs import GEOD, LONLAT, metric_crs, transformer
 from geofield.errors import CRSError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name, to_rasterio
@@ -28,7 +28,6 @@ MAX_SKEW_DEG = 3.0
 #: A reprojected picture reaches this far from the point: one UTM zone does not hold a country.
 REACH_M = 10_000.0
 
-_GEOD = Geod(ellps="WGS84")
 #: Longitude and latitude, degrees.
 LonLat = tuple[float, float]
 
@@ -112,8 +111,8 @@ def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
     lons, lats = grid.to_lonlat(
         np.array([x - 0.5, x + 0.5, x, x]), np.array([y, y, y - 0.5, y + 0.5])
     )
-    azimuth_x, _, length_x = _GEOD.inv(lons[0], lats[0], lons[1], lats[1])
-    azimuth_y, _, length_y = _GEOD.inv(lons[2], lats[2], lons[3], lats[3])
+    azimuth_x, _, length_x = GEOD.inv(lons[0], lats[0], lons[1], lats[1])
+    azimuth_y, _, length_y = GEOD.inv(lons[2], lats[2], lons[3], lats[3])
     angle = abs((azimuth_y - azimuth_x) % 180.0 - 90.0)
     if not min(length_x, length_y) > 0:
         raise CRSError(

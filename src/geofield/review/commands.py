@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from pyproj import Geod
 from shapely import Polygon
 
 from geofield import schema
-from geofield.crs import LONLAT, transformer
+from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
 from geofield.settings import Settings, TrackSettings
@@ -170,7 +169,7 @@ def set_direction(plan: Plan, command: Command) -> Plan:
     if math.hypot(bx - ax, by - ay) < 1.0:
         raise EditError("The line is shorter than a metre: it has no clear direction.")
     lon, lat = transformer(plan.field.crs, LONLAT).transform([ax, bx], [ay, by])
-    heading, _, _ = Geod(ellps="WGS84").inv(lon[0], lat[0], lon[1], lat[1])
+    heading, _, _ = GEOD.inv(lon[0], lat[0], lon[1], lat[1])
     direction = f"{heading % 180.0:.4f}"
     return set_tracks(plan, {"settings": {"direction": direction, "ab_lonlat": None}})
 

@@ -9,9 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pyproj import Geod
-
-from geofield.crs import LONLAT, transformer
+from geofield.crs import GEOD, LONLAT, transformer
 from geofield.model.evidence import outline_digest
 from geofield.review.commands import Command, EditError, places_of
 from geofield.settings import Settings
@@ -83,4 +81,4 @@ class Ground:
 
 def _metres_apart(one: tuple[float, float], other: tuple[float, float]) -> float:
     """Between two places, longitude and latitude."""
-    return float(Geod(ellps="WGS84").line_length([one[0], other[0]], [one[1], other[1]]))
+    return float(GEOD.line_length([one[0], other[0]], [one[1], other[1]]))

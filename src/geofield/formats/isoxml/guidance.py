@@ -12,8 +12,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import shapely
-from pyproj import Geod
 
+from geofield.crs import GEOD
 from geofield.errors import FormatError
 from geofield.formats.isoxml.codes import (
     CLOCKWISE,
@@ -24,7 +24,6 @@ from geofield.formats.isoxml.codes import (
     PointType,
 )
 
-_GEOD = Geod(ellps="WGS84")
 #: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
 _ARC_STEP_DEG = 1.0
 #: Half the length of an A+ line where there is no field to draw it through, metres.
@@ -108,8 +107,8 @@ def _through(line: ET.Element, heading: str | None, outline: Any) -> tuple[Any, 
     if not outline.is_empty:
         corners = shapely.get_coordinates(outline)
         start = np.full(len(corners), lon), np.full(len(corners), lat)
-        reach_m = float(np.max(_GEOD.inv(*start, corners[:, 0], corners[:, 1])[2]))
-    ends = [_GEOD.fwd(lon, lat, heading_deg + turn, reach_m)[:2] for turn in (180.0, 0.0)]
+        reach_m = float(np.max(GEOD.inv(*start, corners[:, 0], corners[:, 1])[2]))
+    ends = [GEOD.fwd(lon, lat, heading_deg + turn, reach_m)[:2] for turn in (180.0, 0.0)]
     whole = shapely.LineString([ends[0], (lon, lat), ends[1]])
     parts = shapely.get_parts(shapely.intersection(whole, outline))
     inside = [part for part in parts if part.geom_type == "LineString"]
@@ -129,7 +128,7 @@ def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
     azimuths, distances = [], []
     for end in ends:
         if end is not None:
-            azimuth, _, distance = _GEOD.inv(*centre, *end)
+            azimuth, _, distance = GEOD.inv(*centre, *end)
             azimuths.append(azimuth)
             distances.append(distance)
     # H is in millimetres; without it the first point lies on the arc.
@@ -143,5 +142,5 @@ def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
         turn = turn if direction == CLOCKWISE else turn - 360.0
     angles = start + np.linspace(0.0, turn, max(int(abs(turn) / _ARC_STEP_DEG), 8) + 1)
     here = np.full(len(angles), centre[0]), np.full(len(angles), centre[1])
-    lon, lat, _ = _GEOD.fwd(here[0], here[1], angles, np.full(len(angles), radius_m))
+    lon, lat, _ = GEOD.fwd(here[0], here[1], angles, np.full(len(angles), radius_m))
     return shapely.LineString(np.column_stack([lon, lat])), f"a pivot of {radius_m:.1f} m"

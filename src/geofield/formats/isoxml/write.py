@@ -16,10 +16,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pyproj import Geod
 
 from geofield import schema
-from geofield.crs import ground_areas_m2, ground_scale_of
+from geofield.crs import GEOD, ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.isoxml.codes import (
@@ -41,7 +40,6 @@ from geofield.formats.xml import node, write_xml
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
 
-_GEOD = Geod(ellps="WGS84")
 #: Behind the name of a boundary that a person should look at first.
 _DOUBTED = " (check)"
 #: Tracks whose directions differ by less are of one pattern, degrees.
@@ -97,13 +95,13 @@ def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, 
     )
     named = [owner_of(each, options) for each in datasets]
     owners = [(customer or "Customer", farm or "Farm") for customer, farm in named]
-    customers = list(dict.fromkeys(customer for customer, _ in owners))
-    farms = list(dict.fromkeys(owners))
-    for place, customer in enumerate(customers, start=1):
-        ET.SubElement(root, "CTR", A=f"CTR{place}", B=cut_name(customer, DESIGNATOR))
-    for place, (customer, farm) in enumerate(farms, start=1):
-        of = f"CTR{customers.index(customer) + 1}"
-        ET.SubElement(root, "FRM", A=f"FRM{place}", B=cut_name(farm, DESIGNATOR), I=of)
+    names = dict.fromkeys(customer for customer, _ in owners)
+    customers = {customer: f"CTR{place}" for place, customer in enumerate(names, start=1)}
+    farms = {owner: f"FRM{place}" for place, owner in enumerate(dict.fromkeys(owners), start=1)}
+    for customer, own in customers.items():
+        ET.SubElement(root, "CTR", A=own, B=cut_name(customer, DESIGNATOR))
+    for (customer, farm), own in farms.items():
+        ET.SubElement(root, "FRM", A=own, B=cut_name(farm, DESIGNATOR), I=customers[customer])
     groups = itertools.count(1)
     for place, (dataset, owner) in enumerate(zip(datasets, owners, strict=True), start=1):
         field = dataset.table(schema.FIELD.name)
@@ -116,8 +114,8 @@ def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, 
             A=f"PFD{place}",
             C=cut_name(dataset.name, DESIGNATOR),
             D=str(round(float(ground_areas_m2([polygon], dataset.crs)[0]))),
-            E=f"CTR{customers.index(owner[0]) + 1}",
-            F=f"FRM{farms.index(owner) + 1}",
+            E=customers[owner[0]],
+            F=farms[owner],
         )
         _add_polygons(part, dataset, polygon, version, options)
         if version == 4:
@@ -254,7 +252,7 @@ def _add_point(
 def _heading_deg(line: Any) -> float:
     """True heading from A to B, degrees clockwise from north, 0 to 360."""
     (lon0, lat0), (lon1, lat1) = line.coords
-    azimuth, _, _ = _GEOD.inv(lon0, lat0, lon1, lat1)
+    azimuth, _, _ = GEOD.inv(lon0, lat0, lon1, lat1)
     return round(float(azimuth) % 360.0, 4) % 360.0
 
 
