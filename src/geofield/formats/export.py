@@ -125,7 +125,8 @@ def write_datasets(
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
             warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
-        if _points_alone(each) and any(_lacks_points(one) for one in datasets):
+        by_points = {"track_points", "tracks", "segments"} & set(each.layers) == {"track_points"}
+        if by_points and any(one.has("tracks") and not one.has("track_points") for one in datasets):
             warnings.warn(
                 f"{each.title} has nothing of the tracks: there are none of their points, which "
                 "`geofield tracks` makes.",
@@ -160,16 +161,6 @@ def _replacing(places: Sequence[Path], target: Path, staging: Path) -> list[Path
             replace_plan(place, new)
     # A project that a person saved stays in its place.
     return [place for place, new in staged.items() if new.is_file()]
-
-
-def _points_alone(into: Format) -> bool:
-    """Whether a format has the tracks by their points alone."""
-    names = schema.TRACKS.name, schema.SEGMENTS.name
-    return schema.TRACK_POINTS.name in into.layers and not set(names) & set(into.layers)
-
-
-def _lacks_points(dataset: Dataset) -> bool:
-    return dataset.has(schema.TRACKS.name) and not dataset.has(schema.TRACK_POINTS.name)
 
 
 def _written(

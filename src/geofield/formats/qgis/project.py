@@ -108,9 +108,8 @@ def _system(crs: CRS) -> ET.Element:
 def _layer_tree(
     name: str, layers: list[schema.Layer], gpkg_name: str, scene: Path | None
 ) -> ET.Element:
-    group = node("layer-tree-group", name=name, expanded="1", checked="Qt::Checked")
-    for layer in layers:
-        leaf = node(
+    leaves = [
+        node(
             "layer-tree-layer",
             id=_ID.format(layer.name),
             name=layer.title,
@@ -119,20 +118,21 @@ def _layer_tree(
             checked="Qt::Checked" if LOOKS[layer.name].visible else "Qt::Unchecked",
             expanded="1" if layer.name == "obstacles" else "0",
         )
-        group.append(leaf)
-    root = node("layer-tree-group", group)
-    if scene is not None:
-        leaf = node(
-            "layer-tree-layer",
-            id=_ID.format("scene"),
-            name="Picture",
-            source=f"./{scene.name}",
-            providerKey="gdal",
-            checked="Qt::Checked",
-            expanded="0",
-        )
-        root.append(leaf)
-    return root
+        for layer in layers
+    ]
+    group = node("layer-tree-group", *leaves, name=name, expanded="1", checked="Qt::Checked")
+    if scene is None:
+        return node("layer-tree-group", group)
+    picture = node(
+        "layer-tree-layer",
+        id=_ID.format("scene"),
+        name="Picture",
+        source=f"./{scene.name}",
+        providerKey="gdal",
+        checked="Qt::Checked",
+        expanded="0",
+    )
+    return node("layer-tree-group", group, picture)
 
 
 def _source(gpkg_name: str, layer: str) -> str:
