@@ -8,6 +8,9 @@ refused here, for every reader.
 
 from __future__ import annotations
 
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree as ET
@@ -27,13 +30,21 @@ _DIRECTIONS = {
     b"<WCS_GDAL": "a WCS connection",
 }
 #: So begin TIFF (BigTIFF, too), PNG, JPEG and JPEG 2000: GDAL would only tell of its drivers.
-_PICTURES = (
+PICTURES = (
     b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"\0\0\0\x0cjP",
 )  # fmt: skip
 _HEAD_BYTES = 1 << 18
 _HINT = "Nothing was read. Ask its maker for a file without it."
 #: Elements inside elements; an honest file needs about 20.
 MAX_DEPTH = 200
+
+
+@contextmanager
+def database(path: Path, *, timeout_s: float = 5.0) -> Iterator[sqlite3.Connection]:
+    """A SQLite file, for reading alone."""
+    uri = f"{path.absolute().as_uri()}?mode=ro"
+    with closing(sqlite3.connect(uri, uri=True, timeout=timeout_s)) as connection:
+        yield connection
 
 
 class _RootSeenError(Exception):
@@ -56,7 +67,7 @@ def check_vector(path: Path | str) -> None:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
         raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
-    if head.startswith(_PICTURES):
+    if head.startswith(PICTURES):
         raise FormatError(
             f"{file} is a picture; what is wanted here are shapes (polygons, points, lines).",
             hint="Give the picture to `geofield run` or `geofield field`, which find the outline "

@@ -11,7 +11,7 @@ from typing import Any
 
 from geofield.crs import parse_crs
 from geofield.errors import CRSError
-from geofield.formats.gpkg_read import opened
+from geofield.strangers import database
 
 _HINT = "One file has one CRS: ogr2ogr -t_srs EPSG:4326 {} FILE, for each part by itself."
 
@@ -70,7 +70,7 @@ def _geopackage(path: Path, layer: str | None) -> tuple[int, str] | None:
     """The first row whose geometry names another system than its table."""
     tables = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
     try:
-        with opened(path) as file:
+        with database(path) as file:
             for table, column, own in file.execute(tables).fetchall():
                 if layer not in (None, table):
                     continue

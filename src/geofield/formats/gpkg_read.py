@@ -5,7 +5,6 @@ from __future__ import annotations
 import sqlite3
 import warnings
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.model import Dataset
+from geofield.strangers import database
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -45,7 +45,7 @@ def read(path: Path) -> Dataset:
         return read_foreign([RawLayer(name, read_vector(path, name)) for name in layers], path)
     tables: dict[str, gpd.GeoDataFrame] = {}
     crs = record.crs
-    with opened(path) as connection:
+    with database(path) as connection:
         own = own_layers(connection)
     known = {layer.name: layer for layer in schema.LAYERS if layer.name in own}
     for name in layers:
@@ -106,13 +106,6 @@ def _scene(record: origin.Origin | None, path: Path) -> Path | None:
     name = None if record is None else Path(str(record.scene or "")).name
     scene = path.parent / name if name else None
     return scene if scene is not None and scene.is_file() else None
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """A GeoPackage's database, for reading alone."""
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as connection:
-        yield connection
 
 
 def in_own_terms(
@@ -275,7 +268,7 @@ def record_of(path: Path) -> origin.Origin | None:
         When the file is damaged.
     """
     try:
-        with opened(path) as connection:
+        with database(path) as connection:
             row = connection.execute(
                 "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ? ORDER BY id DESC",
                 (origin.URI,),

@@ -13,12 +13,12 @@ import sqlite3
 import time
 import warnings
 from collections.abc import Callable, Iterable
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from geofield.errors import ImageryError, ImageryWarning
+from geofield.strangers import database
 
 if TYPE_CHECKING:
     from geofield.imagery.sources.base import TileSource
@@ -280,8 +280,7 @@ def clear_cache(folder: Path, source: str | None = None) -> list[Path]:
 
 def _info(path: Path) -> CacheInfo:
     try:
-        uri = f"{path.resolve().as_uri()}?mode=ro"
-        with closing(sqlite3.connect(uri, uri=True, timeout=_BUSY_S)) as db:
+        with database(path, timeout_s=_BUSY_S) as db:
             words = dict(db.execute("SELECT name, value FROM metadata").fetchall())
             count, size, oldest, newest, low, high = db.execute(
                 "SELECT COUNT(*), COALESCE(SUM(bytes), 0), MIN(time_s), MAX(time_s), "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.stac import is_stac, open_stac
-from geofield.strangers import check_vector
+from geofield.strangers import check_vector, database
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
@@ -77,7 +76,7 @@ def holds_tiles(file: Path) -> bool:
         return False
     asked = "SELECT 1 FROM gpkg_contents WHERE data_type IN ('tiles', '2d-gridded-coverage')"
     try:
-        with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as db:
+        with database(file) as db:
             return db.execute(asked).fetchone() is not None
     except sqlite3.DatabaseError:
         return False

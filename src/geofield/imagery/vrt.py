@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 
 from geofield.errors import ImageryError
 from geofield.imagery.reach import Reach
-from geofield.strangers import parse_xml
+from geofield.strangers import PICTURES, parse_xml
 
 #: How deep VRTs may name VRTs.
 _MAX_LEVELS = 6
@@ -38,9 +38,8 @@ _PLAIN = frozenset(_WORDS.split())
 _SUBCLASSES = frozenset(
     ("", "VRTWarpedDataset", "VRTSourcedRasterBand", "VRTWarpedRasterBand", "VRTDerivedRasterBand")
 )
-#: First bytes of formats that hold their pixels themselves.
-_MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"\0\0\0\x0cjP")
-_MAGIC_MORE = (b"\xff\x4f\xff\x51", b"EHFA_HEADER_TAG", b"RIFF", b"SQLite format 3", b"BM", b"GIF8")
+#: First bytes of further formats that hold their pixels themselves.
+_MAGIC = (b"\xff\x4f\xff\x51", b"EHFA_HEADER_TAG", b"RIFF", b"SQLite format 3", b"BM", b"GIF8")
 
 
 def check_vrt(body: bytes, name: str, folder: Path, reach: Reach, *, level: int = 0) -> None:
@@ -89,7 +88,7 @@ def check_beside(file: Path) -> None:
 def holds_pixels(file: Path) -> bool:
     """Whether a file begins like a format that needs no other file."""
     with file.open("rb") as stream:
-        return stream.read(16).startswith(_MAGIC + _MAGIC_MORE)
+        return stream.read(16).startswith(PICTURES + _MAGIC)
 
 
 def _check_source(source: str | Path, name: str, reach: Reach, level: int) -> None:

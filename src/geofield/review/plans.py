@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 from geofield.errors import FormatError
+from geofield.strangers import database
 
 #: The file that makes a folder a farm.
 _FARM = "farm.json"
@@ -60,7 +60,7 @@ def _is_unsaved(journal: Path) -> bool:
 
 def _is_plan(path: Path) -> bool:
     try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
+        with database(path) as file:
             return bool(file.execute("SELECT 1 FROM gpkg_metadata").fetchone())
     except sqlite3.Error:
         return False

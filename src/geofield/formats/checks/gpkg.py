@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from geofield.formats.gpkg_read import opened
 from geofield.formats.validation import Finding
+from geofield.strangers import database
 
 _APPLICATION_ID = 0x47504B47  # "GPKG"
 _REQUIRED = ("gpkg_spatial_ref_sys", "gpkg_contents", "gpkg_geometry_columns")
@@ -17,7 +17,7 @@ _REQUIRED = ("gpkg_spatial_ref_sys", "gpkg_contents", "gpkg_geometry_columns")
 def check(path: Path) -> Iterator[Finding]:
     """Findings in a GeoPackage's own structure."""
     try:
-        with opened(path) as connection:
+        with database(path) as connection:
             yield from _check(connection, path.name)
     except sqlite3.DatabaseError as error:
         yield Finding("error", path.name, f"not a database that SQLite can read: {error}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import sqlite3
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -16,6 +15,9 @@ from geofield.errors import ImageryError
 from geofield.imagery.client import BrokenBodyError
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TilePyramid
+from geofield.strangers import database
+
+_BUSY_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class MBTilesSource:
         if not file.is_file():
             raise ImageryError(f"There is no file {path}.", hint="Check the path.")
         try:
-            with closing(_connected(file)) as db:
+            with database(file, timeout_s=_BUSY_S) as db:
                 words = dict(db.execute("SELECT name, value FROM metadata").fetchall())
                 low, high = db.execute(
                     "SELECT MIN(zoom_level), MAX(zoom_level) FROM tiles"
@@ -68,7 +70,7 @@ class MBTilesSource:
         """The bytes of a tile, or None; `BrokenBodyError` where the file is damaged."""
         row = 2**tile.zoom - 1 - tile.row
         try:
-            with closing(_connected(Path(self.path))) as db:
+            with database(Path(self.path), timeout_s=_BUSY_S) as db:
                 found = db.execute(
                     "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? "
                     "AND tile_row = ?",
@@ -77,7 +79,3 @@ class MBTilesSource:
         except sqlite3.DatabaseError as error:
             raise BrokenBodyError(f"the file is damaged there: {error}") from None
         return None if found is None else bytes(found[0])
-
-
-def _connected(path: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=30)
