@@ -23,9 +23,8 @@ from geofield.imagery.fetch import FetchReport, Progress, TileFetcher, absence_e
 from geofield.imagery.mosaic import stage_rows, stage_to_cog
 from geofield.imagery.opening import FetchOptions
 from geofield.imagery.scene import read_scene
-from geofield.imagery.sources.base import PictureSource, Source, TileSource
+from geofield.imagery.sources.base import PictureSource, Source, Tiles, TileSource
 from geofield.imagery.sources.google import GoogleStaticSource
-from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.tags import source_tags
 from geofield.imagery.terms import check_terms
 from geofield.imagery.tiling import Block
@@ -159,9 +158,7 @@ def acquire(
     return Acquired(Path(path), block.grid, provenance, report)
 
 
-def plan(
-    source: TileSource | MBTilesSource, place: Where
-) -> tuple[TileSource | MBTilesSource, Block]:
+def plan(source: Tiles, place: Where) -> tuple[Tiles, Block]:
     """The tiles that a place needs, and the source to ask for them."""
     pyramid = source.pyramid
     lat, lon = place.point
@@ -183,7 +180,7 @@ def plan(
     )
 
 
-def choose_zoom(source: TileSource | MBTilesSource, place: Where) -> int:
+def choose_zoom(source: Tiles, place: Where) -> int:
     """The zoom that a place asks for."""
     pyramid = source.pyramid
     lat, lon = place.point
@@ -207,9 +204,7 @@ def choose_zoom(source: TileSource | MBTilesSource, place: Where) -> int:
     return place.zoom
 
 
-def _fetcher(
-    source: TileSource | MBTilesSource, options: FetchOptions, stack: ExitStack
-) -> TileFetcher:
+def _fetcher(source: Tiles, options: FetchOptions, stack: ExitStack) -> TileFetcher:
     if not isinstance(source, TileSource):
         return TileFetcher(source, client=None, threads=options.threads)
     cache = None
@@ -237,9 +232,7 @@ def _fetcher(
     return TileFetcher(source, client=client, cache=cache, threads=options.threads)
 
 
-def _tell_nothing(
-    source: TileSource | MBTilesSource, block: Block, missing_px: int, report: FetchReport
-) -> None:
+def _tell_nothing(source: Tiles, block: Block, missing_px: int, report: FetchReport) -> None:
     """Tell of ground for which a source has an answer, but nothing to show."""
     _, _, width, height = block.window
     if missing_px == width * height:
@@ -265,9 +258,7 @@ def _tell_nothing(
         )
 
 
-def _provenance(
-    source: TileSource | MBTilesSource, block: Block, report: FetchReport
-) -> ImagerySource:
+def _provenance(source: Tiles, block: Block, report: FetchReport) -> ImagerySource:
     newest = report.newest
     if report.downloaded or newest is None:
         newest = datetime.now(UTC).date()

@@ -22,7 +22,7 @@ from geofield.errors import ImageryError
 from geofield.imagery.cache import TileCache
 from geofield.imagery.client import BrokenBodyError, Client, GaveUpError, NotThereError
 from geofield.imagery.decode import Pixels, decode_tile
-from geofield.imagery.sources.base import TileSource
+from geofield.imagery.sources.base import Tiles
 from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.tiling import Block, Tile
 
@@ -75,7 +75,7 @@ class TileFetcher:
 
     def __init__(
         self,
-        source: TileSource | MBTilesSource,
+        source: Tiles,
         *,
         client: Client | None,
         cache: TileCache | None = None,
@@ -222,9 +222,7 @@ class TileFetcher:
         self._cache.put((t.zoom, t.column, t.row, body) for t, body in done if body is not None)
 
 
-def absence_error(
-    source: TileSource | MBTilesSource, report: FetchReport, *, offline: bool
-) -> ImageryError:
+def absence_error(source: Tiles, report: FetchReport, *, offline: bool) -> ImageryError:
     """The error for a product with holes, or with nothing in it."""
     parts = [f"{count} x {reason}" for reason, count in report.reasons.most_common(4)]
     told = (

@@ -73,4 +73,5 @@ class PictureSource:
     date: str | None = None
 
 
-Source = TileSource | MBTilesSource | PictureSource
+Tiles = TileSource | MBTilesSource
+Source = Tiles | PictureSource
