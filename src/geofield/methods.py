@@ -7,7 +7,7 @@ stages know the study's methods by name and do not lean on them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib import import_module
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any, Literal, get_args
 
@@ -46,6 +46,5 @@ LONGEST_EDGE: Mapping[str, str] = MappingProxyType({"hough": "geofield.study.hou
 
 def method(methods: Mapping[str, str], name: str) -> Callable[..., Any]:
     """Load the method of a name."""
-    module, function = methods[name].split(":")
-    found: Callable[..., Any] = getattr(import_module(module), function)
+    found: Callable[..., Any] = resolve_name(methods[name])
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from geofield.formats.terminal import main_field
 from geofield.model import Dataset
 from geofield.model.obstacles import active
 from geofield.staging import staged_folder
+from geofield.wording import nearest
 
 
 def write_dataset(
@@ -230,13 +230,11 @@ def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[
     asked += [(key, set(options)) for name, options in own.items() for key in given.get(name, {})]
     for key, options in asked:
         if key not in options:
-            near = difflib.get_close_matches(key, sorted(known), n=1)
             others = [each.name for each in FORMATS.values() if key in each.options]
             if others:
                 return key, f"It is an option of {_join(others)}."
-            if near:
-                return key, f"Did you mean {near[0]!r}?"
-            return key, f"Options: {', '.join(sorted(known)) or 'none'}."
+            near = nearest(key, sorted(known)).strip()
+            return key, near or f"Options: {', '.join(sorted(known)) or 'none'}."
     return None
 
 

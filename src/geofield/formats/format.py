@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, Literal
 
 from geofield.errors import FormatError
@@ -119,7 +119,7 @@ class Format:
 
     def load_writer(self) -> Writer:
         """The writer, imported."""
-        return _load(self.writer)  # type: ignore[no-any-return]
+        return resolve_name(self.writer)  # type: ignore[no-any-return]
 
     def load_reader(self) -> Reader:
         """The reader, imported.
@@ -134,17 +134,12 @@ class Format:
                 f"{self.title} can be written, not read.",
                 hint="`geofield formats` lists what can be read.",
             )
-        return _load(self.reader)  # type: ignore[no-any-return]
+        return resolve_name(self.reader)  # type: ignore[no-any-return]
 
     def readers(self, path: Path) -> list[tuple[str, Callable[[], Dataset]]]:
         """What reads each field in a file, with its name; none where only a lone one is read."""
-        return [] if self.several is None else list(_load(self.several)(path))
+        return [] if self.several is None else list(resolve_name(self.several)(path))
 
     def load_validator(self) -> Validator | None:
         """The check of the format's own rules, imported; None where there is none."""
-        return None if self.validator is None else _load(self.validator)
-
-
-def _load(reference: str) -> Any:
-    module, _, function = reference.partition(":")
-    return getattr(import_module(module), function)
+        return None if self.validator is None else resolve_name(self.validator)

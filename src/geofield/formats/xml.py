@@ -28,7 +28,7 @@ def node(tag: str, *inside: ET.Element | str | Mapping[str, str], **attributes: 
     return element
 
 
-def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
+def write_xml(root: ET.Element, path: Path) -> None:
     """Write a document as UTF-8; characters that XML cannot carry are refused."""
     for element in root.iter():
         for text in (element.text, *element.attrib.values()):
@@ -38,8 +38,7 @@ def write_xml(root: ET.Element, path: Path, *, indent: bool = True) -> None:
                     "XML cannot carry.",
                     hint="Remove it from the name.",
                 )
-    if indent:
-        ET.indent(root, " ")
+    ET.indent(root, " ")
     path.parent.mkdir(parents=True, exist_ok=True)
     tree = ET.ElementTree(root)
     with path.open("wb") as file:

@@ -66,15 +66,13 @@ def line(colour: str, width_mm: float, *, dash: str = "") -> SymbolLayer:
     return SymbolLayer("SimpleLine", values)
 
 
-def fill(
-    colour: str, outline: str, width_mm: float, *, style: str = "solid", line: str = "solid"
-) -> SymbolLayer:
+def fill(colour: str, outline: str, width_mm: float, *, line: str = "solid") -> SymbolLayer:
     """A filled polygon with an outline."""
     return SymbolLayer(
         "SimpleFill",
         {
             "color": colour,
-            "style": style,
+            "style": "solid",
             "outline_color": outline,
             "outline_width": f"{width_mm:g}",
             "outline_width_unit": "MM",
