@@ -116,18 +116,13 @@ def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     # The corner follows the authority's axis order when the CRS is named as a URN or an address.
     swapped = northing_first(crs) and not text(element, "SupportedCRS").startswith("EPSG:")
     read = (_matrix(each, unit_m, swapped, crs) for each in children(element, "TileMatrix"))
-    rough = [each for each in read if each is not None]
-    rough.sort(key=lambda each: -each[0])
-    if crs == WEB_MERCATOR:
-        return _web_mercator_levels(rough)
-    return tuple(TileLevel(zoom, *values) for zoom, values in enumerate(rough))
+    sound = sorted(filter(None, read), key=lambda each: -each.resolution)
+    levels = [replace(level, zoom=zoom) for zoom, level in enumerate(sound)]
+    return tuple(_in_web_mercator(levels) if crs == WEB_MERCATOR else levels)
 
 
-_Rough = tuple[float, float, float, int, int, tuple[int, int], str]
-
-
-def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> _Rough | None:
-    """The values of a level; None of one that is not written as it should be."""
+def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> TileLevel | None:
+    """A level, its zoom still to be counted; None of one that is not written as it should be."""
     try:
         resolution = float(text(element, "ScaleDenominator")) * _PIXEL_M / unit_m
         left, top = (float(part) for part in text(element, "TopLeftCorner").split())
@@ -142,35 +137,32 @@ def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> _Rou
     # Some write longitude first all the same: no latitude is beyond 90 degrees.
     if swapped and not (crs.is_geographic and abs(left) > 90):
         left, top = top, left
-    return resolution, left, top, columns, rows, (width, height), text(element, "Identifier")
+    size, identifier = (width, height), text(element, "Identifier")
+    return TileLevel(0, resolution, left, top, columns, rows, size, identifier)
 
 
-def _web_mercator_levels(rough: list[_Rough]) -> tuple[TileLevel, ...]:
+def _in_web_mercator(levels: list[TileLevel]) -> list[TileLevel]:
     """Levels with the zooms of the ``z/x/y`` scheme, and its exact numbers where they agree.
 
     Documents print few digits: over a million columns they add up to metres.
     """
-    levels = []
-    for n, values in enumerate(rough):
-        resolution, left, top, columns, rows, (width, height), identifier = values
+    found = []
+    for each in levels:
+        width, height = each.tile_px
+        near_m = 2 * each.resolution + 1.0
         near = (
             level
             for level in TilePyramid.web_mercator(0, 24, width).levels
             if width == height
-            and abs(level.resolution / resolution - 1) < 1e-4
-            and abs(left - level.left) < 2 * resolution + 1.0
-            and abs(top - level.top) < 2 * resolution + 1.0
+            and abs(level.resolution / each.resolution - 1) < 1e-4
+            and abs(each.left - level.left) < near_m
+            and abs(each.top - level.top) < near_m
         )
-        match = next(near, None)
-        if match is None:
-            levels.append(TileLevel(n, *values))
-        else:
-            wraps = columns == match.columns
-            own = replace(match, columns=columns, rows=rows, identifier=identifier, wraps=wraps)
-            levels.append(own)
-    if len({level.zoom for level in levels}) != len(levels):
-        return tuple(TileLevel(n, *values) for n, values in enumerate(rough))
-    return tuple(levels)
+        exact = next(near, each)
+        wraps = exact.wraps and each.columns == exact.columns
+        own = replace(exact, columns=each.columns, rows=each.rows, wraps=wraps)
+        found.append(replace(own, identifier=each.identifier))
+    return found if len({level.zoom for level in found}) == len(found) else levels
 
 
 def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) -> str:
