@@ -163,7 +163,7 @@ def _parquet(path: Path) -> RawPlaces:
 def _vector(path: Path, layer: str | None) -> RawPlaces:
     import pyarrow as pa
     import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+    from pyogrio.errors import DataLayerError, DataSourceError
 
     check_vector(path)
     try:
@@ -184,7 +184,7 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
                 hint="Say which one holds the places: --layer NAME.",
             )
         meta, table = pyogrio.read_arrow(path, layer=layer)
-    except (DataSourceError, DataLayerError, FeatureError) as error:
+    except (DataSourceError, DataLayerError) as error:
         raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from None
     except (UnicodeDecodeError, pa.ArrowInvalid) as error:
         raise FormatError(

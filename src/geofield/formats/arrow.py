@@ -230,7 +230,7 @@ def write_layer(
 ) -> None:
     """Write a layer into a file through GDAL, in the dataset's CRS or WGS 84."""
     import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
+    from pyogrio.errors import DataLayerError, DataSourceError
 
     path.parent.mkdir(parents=True, exist_ok=True)
     crs = LONLAT if lonlat else dataset.crs
@@ -246,7 +246,7 @@ def write_layer(
             crs=name if ":" in name else crs.to_wkt(),
             **options,
         )
-    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
+    except (DataSourceError, DataLayerError) as error:
         raise FormatError(
             f"{path.name} could not be written: {error}.", hint=disk_hint(path)
         ) from error

@@ -48,7 +48,7 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     """
     import geopandas as gpd
     import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
+    from pyogrio.errors import DataLayerError, DataSourceError
     from shapely.errors import GEOSException
 
     if path.suffix.lower() in PARQUET:
@@ -67,7 +67,7 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
             f"{path}: its text is not in the encoding it claims ({error.reason}).",
             hint="Save it as UTF-8 (a Shapefile with a .cpg file beside it).",
         ) from error
-    except (*_DAMAGED, DataSourceError, DataLayerError, FeatureError, GeometryError) as error:
+    except (*_DAMAGED, DataSourceError, DataLayerError) as error:
         raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")

@@ -18,7 +18,8 @@ from typing import Any
 from geofield import schema
 from geofield.formats import origin
 from geofield.formats.arrow import gdal_config, write_layer
-from geofield.formats.qgis import add_project, add_styles, project_xml, qgz_bytes
+from geofield.formats.qgis.project import project_xml, qgz_bytes
+from geofield.formats.qgis.store import add_project, add_styles
 from geofield.model import Dataset
 
 #: GDAL 3.4 and QGIS 3.22 warn about 1.4.

@@ -16,7 +16,7 @@ from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.gpkg_read import own_layers
-from geofield.formats.qgis import is_as_written, is_project_as_written
+from geofield.formats.qgis.as_written import is_as_written, is_project_as_written
 from geofield.staging.generations import keep_earlier
 
 #: Of QGIS: their rows are brought one by one.

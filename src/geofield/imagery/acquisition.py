@@ -85,15 +85,7 @@ class Where:
 
 @dataclass(frozen=True, slots=True)
 class Acquired:
-    """What `acquire` made.
-
-    Attributes
-    ----------
-    path : Path
-    grid : Grid
-    source : ImagerySource
-    report : FetchReport
-    """
+    """What `acquire` made."""
 
     path: Path
     grid: Grid
