@@ -62,6 +62,16 @@ def test_isoxml_in_an_archive(plan_file, tmp_path, name):
     assert geofield("validate", file).returncode == 0
 
 
+def test_track_points_that_were_saved_in_another_crs_are_refused(plan_file, tmp_path):
+    edited = tmp_path / "field.gpkg"
+    edited.write_bytes(plan_file.read_bytes())
+    points = pyogrio.read_dataframe(edited, layer="track_points")
+    pyogrio.write_dataframe(points.to_crs("EPSG:4326"), edited, layer="track_points")
+    done = geofield("export", edited, "-f", "geojson", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "layer 'track_points' is no longer in WGS 84 / UTM zone 36N" in done.stderr
+
+
 def test_waypoints_are_the_centres(tmp_path):
     dataset = make_dataset()
     write_dataset(dataset, tmp_path, ["gpx"])

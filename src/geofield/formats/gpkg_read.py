@@ -71,7 +71,7 @@ def read(path: Path) -> Dataset:
         record.provenance,
         record.grid,
         _scene(record, path),
-        PointsInFile(path, crs.to_wkt()) if has_points else None,
+        PointsInFile(path, crs) if has_points else None,
     )
 
 
@@ -80,7 +80,7 @@ class PointsInFile:
     """Track points that stay in their file until they are asked for, a batch at a time."""
 
     path: Path
-    crs_wkt: str
+    crs: CRS
 
     def __call__(self) -> Iterator[gpd.GeoDataFrame]:
         """The batches, as tables of layer `track_points`."""
@@ -88,12 +88,12 @@ class PointsInFile:
         import pyarrow as pa
         from pyogrio.raw import open_arrow
 
-        layer, crs = schema.TRACK_POINTS, CRS.from_wkt(self.crs_wkt)
+        layer = schema.TRACK_POINTS
         with open_arrow(self.path, layer=layer.name, batch_size=BATCH_ROWS) as (_, source):
             for batch in pa.RecordBatchReader.from_stream(source):
                 if batch.num_rows:
                     frame = gpd.GeoDataFrame.from_arrow(batch).rename_geometry("geometry")
-                    yield _own_table(layer, frame, crs, self.path)
+                    yield _own_table(layer, frame, self.crs, self.path)
 
 
 def scene_beside(path: Path) -> Path | None:
