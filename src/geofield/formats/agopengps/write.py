@@ -107,25 +107,22 @@ def _headland(
 
 def _on_plane(rings: list[Any], dataset: Dataset, plane: LocalPlane) -> list[FloatArray]:
     """Open rings (n, 2) in the plane; the first clockwise, the others not, as in the program."""
-    placed = to_lonlat(np.array(rings, dtype=object), dataset.crs)
-    return [_plane_ring(ring, plane, clockwise=n == 0) for n, ring in enumerate(placed)]
-
-
-def _plane_ring(ring: Any, plane: LocalPlane, *, clockwise: bool) -> FloatArray:
-    """An open ring (n, 2) in the plane, from one in longitude and latitude."""
-    lonlat = shapely.get_coordinates(ring)[:-1]
-    placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
-    is_ccw = shapely.is_ccw(shapely.LinearRing(placed))
-    return placed[::-1] if is_ccw == clockwise else placed
+    found = []
+    for number, ring in enumerate(to_lonlat(np.array(rings, dtype=object), dataset.crs)):
+        placed = plane.to_plane(*shapely.get_coordinates(ring)[:-1].T)
+        is_ccw = shapely.is_ccw(shapely.LinearRing(placed))
+        found.append(placed[::-1] if is_ccw == (number == 0) else placed)
+    return found
 
 
 def _ring(ring: FloatArray, step: float) -> list[str]:
     vertices = np.round(densified(ring, step), 3)
-    headings = ring_headings(vertices)
-    return [str(len(vertices))] + [
-        f"{east:.3f},{north:.3f},{heading:.5f}"
-        for (east, north), heading in zip(vertices, headings, strict=True)
-    ]
+    return [str(len(vertices)), *_rows(vertices, ring_headings(vertices))]
+
+
+def _rows(vertices: FloatArray, headings: FloatArray) -> list[str]:
+    placed = np.column_stack([vertices, headings])
+    return [f"{east:.3f},{north:.3f},{heading:.5f}" for east, north, heading in placed]
 
 
 def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
@@ -158,11 +155,7 @@ def _curve(way: FloatArray) -> list[str]:
     """The points of a line with bends, as a person may draw one, and the heading at each."""
     points = shapely.get_coordinates(shapely.segmentize(shapely.LineString(way), _CURVE_STEP_M))
     ahead = np.gradient(points, axis=0)
-    headings = np.arctan2(ahead[:, 0], ahead[:, 1]) % (2 * np.pi)
-    return [
-        f"{east:.3f},{north:.3f},{heading:.5f}"
-        for (east, north), heading in zip(points, headings, strict=True)
-    ]
+    return _rows(points, np.arctan2(ahead[:, 0], ahead[:, 1]) % (2 * np.pi))
 
 
 def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
