@@ -122,24 +122,19 @@ def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
             pa.field(GEOMETRY, pa.binary(), nullable=False),
         ]
     )
-    own = list(dict.fromkeys(name for row in rows for name in row if name not in fields.names))
-    data: dict[str, Any] = {
-        name: [row.get(name) for row in rows]
-        for name in (*fields.names, *own)
-        if name not in (GEOMETRY, "determination:datetime")
-    }
-    for name in own:
-        kinds = {type(value) for value in data[name] if value is not None}
-        if len(kinds) > 1:
-            data[name] = [None if value is None else str(value) for value in data[name]]
-        values = pa.array(data[name])
-        fields = fields.append(pa.field(name, values.type))
-    dates = [row.get("determination:datetime") for row in rows]
-    data["determination:datetime"] = [
-        None if date is None else datetime.fromisoformat(date) for date in dates
+    day = "determination:datetime"
+    records = [
+        {**row, GEOMETRY: wkb, day: datetime.fromisoformat(row[day]) if day in row else None}
+        for row, wkb in zip(rows, shapely.to_wkb(shapes, flavor="iso"), strict=True)
     ]
-    data[GEOMETRY] = shapely.to_wkb(shapes, flavor="iso")
-    table = pa.table(data, schema=fields)
+    for name in dict.fromkeys(name for row in rows for name in row if name not in fields.names):
+        having = [record for record in records if name in record]
+        if len({type(record[name]) for record in having}) > 1:
+            for record in having:
+                record[name] = str(record[name])
+        values = pa.array([record[name] for record in having])
+        fields = fields.append(pa.field(name, values.type))
+    table = pa.Table.from_pylist(records, schema=fields)
     collection = json.dumps({"schemas": {COLLECTION: list(SCHEMAS)}})
     # GeoParquet wants boxes as obligatory as the geometry, fiboa wants them optional.
     write_geoparquet(

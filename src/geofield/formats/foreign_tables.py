@@ -185,21 +185,16 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     }
     table = schema.table(schema.SEGMENTS, values, geometry, crs)
     segments = schema.conform(schema.SEGMENTS, table)
-    rows, shapes = [], []
-    for number, part in segments.groupby("track_no", sort=True):
-        lines = part.geometry.to_numpy()
-        whole = shapely.multilinestrings(list(lines))
-        row = {
-            "track_no": int(number),
-            "heading_deg": heading_deg(whole, crs),
-            "segment_count": len(part),
-            "gap_count": len(part) - 1,
-            "length_m": float(part["length_m"].sum()),
-        }
-        rows.append(row)
-        shapes.append(whole)
-    data = {name: [row.get(name) for row in rows] for name in schema.TRACKS.column_names}
-    return schema.table(schema.TRACKS, data, shapes, crs), segments
+    each: list[Any] = [part for _, part in segments.groupby("track_no", sort=True)]
+    wholes = [shapely.multilinestrings(list(part.geometry)) for part in each]
+    data = {
+        "track_no": [part["track_no"].iloc[0] for part in each],
+        "heading_deg": [heading_deg(whole, crs) for whole in wholes],
+        "segment_count": [len(part) for part in each],
+        "gap_count": [len(part) - 1 for part in each],
+        "length_m": [part["length_m"].sum() for part in each],
+    }
+    return schema.table(schema.TRACKS, data, wholes, crs), segments
 
 
 def heading_deg(track: shapely.Geometry, crs: CRS) -> float:
