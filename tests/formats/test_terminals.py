@@ -170,7 +170,7 @@ def test_headland_of_agopengps(tmp_path):
     assert file.read_text().split() == ["$Headland"]
 
 
-def test_the_line_at_which_machines_turn_has_no_spikes_along_a_hole():
+def test_the_headland_and_its_line_have_no_spikes_along_a_hole():
     corner = np.array([500_000.0, 5_600_000.0])
     plain, hole = shapely.box(0, 0, 200, 100), shapely.box(85, 3, 95, 50)
     for turned_deg in range(0, 90, 3):
@@ -178,10 +178,13 @@ def test_the_line_at_which_machines_turn_has_no_spikes_along_a_hole():
         field = shapely.affinity.rotate(plain - shapely.affinity.rotate(hole, 7), **place)
         field = shapely.transform(field, lambda c: c + corner)
         tracks = gf.plan_tracks(field, crs=32632, spacing_m=6, headland_m=6)
+        border = shapely.Polygon(field.exterior).exterior
+        strip = shapely.points(shapely.get_coordinates(tracks.headland.geometry))
+        assert shapely.distance(strip, border).max() < 6.01
         dataset = Dataset({"headland": tracks.headland}, tracks.crs, "", Provenance())
         # A hole reaches through the headland: the field's edge along it is the main area's, too.
         (main,) = main_field(dataset, field)
-        assert main.distance(shapely.Polygon(field.exterior).exterior) > 5.99
+        assert main.distance(border) > 5.99
 
 
 def test_a_headland_around_several_parts_is_told_of_agopengps(tmp_path):

@@ -68,9 +68,12 @@ def main_area(
 
 
 def headland_table(
-    outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float
+    outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float, holes: bool
 ) -> Rows:
     """Layer `headland`: the field less its main area, one row."""
+    if outline.interiors and not holes:
+        # Along a hole main area and field share an edge but for its last digits: a spike is left.
+        inner = inset(Polygon(outline.exterior), width_m * scale)
     strip = shapely.difference(outline, inner)
     parts = [p for p in shapely.get_parts(strip) if isinstance(p, Polygon) and p.area > 0.0]
     return Rows(
