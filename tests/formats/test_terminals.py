@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -174,9 +175,9 @@ def test_the_headland_and_its_line_have_no_spikes_along_a_hole():
     corner = np.array([500_000.0, 5_600_000.0])
     plain, hole = shapely.box(0, 0, 200, 100), shapely.box(85, 3, 95, 50)
     for turned_deg in range(0, 90, 3):
-        place = {"angle": turned_deg, "origin": (100, 50)}
-        field = shapely.affinity.rotate(plain - shapely.affinity.rotate(hole, 7), **place)
-        field = shapely.transform(field, lambda c: c + corner)
+        pierced = plain - shapely.affinity.rotate(hole, 7)
+        turned = shapely.affinity.rotate(pierced, turned_deg, origin=(100, 50))
+        field: Any = shapely.transform(turned, lambda c: c + corner)
         tracks = gf.plan_tracks(field, crs=32632, spacing_m=6, headland_m=6)
         border = shapely.Polygon(field.exterior).exterior
         strip = shapely.points(shapely.get_coordinates(tracks.headland.geometry))

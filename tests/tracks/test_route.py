@@ -242,7 +242,8 @@ def test_round_outlines_cost_no_more_than_circles() -> None:
 def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:
     ring = shapely.get_coordinates(shapely.segmentize(shapely.box(0, 0, 600, 400), 1.0))[:-1]
     ring += np.random.default_rng(1).normal(0.0, 1e-4, ring.shape)
-    none = ObstacleShapes(np.empty((0, 3)), np.empty(0), np.empty(0, object), np.empty(0))
+    no = np.empty(0, np.int64)
+    none = ObstacleShapes(np.empty((0, 3)), no, np.empty(0, object), no)
     passage = Passage(shapely.Polygon(ring), none)
     # 1007, and so 500 000 lines to look along, where each vertex is one.
     assert len(passage._corners[-1].places) == 0

@@ -39,7 +39,7 @@ def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometr
         join_style="mitre",
         mitre_limit=MITRE_LIMIT,
     )
-    inner = tried[np.argmax(shapely.area(tried))]
+    inner: BaseGeometry = tried[np.argmax(shapely.area(tried))]
     return inner if holes or not outline.interiors else shapely.intersection(inner, outline)
 
 

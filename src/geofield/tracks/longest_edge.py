@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon
+from shapely import LinearRing, LineString, Polygon
 
 from geofield.tracks.frame import FloatArray
 
@@ -77,7 +77,7 @@ def own_edges(
     xy = shapely.get_coordinates(ring)[:-1]
     first = int(np.lexsort((xy[:, 1].round(3), -xy[:, 0].round(3)))[0])
     xy = np.roll(xy, -first, axis=0)
-    ring = shapely.linearrings(xy)
+    ring = LinearRing(xy)
     if shapely.get_num_coordinates(ring) > 400:
         # Hundreds of stairs of a pixel each say nothing that their corners do not.
         ring = shapely.simplify(ring, tolerance / 4.0)
