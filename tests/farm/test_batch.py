@@ -431,6 +431,7 @@ def test_parcels_without_shape_fail_alone(tmp_path: Path) -> None:
     frame.to_file(tmp_path / "odd.gpkg")
     said = batch(tmp_path / "odd.gpkg", "--spacing", 20, "--workers", 1, "--out", tmp_path / "farm")
     assert "4 of 4: 3 done, 1 failed" in said
+    assert "1 place has no plan" in said
     failed = pd.read_csv(tmp_path / "farm" / "failed.csv")
     assert failed["error"].to_list() == ["The row has no position."]
     overview = tmp_path / "farm" / "farm.gpkg"

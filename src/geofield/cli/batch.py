@@ -355,5 +355,6 @@ def _summarise(count: Count, place: str, files: list[str]) -> None:
     if count.done > count.before:
         say(f"Pace       {count.per_minute:.0f} per minute")
     if count.failed:
-        say_note(f"{count.failed} places have no plan: the reasons are in {place}/failed.csv.")
+        few = "1 place has" if count.failed == 1 else f"{count.failed} places have"
+        say_note(f"{few} no plan: the reasons are in {place}/failed.csv.")
     say(f"Farm       {place}" + (f" ({', '.join(files)})" if files else ""))

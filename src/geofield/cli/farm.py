@@ -42,9 +42,10 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
 
     whole = read_farm(folder)
     if field_id not in whole:
+        some = ", ".join(whole.ids[:10]) + ", ..." * (len(whole) > 10)
         raise FormatError(
             f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
-            hint="Its status table tells what became of each place.",
+            hint=f"It has plans of {some}; its failed.csv tells why others have none.",
         )
     save_plan(taken_out(whole[field_id]), output, overwrite=overwrite)
     say(f"Plan       {output}")

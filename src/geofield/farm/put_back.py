@@ -69,7 +69,7 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
     if not chunks:
         raise FormatError(
             f"{folder} has no field {field_id!r}.",
-            hint="The field's id must be that of the farm: see its status table.",
+            hint="The field's id must be one of the farm's, which are in its farm.gpkg.",
         )
     _refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
