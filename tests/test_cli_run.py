@@ -79,7 +79,11 @@ def test_json_goes_to_stdout_alone(
 
 
 def test_stage_by_stage_gives_the_same_plan(
-    ran: Path, simulated: SimulatedField, simulated_tif: Path, tmp_path: Path
+    ran: Path,
+    simulated: SimulatedField,
+    simulated_tif: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file = tmp_path / "stages.gpkg"
     scene = tmp_path / "scene.tif"
@@ -99,6 +103,11 @@ def test_stage_by_stage_gives_the_same_plan(
     assert one.tracks.segments.equals(other.tracks.segments)
     exported = (tmp_path / "export/geojson/segments.geojson").read_bytes()
     assert exported == (ran / "geojson/segments.geojson").read_bytes()
+    for stage in (["obstacles", scene, file], ["field", scene, *where, "--overwrite"]):
+        assert "Tracks removed" not in capsys.readouterr().err
+        assert geofield(*stage, "-o", file) == 0
+        assert "Tracks removed: they no longer fit (geofield tracks" in capsys.readouterr().err
+        assert geofield("tracks", file, "-o", file) == 0
 
 
 def test_an_own_boundary_is_taken_as_it_is(

@@ -19,7 +19,7 @@ from geofield.cli.options import (
     tell_idle,
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
-from geofield.cli.refresh import say_outdated
+from geofield.cli.refresh import say_outdated, say_removed
 
 if TYPE_CHECKING:
     from geofield.model import Field, Scene
@@ -155,6 +155,7 @@ def field(
         echo_json(_figures(plan, output))
     else:
         _say(plan, output, alternatives=alternatives)
+        say_removed(previous, plan, output)
         say_wider(plan, picture)
 
 

@@ -11,7 +11,7 @@ from geofield.cli.console import echo_json, say
 from geofield.cli.files import OLD_FILE, claim_plan, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
-from geofield.cli.refresh import say_outdated
+from geofield.cli.refresh import say_outdated, say_removed
 
 if TYPE_CHECKING:
     from geofield.settings import Settings
@@ -66,6 +66,7 @@ def obstacles(
     if not defaults:
         settings = continued(settings, plan.settings, "obstacles")
     tell_idle(settings)
+    before = plan
     plan = run_obstacles(plan, scene_of_plan(imagery, plan, settings), settings=settings)
     save_plan(plan, output, read_from=plan_file, overwrite=overwrite, inputs=[imagery])
     table = plan.obstacles
@@ -85,4 +86,5 @@ def obstacles(
     say(f"{len(table)} obstacles ({parts}) in {output}")
     for change in plan.changes:
         say(f"Changes: {change}")
+    say_removed(before, plan, output)
     say_outdated(output)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import claim_folder, plan_argument
+
+if TYPE_CHECKING:
+    from geofield.plan import Plan
 
 
 @click.command(
@@ -49,3 +53,9 @@ def say_outdated(plan_file: Path) -> None:
     old = outdated(plan_file)
     if old:
         say(f"Older than the plan: {', '.join(old)} (renew them: geofield refresh {plan_file})")
+
+
+def say_removed(before: Plan | None, after: Plan, plan_file: Path) -> None:
+    """Tell that a stage removed the tracks of a plan, and how they are planned again."""
+    if before is not None and before.tracks is not None and after.tracks is None:
+        say(f"Tracks removed: they no longer fit (geofield tracks {plan_file} -o {plan_file})")
