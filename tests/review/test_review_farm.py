@@ -23,6 +23,7 @@ from geofield.farm.edits import put_edits
 from geofield.farm.put_back import put_back
 from geofield.review import Session
 from geofield.review.shelf import Shelf
+from geofield.simulate import SimulationSettings, simulate_field
 from geofield_command import run_geofield
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
@@ -65,6 +66,11 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     assert "data:image/" in next((farm / "a").glob("*.html")).read_text()
     (farm.parent / "field_1.tif").rename(farm.parent / "elsewhere.tif")
     assert "Shown without the picture" in run_geofield(*next(pages), check=True).stderr
+    small = SimulationSettings(width_px=96, height_px=96, obstacles=0, lat=36.0)
+    other = gf.write_scene(simulate_field(1, small).scene, farm.parent / "other.tif")
+    options = ["-f", "map", "--picture", other, "--out", farm / "c"]
+    said = run_geofield("export", farm, *options, check=True).stderr
+    assert "other.tif does not show field_" in said
     number = int(desk.session.plan.obstacles["obstacle_no"].iloc[0])  # type: ignore[index]
     desk.edit({"do": "status", "no": number, "status": "rejected"})
     assert "rejected" not in statuses(farm, shown[0])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, say
+from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.farm import say_waiting
 from geofield.cli.files import FOLDER, OLD_PATH, PATH, claim_folder, tell_unsaved
 from geofield.errors import GeofieldError
@@ -119,8 +119,13 @@ def export(
                 say(note)
             own = apart(dataset)
         if pictured and below is not None:
-            own = [_on(below, each, cuts, asked=picture is not None) for each in own]
+            # Of several fields those off the picture are told, with all others drawn on it.
+            alone = picture is not None and len(own) == len(plan_files) == 1
+            own = [_on(below, each, cuts, must=alone) for each in own]
         datasets += own
+    off = [each.name for each in datasets if each.scene_path is None]
+    if pictured and picture is not None and off:
+        say_note(f"{picture} does not show {', '.join(off)}.")
     written = write_datasets(
         datasets,
         folder,
@@ -137,8 +142,8 @@ def export(
         say(str(path))
 
 
-def _on(picture: Path, dataset: Dataset, cuts: str, *, asked: bool) -> Dataset:
-    """The dataset with its part of the picture, unless nobody asked for it and it has none."""
+def _on(picture: Path, dataset: Dataset, cuts: str, *, must: bool) -> Dataset:
+    """The dataset with its part of the picture, which it must have or may."""
     from geofield.imagery import write_scene
     from geofield.plan import Plan
     from geofield.settings import Settings
@@ -148,7 +153,7 @@ def _on(picture: Path, dataset: Dataset, cuts: str, *, asked: bool) -> Dataset:
     try:
         scene = scene_of_plan(picture, plan, plan.settings or Settings())
     except GeofieldError:
-        if asked:
+        if must:
             raise
         return dataset
     place = Path(tempfile.mkdtemp(dir=cuts)) / "scene.tif"
