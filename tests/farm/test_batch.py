@@ -262,6 +262,32 @@ def test_a_worker_killed_while_it_writes_leaves_nothing(farm: Path, tmp_path: Pa
     assert layers_of(tmp_path / "farm") == layers_of(farm)
 
 
+def test_a_run_that_fails_leaves_nothing_that_another_worker_was_writing(tmp_path: Path) -> None:
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "sitecustomize.py").write_text(
+        "import sys\n"
+        "if 'worker' in ' '.join(sys.orig_argv):\n"
+        "    import pathlib, time\n"
+        "    plain = pathlib.Path.replace\n"
+        "    def bad(self, target):\n"
+        "        if 'chunk=0001' in str(target):\n"
+        "            time.sleep(100)\n"
+        "        if 'chunk=0000' not in str(target):\n"
+        "            return plain(self, target)\n"
+        f"        while not list(pathlib.Path({str(tmp_path)!r}).rglob('chunk=0001/.*.tmp')):\n"
+        "            time.sleep(0.01)\n"
+        "        raise OSError(28, 'No space left on device')\n"
+        "    pathlib.Path.replace = bad\n"
+    )
+    line = [GEOFIELD, "batch", str(parcels(tmp_path / "p.gpkg")), "--out", str(tmp_path / "farm"),
+            "--workers", "2"]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "bad")}
+    done = subprocess.run(line, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 1
+    assert "The disk is full" in done.stderr
+    assert not list((tmp_path / "farm").rglob("*.tmp"))
+
+
 def test_a_run_killed_at_its_end_is_finished_by_the_next(farm: Path, tmp_path: Path) -> None:
     import shutil
 

@@ -17,6 +17,7 @@ from typing import IO, Any
 from geofield.errors import GeofieldError
 from geofield.farm.chunk import Done, Orders, Task
 from geofield.farm.engine import ONE_THREAD, Control, Patience
+from geofield.farm.folder import sweep_chunk
 from geofield.farm.worker import receive, send
 
 #: What a worker is started with.
@@ -78,7 +79,7 @@ class Pool:
                         worker.task = None
                         yield message
         finally:
-            self.close()
+            self._end(orders)
 
     def _employ(
         self, tasks: Iterator[Task], again: deque[Task], orders: Orders, control: Control
@@ -97,6 +98,13 @@ class Pool:
                 worker = _Worker.start(orders, self._events)
                 self._workers.append(worker)
             worker.take(task)
+
+    def _end(self, orders: Orders) -> None:
+        """End all workers, and remove what they were writing where another one could not go on."""
+        begun = [worker.task.chunk for worker in self._workers if worker.task is not None]
+        self.close()
+        for chunk in begun:
+            sweep_chunk(orders.store, chunk)
 
     def close(self) -> None:
         """End all workers now."""
