@@ -22,7 +22,7 @@ from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
 from geofield.formats import validate_file
-from geofield.model.segment_values import values_in, with_values
+from geofield.model.segment_values import SegmentValues, values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import TracksWritten
@@ -591,6 +591,29 @@ def test_a_segment_that_is_cut_in_two_has_its_values_twice(folder: Path) -> None
     both = table[table["note"].notna()]
     assert len(both) == 2
     assert set(both["track_no"]) == {number}
+
+
+def test_a_segment_that_is_joined_gives_its_values_to_no_other_ground() -> None:
+    """What stood beside one side of a tree is not said of the other while the tree is away."""
+
+    def noted(*lines: LineString) -> Frame:
+        table = gpd.GeoDataFrame(
+            {"track_no": 1, "segment_no": range(1, len(lines) + 1), "length_m": 1.0},
+            geometry=list(lines),
+            crs=32633,
+        )
+        return with_values(table, beside, 6.0)
+
+    sides = LineString([(0, 0), (24, 0)]), LineString([(33, 0), (39, 0)])
+    beside: tuple[SegmentValues, ...] = (SegmentValues(sides[0].wkt, {"note": "wet"}),)
+    joined = noted(LineString([(0, 0), (39, 0)]))
+    assert joined["note"].tolist() == ["wet"]
+    assert values_in(joined, beside, 6.0) == beside
+    beside = values_in(joined, beside, 6.0)
+    assert noted(*sides)["note"].isna().tolist() == [False, True]
+    # Another word is one of all that it stands beside.
+    (changed,) = values_in(joined.assign(note="sown"), beside, 6.0)
+    assert shapely.from_wkt(changed.line).length == 39
 
 
 def test_values_beside_lines_of_several_parts_and_none_at_all() -> None:

@@ -57,14 +57,18 @@ def values_in(
     texts = shapely.to_wkt(lines, rounding_precision=DECIMALS)
     has_length = shapely.length(lines) > 0
     if known:
-        # A piece that is as it was keeps its text: reading a file is no edit.
+        # A piece that is as it was keeps its text: reading a file is no edit. So does one of which
+        # all segments say what it said, however planning has cut or joined them.
+        changed = [no for row, no in enumerate(at) if own.get(row, {}) != known[no].own]
         before = np.array([one.line for one in known], dtype=object)[at]
-        same = (at >= 0) & shapely.equals_exact(shapely.from_wkt(before), lines, SAME_M)
-        texts = np.where(same, before, texts)
-    now = [SegmentValues(texts[row], values) for row, values in own.items() if has_length[row]]
+        same = shapely.equals_exact(shapely.from_wkt(before), lines, SAME_M)
+        texts = np.where((at >= 0) & (same | ~np.isin(at, changed)), before, texts)
+    now: dict[str, Mapping[str, Any]] = {
+        texts[row]: values for row, values in own.items() if has_length[row]
+    }
     found = set(at.tolist())
-    now += [one for number, one in enumerate(known) if number not in found]
-    return tuple(sorted(now, key=lambda one: one.line))  # whatever order the rows are in
+    now |= {one.line: one.own for number, one in enumerate(known) if number not in found}
+    return tuple(map(SegmentValues._make, sorted(now.items(), key=lambda one: one[0])))
 
 
 def with_values(
