@@ -201,6 +201,19 @@ def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
     assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}
 
 
+def test_the_stages_behind_an_outline_go_on_with_the_settings_of_the_plan(
+    folder: Path, made: SimulatedField
+) -> None:
+    file, picture = folder / "out/field.gpkg", folder / "picture.tif"
+    geofield("obstacles", picture, file, "--buffer", 2.5, "-o", file)
+    place = ["--lat", made.lat, "--lon", made.lon]
+    geofield("field", picture, *place, "-o", file, "--overwrite")
+    assert "--buffer 2.5\n" in geofield("obstacles", picture, file, "-o", file)
+    assert "--spacing 6\n" in geofield("tracks", file, "-o", file)
+    geofield("field", picture, *place, "-o", file, "--overwrite", "--fresh")
+    assert "As the plan was made" not in geofield("tracks", file, "-o", file)
+
+
 def test_a_layer_of_tracks_that_is_gone_is_planned_again(folder: Path) -> None:
     file = folder / "out/field.gpkg"
     with closing(sqlite3.connect(file)) as connection, connection:

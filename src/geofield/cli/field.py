@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,12 +110,12 @@ def field(
     touches the window's edge, the window grows as far as the picture reaches.
     """
     from geofield.cli.imagery_tools import as_picture, say_wider
-    from geofield.earlier import known_outline
+    from geofield.earlier import holds, known_outline
     from geofield.errors import OutputExistsError
     from geofield.pipeline import run_field
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
-    from geofield.settings import with_values
+    from geofield.settings import as_before, with_values
     from geofield.windows import open_scene, showing
 
     _refuse_at_odds(click.get_current_context().params)
@@ -148,6 +149,10 @@ def field(
             picture.path, lat=lat, lon=lon, settings=settings, previous=previous,
             regions=regions, boundary=parcel, choose=choose, name=name, fetch_wider=picture.wider,
         )  # fmt: skip
+    if previous is not None and holds(previous, lat=lat, lon=lon):
+        # The stages behind this one go on as the plan was made.
+        made = as_before(plan.settings or settings, previous.settings, "obstacles")
+        plan = replace(plan, settings=as_before(made, previous.settings, "tracks"))
     inputs = [each for each in (imagery, boundary) if each is not None]
     read_from = output if previous else None
     save_plan(plan, output, read_from=read_from, overwrite=overwrite, inputs=inputs)
