@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 Image = NDArray[np.float32]
 _REMAP_WIDTH = 4096
@@ -71,6 +72,17 @@ def windows(
 
 def _start(working_px: float, align_px: int, factor: float) -> int:
     return round(max(int(np.floor(working_px / align_px)), 0) * align_px * factor)
+
+
+def gaps_filled(image: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[Any]:
+    """Return a picture (..., rows, cols) whose missing pixels repeat the nearest one.
+
+    So they add no edge, and what is computed across their border mixes nothing foreign in.
+    """
+    if valid.all() or not valid.any():
+        return image
+    nearest = ndimage.distance_transform_edt(~valid, return_distances=False, return_indices=True)
+    return np.asarray(image[..., *nearest])
 
 
 def block_mean(image: Image, factor: int) -> Image:

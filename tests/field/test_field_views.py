@@ -190,3 +190,36 @@ def test_no_alternative_ends_where_the_search_did(wide):
     for one in field.alternatives:
         border = shapely.transform(one.polygon, scene.grid.from_metric_array).exterior
         assert border.intersection(sides).length < 0.02 * border.length
+
+
+def test_an_empty_margin_changes_neither_outline_nor_certainty():
+    truth = simulate_field(3, SimulationSettings(width_px=400, height_px=400))
+    scene = truth.scene.crop(0, 0, 256, 256)
+    lon, lat = scene.grid.to_lonlat(128.0, 128.0)
+    margin = ((30, 20), (50, 40))
+    framed = replace(
+        scene,
+        grid=scene.grid.crop(-50, -30, 346, 306),
+        bands=np.pad(scene.bands, ((0, 0), *margin)),
+        valid=np.pad(scene.valid, margin),
+    )
+    field, same = (extract_field(one, lat=lat, lon=lon) for one in (scene, framed))
+    assert shapely.equals_exact(same.polygon, field.polygon, 1e-6)
+    assert same.quality == field.quality
+    kept = prepare_field(framed, lat=lat, lon=lon)
+    assert extract_field(framed, lat=lat, lon=lon, search=kept).polygon == same.polygon
+
+
+def test_what_values_lie_where_there_are_no_data_changes_nothing():
+    truth = simulate_field(3, SimulationSettings(width_px=640, height_px=640))
+    scene = coarser(truth.scene, 10)
+    row, column = np.indices(scene.grid.shape)
+    valid = column + row // 4 < 0.8 * scene.grid.width_px  # through the field
+    black, white = (
+        replace(scene, valid=valid, bands=np.where(valid, scene.bands, np.uint8(value)))
+        for value in (0, 255)
+    )
+    lon, lat = truth.lon, truth.lat
+    field, same = (extract_field(one, lat=lat, lon=lon) for one in (black, white))
+    assert same.polygon == field.polygon
+    assert same.quality == field.quality

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
+import numpy as np
 import shapely
 from shapely import Polygon
 
@@ -24,6 +26,7 @@ from geofield.methods import FIELD
 from geofield.methods import method as method_of
 from geofield.model import Alternative, Field, FieldQuality, Scene
 from geofield.model.segmentation import Segmentation
+from geofield.raster import gaps_filled
 
 Holes = Literal["fill", "keep"]
 Smoothing = Literal["none", "diffusion"]
@@ -106,6 +109,8 @@ def extract_field(
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
     _check_places(scene, (lon, lat), include, exclude)
+    if method == "auto":
+        scene = _with_data(scene)
     picture = diffused(scene) if smooth == "diffusion" else scene
     part, whole, shown_px = Part.whole(scene), scene.grid, scene.shown_px
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
@@ -188,7 +193,7 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
         The point in the field, degrees, WGS 84.
     """
     search = FieldSearch((lon, lat))
-    search.view(scene)
+    search.view(_with_data(scene))
     return search
 
 
@@ -232,6 +237,19 @@ def _check_places(
             "The picture is empty: all its pixels have the same value.",
             hint="Check the source, the band and the scaling, for instance with QGIS.",
         )
+
+
+def _with_data(scene: Scene) -> Scene:
+    """The picture as far as it has data: an empty margin is no ground, and its values nothing.
+
+    A side where data end is then the picture's side, which no outline is judged by.
+    """
+    if scene.valid.all():
+        return scene
+    rows, columns = (np.flatnonzero(scene.valid.any(axis=axis)) for axis in (1, 0))
+    size = columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0]
+    shown = scene.crop(*(int(each) for each in (columns[0], rows[0], *size)))
+    return replace(shown, bands=gaps_filled(shown.bands, shown.valid))
 
 
 def _to_metric(outline_px: Polygon, grid: Grid) -> Polygon:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.scene import Scene
-from geofield.raster import Image, pixel_centres, resample
+from geofield.raster import Image, gaps_filled, pixel_centres, resample
 
 WORKING_RESOLUTION_M = 23 / 64
 """Ground size of a pixel of the working grid, 0.36 m: three fifths of the pictures' that the
@@ -130,17 +129,10 @@ def working_bands(scene: Scene, tone: Tone, factor: float) -> dict[str, Image | 
 
     Missing pixels are filled with the nearest, so that their border is no edge.
     """
-    nearest = None
-    if not scene.valid.all() and scene.valid.any():
-        nearest = ndimage.distance_transform_edt(
-            ~scene.valid, return_distances=False, return_indices=True
-        )
+    scene = replace(scene, bands=gaps_filled(scene.bands, scene.valid))
 
     def band(values: NDArray[np.generic]) -> Image:
-        picture = values.astype(np.float32)
-        if nearest is not None:
-            picture = picture[tuple(nearest)]
-        return tone.normalised(resample(picture, factor))
+        return tone.normalised(resample(values.astype(np.float32), factor))
 
     if tone.bands == "grey":
         grey = band(scene.grey)

@@ -12,6 +12,7 @@ from scipy import ndimage
 from geofield.errors import ObstacleError
 from geofield.model.circles import Circles, inside
 from geofield.model.scene import Scene
+from geofield.raster import gaps_filled
 from geofield.study.accumulator import otsu_threshold
 from geofield.study.checks import (
     GREY_LIMIT,
@@ -70,7 +71,7 @@ def detect_by_study(
         The winning setting, the counts per threshold, the grey limit.
     """
     options = StudyOptions(**varied)
-    grey = filled(scene.grey, scene.valid)
+    grey = gaps_filled(scene.grey.astype(np.float64), scene.valid)
     if strategy == "study_listing":
         result = _listing(grey, region, options)
     elif strategy == "study_text":
@@ -90,15 +91,6 @@ def detect_by_study(
         share = None if share is None else share[dark]
         detection["grey_limit"] = limit
     return circles, share, detection
-
-
-def filled(grey: NDArray[np.floating], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return a picture whose missing pixels repeat the nearest one, so that they add no edge."""
-    picture: NDArray[np.float64] = grey.astype(np.float64)
-    if valid.all() or not valid.any():
-        return picture
-    nearest = ndimage.distance_transform_edt(~valid, return_distances=False, return_indices=True)
-    return cast("NDArray[np.float64]", picture[tuple(nearest)])
 
 
 def _listing(
