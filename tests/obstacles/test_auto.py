@@ -185,6 +185,21 @@ def test_holes_without_data_add_nothing(simulated):
     assert valid[rows, cols].all()
 
 
+@pytest.mark.parametrize(("side_px", "told"), [(12, "52 m2"), (6, None), (2, None)])
+def test_a_gap_that_hides_a_tree_is_told_however_large_the_field(simulated, side_px, told):
+    scene, field = simulated.scene, simulated.field
+    middle = field.polygon_px(scene.grid).representative_point()
+    row, column = int(middle.y), int(middle.x)
+    valid = scene.valid.copy()
+    valid[row : row + side_px, column : column + side_px] = False
+    assert side_px**2 < 0.006 * field.polygon_px(scene.grid).area
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ObstacleWarning)
+        found = gf.detect_obstacles(replace(scene, valid=valid), field)
+    doubts = [each for each in found.attrs["detection"]["doubts"] if "does not show" in each]
+    assert [f"does not show {told} of the field" in each for each in doubts] == [True] * bool(told)
+
+
 def test_a_reader_gives_the_same_as_its_scene(simulated, simulated_tif):
     from geofield.imagery.reader import SceneReader
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -49,6 +50,8 @@ _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""
 MIN_RADIUS_PX = 1.6
 """Smaller crowns are seen by chance, in pixels of the picture."""
+_HIDES_M2 = 20.0
+"""Gaps of the data on more ground than this hide a tree, however large the field is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +122,11 @@ def detect_by_default(
             doubts.append("The field is too large to search it for what is no tree.")
     far_px = radius_m[1] / resolution
     reach = None if ring is None else ring.buffer(far_px)
-    crowns, seen_px = _look(
+    crowns, seen_px, gaps_px = _look(
         picture, area, reach, far_px, tone, factor, polarity, standing, progress
     )
     if ring is not None:
-        doubts += _unseen(ring.area, seen_px)
+        doubts += _unseen(ring.area, seen_px, gaps_px, resolution)
     for doubt in doubts:
         warnings.warn(doubt, ObstacleWarning, stacklevel=3)
     crowns = once_each(crowns, **facts["suppression"])
@@ -175,16 +178,16 @@ def _look(
     polarity: Polarity,
     standing: StandingMap | None,
     progress: Progress | None,
-) -> tuple[Circles, int]:
+) -> tuple[Circles, int, int]:
     """Return the candidates of all windows that are within reach, and fill the map.
 
     The reach and how far it is are in pixels of the picture, candidates are in working pixels.
-    Told, too, is how many pixels of the area have data.
+    Told, too, is how many pixels of the area have data, and how many lie in gaps of the data.
     """
     todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor))
     if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
-    crowns, seen_px = Circles(), 0
+    crowns, seen_px, gaps_px = Circles(), 0, 0
     for done, window in enumerate(todo):
         scene = part_of(picture, (window.col, window.row, window.width, window.height), tone)
         if scene.valid.any():
@@ -202,12 +205,15 @@ def _look(
             here = here.scaled(1.0, *start)
             crowns = crowns.joined(here.take(_in_core(here, window, factor)))
             seen_px += int(region.sum())
+            if area is not None and not scene.valid.all():
+                missing = area.mask(scene.grid, holes=False) & ~scene.valid
+                gaps_px += int(_opened(missing)[window.core_slices].sum())
             if standing is not None:
                 cells = on_working_grid(region, named["other"].shape, factor * CELL_PX)
                 standing.fill(named, cells, *(round(each / CELL_PX) for each in start))
         if progress is not None:
             progress(done + 1, len(todo), "obstacles")
-    return crowns, seen_px
+    return crowns, seen_px, gaps_px
 
 
 def _cut(
@@ -234,13 +240,23 @@ def _cut(
     return Circles(x, y, crowns.radius_px, crowns.strength)
 
 
-def _unseen(field_px: float, seen_px: int) -> list[str]:
+def _opened(mask: Mask) -> Mask:
+    """Return what is at least three pixels wide: neither specks nor the border's own pixels."""
+    kernel = np.ones((3, 3), np.uint8)
+    return cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+
+
+def _unseen(field_px: float, seen_px: int, gaps_px: int, resolution_m: float) -> list[str]:
     """The part of a field that the picture does not show, in words."""
-    missing = field_px - seen_px
+    missing, gaps_m2 = field_px - seen_px, gaps_px * resolution_m**2
     # Along its border pixels are counted whole or not at all.
-    if missing <= max(0.01 * field_px, field_px**0.5):
+    if missing > max(0.01 * field_px, field_px**0.5):
+        share = f"{missing / field_px:.0%}"
+    elif gaps_m2 > _HIDES_M2:
+        share = f"{gaps_m2:.0f} m2"
+    else:
         return []
-    return [f"{UNSEEN} {missing / field_px:.0%} of the field: what stands there is not found."]
+    return [f"{UNSEEN} {share} of the field: what stands there is not found."]
 
 
 def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
