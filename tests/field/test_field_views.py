@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from geofield.errors import PointOutsideError
 from geofield.field import FieldSearch, extract_field, prepare_field
 from geofield.field.part import Part
 from geofield.raster import resample
@@ -223,3 +224,11 @@ def test_what_values_lie_where_there_are_no_data_changes_nothing():
     field, same = (extract_field(one, lat=lat, lon=lon) for one in (black, white))
     assert same.polygon == field.polygon
     assert same.quality == field.quality
+
+
+@pytest.mark.parametrize("look", [extract_field, prepare_field])
+def test_a_picture_without_any_data_is_told(look):
+    made = simulate_field(1, SimulationSettings(width_px=96, height_px=96))
+    scene = replace(made.scene, valid=np.zeros_like(made.scene.valid))
+    with pytest.raises(PointOutsideError, match="no data"):
+        look(scene, lat=made.lat, lon=made.lon)

@@ -205,6 +205,7 @@ def _run(args: list[str] | None) -> None:
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
         except click.ClickException as error:
+            # Final for click, which has no door for its words.
             vars(error).update(message=_NO_NUMBER.sub(_as_number, error.message))
             error.show()
             sys.exit(error.exit_code)

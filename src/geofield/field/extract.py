@@ -244,7 +244,7 @@ def _with_data(scene: Scene) -> Scene:
 
     A side where data end is then the picture's side, which no outline is judged by.
     """
-    if scene.valid.all():
+    if scene.valid.all() or not scene.valid.any():
         return scene
     rows, columns = (np.flatnonzero(scene.valid.any(axis=axis)) for axis in (1, 0))
     size = columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0]
