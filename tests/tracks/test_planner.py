@@ -389,11 +389,11 @@ def test_only_whole_strips_are_left_on_either_side_of_a_place(direction: Any) ->
 
 
 def test_a_pass_of_a_headland_narrower_than_half_the_machine_stays_within_the_border() -> None:
-    for width_m, headland_m in ((None, 2.0), (13.0, 6.0)):
+    for width_m, headland_m, offset_m in ((None, 2.0, 3.0), (13.0, 6.0, 6.5)):
         how: Any = {"crs": CRS, "spacing_m": 6.0, "width_m": width_m}
         planned = plan_tracks(box(0, 0, 200, 121), headland_m=headland_m, **how)
         assert planned.headland_tracks is not None
-        assert planned.headland_tracks["offset_m"].tolist() == [(width_m or 6.0) / 2]
+        assert planned.headland_tracks["offset_m"].tolist() == [offset_m]
 
 
 def test_a_headland_is_told_to_be_worked_as_far_as_its_passes_reach() -> None:
