@@ -19,6 +19,7 @@ import shapely
 import geofield as gf
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import Farm, read_farm
+from geofield.model.rows import rows_of
 
 SQUARE = shapely.box(0.0, 0.0, 120.0, 90.0)
 
@@ -201,3 +202,14 @@ def test_what_is_changed_in_a_plans_tables_is_in_the_farm(tmp_path: Path) -> Non
     assert set(found["driver"]) == {"Ayşe"}
     assert len(gpd.read_parquet(tmp_path / "farm" / "gaps")) == len(plan.tracks.gaps)
     assert read_farm(tmp_path / "farm")["one"] == plan
+
+
+def test_no_table_is_made_of_the_tracks_of_a_parcel(tmp_path: Path) -> None:
+    """They go from the planner to the files: tables would be most of the work."""
+    parcel = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 200, 100)], crs=32633)
+    parcel.translate(500_000, 5_500_000).to_file(tmp_path / "one.gpkg")
+    (plan,) = gf.plan_fields(tmp_path / "one.gpkg", spacing_m=5)
+    assert plan.tracks is not None
+    rows = rows_of(plan.tracks)
+    assert len(rows["tracks"]) == 20
+    assert [name for name, each in rows.items() if each._frame is not None] == []

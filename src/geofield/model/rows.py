@@ -7,6 +7,7 @@ from the planner to the files as they are.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -137,6 +138,14 @@ def tables_when_asked(**layers: schema.Layer) -> Callable[[type[_Class]], type[_
         return owner
 
     return change
+
+
+def replaced(of: _Class, **changes: Any) -> _Class:
+    """The same with other values, as `dataclasses.replace`; rows stay rows, not tables."""
+    value: Any = of
+    names = [name for name, each in vars(type(of)).items() if isinstance(each, _Table)]
+    same: _Class = dataclasses.replace(value, **{name: vars(of)[name] for name in names} | changes)
+    return same
 
 
 def rows_of(of: Any) -> dict[str, Rows]:

@@ -249,8 +249,10 @@ def with_drawn(
 def with_own(tracks: Tracks, edits: TrackEdits) -> Tracks:
     """Tracks with what a person wrote into columns of their own, in both layers."""
     said = {one.track_no: one.own for one in edits.edits if one.own}
-    numbers = tracks.lines["track_no"].tolist() if said else []
     beside = edits.beside
+    if not said and not beside:
+        return tracks
+    numbers = tracks.lines["track_no"].tolist() if said else []
     segments = with_values(tracks.segments, beside, tracks.spacing_m)
     return replace(
         tracks,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from geofield.crs import LONLAT, transformer
 from geofield.errors import TrackError, TrackWarning
 from geofield.grid import Grid
 from geofield.model.obstacles import active
+from geofield.model.rows import replaced
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
@@ -77,7 +77,7 @@ def plan_with_settings(
     told = _reaching_in(settings, obstacles)
     for note in told:
         warnings.warn(note, TrackWarning, stacklevel=2)
-    tracks = replace(tracks, notes=(*tracks.notes, *told))
+    tracks = replaced(tracks, notes=(*tracks.notes, *told))
     if settings.route == "none":
         return tracks
     start = settings.start_lonlat
