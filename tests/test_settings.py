@@ -171,6 +171,7 @@ def test_settings_of_python_are_checked_in_words(said: dict[str, Any], message: 
 
 
 def test_any_setting_by_its_name() -> None:
+    assert set(Settings.model_fields) == {*MODELS, "machines"}
     names = [name for each in SECTIONS for name in type(getattr(Settings(), each)).model_fields]
     assert len(set(names)) == len(names)
     changed = with_values(Settings(tracks={"step_m": 0.5}), spacing_m=6, route="shortest")

@@ -85,7 +85,6 @@ def export(
     together or not at all; what a format cannot carry is said once.
     """
     from geofield.farm import is_farm, read_farm
-    from geofield.farm.pictures import pictures_of
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.many import apart
@@ -109,6 +108,8 @@ def export(
     for plan_file in plan_files:
         below = picture
         if is_farm(plan_file):
+            from geofield.farm.pictures import pictures_of
+
             say_waiting(plan_file)
             own = [plan.to_dataset() for plan in read_farm(plan_file)]
             below = picture or pictures_of(plan_file)

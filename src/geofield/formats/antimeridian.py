@@ -30,7 +30,7 @@ _SNAP_DEG = 1.1e-7
 
 def unwrapped(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     """Shapes in degrees, those that jump at 180 with longitudes from 0 to 360 instead."""
-    return _where_jumping(shapes, lambda whole: whole)
+    return _where_jumping(shapes, list)
 
 
 def split(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
@@ -80,7 +80,7 @@ def extent_box(west: float, south: float, east: float, north: float) -> Any:
 
 
 def _where_jumping(
-    shapes: NDArray[np.object_], change: Callable[[Any], Any]
+    shapes: NDArray[np.object_], change: Callable[[NDArray[np.object_]], list[Any]]
 ) -> NDArray[np.object_]:
     """Shapes, those that jump at 180 changed from what they are with longitudes up to 360."""
     shapes = np.asarray(shapes, dtype=object)
@@ -89,22 +89,27 @@ def _where_jumping(
         jumps = (bounds[:, 2] - bounds[:, 0] > _WIDEST_DEG) & (bounds[:, 0] < 0)
     if jumps.any():
         shapes = shapes.copy()
-        shapes[jumps] = [change(each) for each in shapely.transform(shapes[jumps], _positive)]
+        shapes[jumps] = change(shapely.transform(shapes[jumps], _positive))
     return shapes
 
 
-def _split(whole: Any) -> Any:
-    if not shapely.is_valid(whole):
+def _split(whole: NDArray[np.object_]) -> list[Any]:
+    if not shapely.is_valid(whole).all():
         raise FormatError(
             "A shape that reaches longitude 180 is not valid in degrees; one that goes round a "
             "pole never is.",
             hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
         )
     west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
-    return _collected(shapely.intersection(whole, _EAST), west)
+    east = shapely.intersection(whole, _EAST)
+    return [_collected(*parts) for parts in zip(east, west, strict=True)]
 
 
-def _joined(whole: Any) -> Any:
+def _joined(whole: NDArray[np.object_]) -> list[Any]:
+    return [_as_one(each) for each in whole]
+
+
+def _as_one(whole: Any) -> Any:
     parts = shapely.get_parts(whole)
     if len(parts) == 1:
         return whole

@@ -118,7 +118,7 @@ def write_datasets(
                     )
                 written.append(place)
         written = _replacing(written, target, staging)
-    _tell_bare(chosen, datasets)
+    _tell_bare([one for one in datasets if any(each.pictured for each in chosen)])
     # Nobody takes the picture, map and report for a plan's whole content.
     for each in [each for each in chosen if tell_drops and not each.automatic]:
         told = (dropped(one, each, together=len(datasets) > 1) for one in datasets)
@@ -136,7 +136,7 @@ def write_datasets(
     return written
 
 
-def _tell_bare(chosen: Sequence[Format], datasets: Sequence[Dataset]) -> None:
+def _tell_bare(datasets: Sequence[Dataset]) -> None:
     """Warn of plans shown without the picture that they were made from: it is not at hand."""
     bare = [
         one.name
@@ -144,7 +144,7 @@ def _tell_bare(chosen: Sequence[Format], datasets: Sequence[Dataset]) -> None:
         if one.scene_path is None
         and one.table(schema.FIELD.name)["imagery"].fillna("").ne("").any()
     ]
-    if bare and any(each.pictured for each in chosen):
+    if bare:
         warnings.warn(
             f"Shown without the picture, which is not beside the plan: {', '.join(bare)}. "
             "`geofield export --picture` takes it from elsewhere.",

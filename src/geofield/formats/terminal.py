@@ -17,12 +17,10 @@ from geofield import schema
 from geofield.formats.arrow import exact_geometry
 from geofield.formats.avoided import avoided
 from geofield.model import Dataset
+from geofield.model.track_statistics import SHARED_EDGE_M
 
 #: Smaller pieces are left over from clipping, square metres.
 _SLIVER_M2 = 0.01
-#: Edges that two shapes share differ in their last digits, metres: what lies between has no area,
-#: but is as long as they are.
-_GRID_M = 1e-4
 #: How far a straight line's vertices may stray, metres.
 _STRAIGHT_M = 0.01
 
@@ -87,7 +85,7 @@ def main_field(dataset: Dataset, field: shapely.Polygon) -> list[shapely.Polygon
         return []
     strip = shapely.union_all(dataset.table(schema.HEADLAND.name).geometry.to_numpy())
     rest = shapely.get_parts(
-        shapely.orient_polygons(shapely.difference(field, strip, grid_size=_GRID_M))
+        shapely.orient_polygons(shapely.difference(field, strip, grid_size=SHARED_EDGE_M))
     )
     parts = [part for part in rest if part.geom_type == "Polygon" and part.area > _SLIVER_M2]
     return sorted(parts, key=lambda part: -float(part.area))

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 #: Of headland tracks and their strips: corners stay corners (an implement is turned there), but a
 #: spike's corner is cut off.
 MITRE_LIMIT = 2.0
+#: Edges that two areas share differ in their last digits, metres: what lies between has no area,
+#: but is as long as they are.
+SHARED_EDGE_M = 1e-4
 #: Rows are parallel where their ends are no farther off, share of the spacing.
 _STRAIGHT = 1e-6
 

@@ -12,7 +12,7 @@ from geofield import schema
 from geofield.errors import TrackError
 from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
 from geofield.model.rows import Rows
-from geofield.model.track_statistics import MITRE_LIMIT
+from geofield.model.track_statistics import MITRE_LIMIT, SHARED_EDGE_M
 
 _MIN_PIECE_M = 1e-3
 #: A border is moved without what stands out less than this: where many vertices lie closer than
@@ -68,13 +68,11 @@ def main_area(
 
 
 def headland_table(
-    outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float, holes: bool
+    outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float
 ) -> Rows:
     """Layer `headland`: the field less its main area, one row."""
-    if outline.interiors and not holes:
-        # Along a hole main area and field share an edge but for its last digits: a spike is left.
-        inner = inset(Polygon(outline.exterior), width_m * scale)
-    strip = shapely.difference(outline, inner)
+    # Along a hole they share an edge: without the grid a spike would be left there.
+    strip = shapely.difference(outline, inner, grid_size=SHARED_EDGE_M)
     parts = [p for p in shapely.get_parts(strip) if isinstance(p, Polygon) and p.area > 0.0]
     return Rows(
         schema.HEADLAND,

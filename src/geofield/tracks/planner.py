@@ -198,7 +198,7 @@ def plan_tracks(
     if headland_m > 0.0:
         told = (*unworked_note(headland_m, strips.spacing_m, strips.overlap_m), *told)
         optional["headland"] = headland_table(
-            outline, inner, headland_m, crs=metric_crs, scale=scale, holes=headland_holes
+            outline, inner, headland_m, crs=metric_crs, scale=scale
         )
         optional["headland_tracks"] = headland_track_table(
             outline,
