@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geofield.raster import bilinear, block_mean, is_peak, resample, smoothed, windows
+from geofield.raster import bilinear, block_mean, gaps_filled, is_peak, resample, smoothed, windows
 
 
 def ramp(rows, cols):
@@ -60,3 +60,15 @@ def test_cores_cover_the_picture_once(factor):
         assert window.row <= y0
         assert window.row + window.height >= min(y1, 70) - 1e-9
     assert (seen == 1).all()
+
+
+def test_gaps_repeat_a_nearest_pixel():
+    known = np.random.default_rng(1).random((40, 50)) < 0.03
+    number = np.arange(2.0 * known.size).reshape(2, *known.shape)
+    filled = gaps_filled(number, known)
+    assert np.array_equal(filled[1] - filled[0], np.full(known.shape, float(known.size)))
+    taken = np.stack(np.divmod(filled[0].astype(int), known.shape[1]))
+    assert known[tuple(taken)].all()
+    places, row_column = np.argwhere(known), np.indices(known.shape)
+    away = np.hypot(*(row_column[..., None] - places.T[:, None, None])).min(axis=-1)
+    assert np.hypot(*(row_column - taken)) == pytest.approx(away, rel=0.03)

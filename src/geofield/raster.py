@@ -15,7 +15,6 @@ from typing import Any, cast
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 Image = NDArray[np.float32]
 _REMAP_WIDTH = 4096
@@ -81,8 +80,18 @@ def gaps_filled(image: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[Any]:
     """
     if valid.all() or not valid.any():
         return image
-    nearest = ndimage.distance_transform_edt(~valid, return_distances=False, return_indices=True)
-    return np.asarray(image[..., *nearest])
+    import cv2
+
+    gap = ~valid
+    # Nearest to a fiftieth; six times as fast as exactly so.
+    _, number = cv2.distanceTransformWithLabels(
+        gap.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest = np.flatnonzero(valid)[number[gap] - 1]
+    whole = image.copy()
+    for band in whole.reshape(-1, *valid.shape):
+        band[gap] = band.ravel()[nearest]
+    return whole
 
 
 def block_mean(image: Image, factor: int) -> Image:
