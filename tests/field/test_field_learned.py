@@ -16,6 +16,7 @@ from geofield.field import FieldSearch, extract_field
 from geofield.field.auto import likely_outlines
 from geofield.field.border import measure
 from geofield.field.cuts import divided
+from geofield.field.frame import Frame
 from geofield.field.learned import Learned, shipped
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import Ranking, exact, log_odds, trained
@@ -42,7 +43,7 @@ def several():
     stack[0, 40:120, 40:] += 9
     stack[1, 70:100, 60:110] += 3
     stack[2, 120:] += 5 * rng.random((40, 160), np.float32)
-    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool), Frame((160, 160)))
     likely = np.clip(surface.parted.mean(stack[0]) / 9 + 0.1, 0.02, 0.97)
     outlines = [shapely.Polygon(corners) for corners in OUTLINES]
     inside = [surface.members(ring(one)) for one in outlines]

@@ -11,6 +11,7 @@ from pyproj import CRS
 from shapely import box
 
 from geofield.field import extract_field, prepare_field
+from geofield.field.frame import Frame
 from geofield.field.mend import mended
 from geofield.field.outline import rough_outline, straight_outline
 from geofield.field.points import drawn, obeys
@@ -22,6 +23,7 @@ from geofield.model.scene import Scene
 from geofield.simulate import SimulationSettings, simulate_field
 
 SQUARE = box(40, 40, 120, 120)
+FRAME = Frame((160, 160))
 
 
 def overlap(a, b):
@@ -54,28 +56,28 @@ def outline_of(field, include, exclude, search=None):
 def test_the_side_beside_a_point_moves_or_turns_beyond_it(point, truth):
     belongs = not SQUARE.contains(shapely.Point(point))
     said = ([(80.0, 80.0), point], []) if belongs else ([(80.0, 80.0)], [point])
-    found = [one for one in mended(SQUARE, *said, (160, 160)) if obeys(one, *said)]
+    found = [one for one in mended(SQUARE, *said, FRAME) if obeys(one, *said)]
     assert max(overlap(one, truth) for one in found) > 0.97
     assert overlap(SQUARE, truth) < 0.965
 
 
 def test_a_side_does_not_leave_the_picture_and_an_obeyed_point_moves_none():
     inside = (80.0, 80.0), (100.0, 60.0)
-    assert mended(SQUARE, inside, [(10.0, 10.0)], (160, 160)) == []
-    found = mended(SQUARE, [inside[0], (150.0, 80.0)], [], (160, 160))
+    assert mended(SQUARE, inside, [(10.0, 10.0)], FRAME) == []
+    found = mended(SQUARE, [inside[0], (150.0, 80.0)], [], FRAME)
     assert found
     assert all(box(0, 0, 160, 160).covers(one) for one in found)
 
 
 def test_a_first_correction_moves_a_side_and_details_give_way_at_a_point_too():
     seed, beyond = (80.0, 80.0), (124.0, 80.0)
-    first = mended(SQUARE, [seed, beyond], [], (160, 160))
+    first = mended(SQUARE, [seed, beyond], [], FRAME)
     assert min(one.symmetric_difference(SQUARE).area for one in first) > 80 * 3, "no mere strip"
-    later = mended(SQUARE, [seed, beyond], [(20.0, 20.0), (20.0, 140.0)], (160, 160))
+    later = mended(SQUARE, [seed, beyond], [(20.0, 20.0), (20.0, 140.0)], FRAME)
     assert min(one.symmetric_difference(SQUARE).area for one in later) < 20
     # Sides that move beyond the point would cross others: it gives way at once.
     beside = [(124.0, y) for y in (50.0, 65.0, 95.0, 110.0)]
-    only = mended(SQUARE, [seed, beyond], beside, (160, 160))
+    only = mended(SQUARE, [seed, beyond], beside, FRAME)
     assert len(only) == 1
     assert obeys(only[0], [seed, beyond], beside)
 

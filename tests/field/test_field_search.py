@@ -8,6 +8,7 @@ from shapely import Polygon, box
 from geofield.field.answer import network_outlines
 from geofield.field.border import measure as measure_inside
 from geofield.field.clearing import clear
+from geofield.field.frame import Frame
 from geofield.field.hierarchy import merge
 from geofield.field.morphology import filled, inner, plump
 from geofield.field.ranking import expected_overlaps
@@ -17,6 +18,8 @@ from geofield.field.regions import regions as regions_around
 from geofield.field.search import open_ground
 from geofield.field.straight import redrawn, ring
 from geofield.field.surface import Surface
+
+FRAME = Frame((160, 160))
 
 
 def overlap(a, b):
@@ -160,20 +163,20 @@ def test_a_point_on_a_crown_at_the_border_stands_on_the_crowns_own_ground():
 )
 def test_the_sides_drawn_on_undo(wrong, why):
     truth = box(wrong.bounds[0], 20, 120, 120)
-    found = redrawn(wrong, (50, 60), (160, 160))
+    found = redrawn(wrong, (50, 60), FRAME)
     assert max(overlap(one, truth) for one in found) > 0.999, why
     assert all(one.is_valid and one.contains(shapely.Point(50, 60)) for one in found)
     assert len(found) < 40
 
 
 def test_a_rectangle_suggests_nothing_else():
-    assert redrawn(box(20, 20, 120, 120), (50, 60), (160, 160)) == []
+    assert redrawn(box(20, 20, 120, 120), (50, 60), FRAME) == []
 
 
 def test_figures_tell_a_border_from_none():
     stack = picture()
     stack[0, 40:120, 40:120] += 10
-    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool), FRAME)
     on, off = (
         measure(surface, box(*corners)) for corners in ((40, 40, 120, 120), (30, 30, 130, 130))
     )
@@ -190,7 +193,7 @@ def test_figures_tell_a_border_from_none():
 def test_figures_do_not_depend_on_the_direction_of_the_ring():
     stack = picture()
     stack[0, 40:120, 40:120] += 10
-    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool))
+    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool), FRAME)
     outline = box(38, 40, 120, 119)
     one, other = measure(surface, outline), measure(surface, Polygon(outline.exterior.coords[::-1]))
     assert one == pytest.approx(other, abs=0.05)
@@ -202,7 +205,7 @@ def test_sides_move_onto_the_border():
     row, column = np.indices((160, 160)) + 0.5
     stack[0, shapely.contains_xy(truth, column, row)] += 10
     crooked = Polygon([(31.5, 38), (116, 29.5), (131.5, 118.5), (42.5, 132.5)])
-    found = aligned(crooked, np.moveaxis(stack, 0, -1).copy(), 3.0)
+    found = aligned(crooked, np.moveaxis(stack, 0, -1).copy(), 3.0, FRAME)
     assert overlap(crooked, truth) < 0.965
     assert overlap(found, truth) > 0.985
     assert len(found.exterior.coords) == 5
@@ -212,7 +215,7 @@ def test_a_side_beside_the_frame_is_the_frame():
     stack = picture()
     stack[0, 40:120] += 10
     beside = Polygon([(2, 41), (158, 39), (157.8, 121), (1.5, 119)])
-    found = aligned(beside, np.moveaxis(stack, 0, -1).copy(), 2.0)
+    found = aligned(beside, np.moveaxis(stack, 0, -1).copy(), 2.0, FRAME)
     assert found.bounds[::2] == (0, 160)
     assert overlap(found, box(0, 40, 160, 120)) > 0.98
 

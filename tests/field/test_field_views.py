@@ -211,6 +211,23 @@ def test_an_empty_margin_changes_neither_outline_nor_certainty():
     assert extract_field(framed, lat=lat, lon=lon, search=kept).polygon == same.polygon
 
 
+def test_a_slanting_end_of_data_is_judged_as_the_frame_is():
+    made = simulate_field(3, SimulationSettings(width_px=256, height_px=256))
+    grid = made.scene.grid
+    x, y = (float(at) for at in grid.from_lonlat(made.lon, made.lat))
+    truth = made.field.polygon_px(grid)
+    far = 0.6 * x + 0.4 * truth.bounds[2] + 0.35 * y
+    shown = shapely.Polygon([(0, 0), (far, 0), (far - 0.35 * 256, 256), (0, 256)])
+    row, column = np.indices(grid.shape) + 0.5
+    cut = replace(made.scene, valid=shapely.contains_xy(shown, column, row))
+    whole, part = (extract_field(one, lat=made.lat, lon=made.lon) for one in (made.scene, cut))
+    assert whole.quality.score - part.quality.score < 0.05
+    assert part.quality.trusted
+    found, truth = part.polygon_px(grid), truth.intersection(shown)
+    assert found.intersection(truth).area > 0.975 * found.union(truth).area
+    assert 0.05 < dict(part.quality.figures)["edge_share"] < 0.5
+
+
 def test_what_values_lie_where_there_are_no_data_changes_nothing():
     truth = simulate_field(3, SimulationSettings(width_px=640, height_px=640))
     scene = coarser(truth.scene, 10)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
+from geofield.field.frame import covered
 from geofield.field.morphology import filled
 from geofield.field.outline import straight_outline
 from geofield.field.segmentation import part_at
 from geofield.field.straight import ring
-from geofield.field.surface import covered
 
 BoolArray = NDArray[np.bool_]
 

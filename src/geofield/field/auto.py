@@ -76,7 +76,8 @@ def segment(
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     likely = likely_outlines(found[:WEIGHED], search)
     outlines = [one.candidate.polygon for one in likely]
-    masks = carried(scene, outlines, search.factor, (search.seed_px, *belong), apart)
+    points = (search.seed_px, *belong), apart
+    masks = carried(scene, outlines, search.factor, *points, times=search.seen.times)
     chosen, *others = (
         _told(scene, search, one, mask) for one, mask in zip(likely, masks, strict=True)
     )

@@ -15,8 +15,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.frame import Frame
 from geofield.field.median import median
-from geofield.field.straight import on_frame, ring
+from geofield.field.straight import ring
 from geofield.field.surface import Surface
 from geofield.raster import bilinear
 
@@ -56,7 +57,7 @@ def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> dict[str, 
     vertices = ring(outline)
     side = np.concatenate([vertices[1:], vertices[:1]]) - vertices
     length = np.hypot(*side.T)
-    places, outward, frame = _places(vertices, side, length, surface.shape)
+    places, outward, framed = _places(vertices, side, length, surface.frame)
     if len(places) < 12 or inside.sum() < 5:
         return None
     means = surface.means[:, inside]
@@ -67,11 +68,11 @@ def measure(surface: Surface, outline: Polygon, inside: BoolArray) -> dict[str, 
     for share in (50, 25):
         above = along[f"strength_{share}"] - interior["interior_80"]
         interior[f"strength_{share}_above_interior"] = above
-    return along | _shape(outline, side, length, frame, surface.shape) | interior
+    return along | _shape(outline, side, length, framed, surface.frame.area_px) | interior
 
 
 def _places(
-    vertices: FloatArray, side: FloatArray, length: FloatArray, shape: tuple[int, int]
+    vertices: FloatArray, side: FloatArray, length: FloatArray, frame: Frame
 ) -> tuple[FloatArray, FloatArray, float]:
     """Points along an outline, a pixel apart, with outward directions; share on the frame."""
     steps = np.maximum(np.rint(length).astype(int), (length > 1e-6).astype(int))
@@ -79,13 +80,13 @@ def _places(
     number = np.arange(len(index)) - np.repeat(np.cumsum(steps) - steps, steps)
     places = vertices[index] + ((number + 0.5) / steps[index])[:, None] * side[index]
     outward = (side[:, ::-1] * [1, -1] / np.maximum(length, 1e-9)[:, None])[index]
-    kept = ~on_frame(places, shape, 2.0)
-    frame = 1.0 - _share(kept)
+    kept = ~frame.near(places, 2.0)
+    framed = 1.0 - _share(kept)
     places, outward = places[kept], outward[kept]
     if len(places) > _MOST_PLACES:
         chosen = np.linspace(0, len(places) - 1, _MOST_PLACES).astype(int)
         places, outward = places[chosen], outward[chosen]
-    return places, outward, frame
+    return places, outward, framed
 
 
 def _look(
@@ -152,16 +153,16 @@ def _shape(
     outline: Polygon,
     side: FloatArray,
     length: FloatArray,
-    frame: float,
-    shape: tuple[int, int],
+    framed: float,
+    picture_px: float,
 ) -> dict[str, float]:
     """How plain the outline is."""
     around, area = float(length.sum()), outline.area
     turn = np.exp(4j * np.arctan2(side[:, 1], side[:, 0]))
     return {
         "compactness": math.log(4 * math.pi * area / around**2),
-        "area_share": math.log(area / (shape[0] * shape[1])),
-        "frame_share": frame,
+        "area_share": math.log(area / picture_px),
+        "frame_share": framed,
         "vertices": math.log(len(side)),
         "convexity": area / shapely.convex_hull(outline).area,
         "long_sides_share": float(length[length >= 0.15 * math.sqrt(area)].sum()) / around,

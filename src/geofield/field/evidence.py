@@ -34,7 +34,6 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
     Brightness, red against green, yellow against blue and, where there is near infrared,
     the vegetation index, each spread over about the range of brightness.
     """
-    valid = scene.valid
     if scene.is_colour:
         bands = (scene.bands[scene.roles.index(role)] for role in ("red", "green", "blue"))
         red, green, blue = (block_mean(band, factor) for band in bands)
@@ -46,11 +45,7 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
     if scene.nir is not None:
         nir = block_mean(scene.nir, factor)
         layers.append(100.0 * (nir - red) / (nir + red + 20.0))
-    stack = np.stack(layers).astype(np.float32)
-    if not valid.all():
-        # No data must look like nothing else, so that a field ends there.
-        stack[:, block_mean(valid.astype(np.float32), factor) < 0.5] = 400.0
-    return stack
+    return np.stack(layers).astype(np.float32)
 
 
 def block_mean(band: NDArray[np.bool_ | np.uint8 | np.float32], factor: int) -> FloatArray:
@@ -71,7 +66,9 @@ def block_mean(band: NDArray[np.bool_ | np.uint8 | np.float32], factor: int) -> 
     return total / np.float32(factor**2)
 
 
-def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:
+def whiten(
+    stack: FloatArray, seed_px: tuple[float, float], inside: NDArray[np.bool_] | None = None
+) -> FloatArray:
     """Channels in units of their variation within the surface around the seed.
 
     Parameters
@@ -79,6 +76,8 @@ def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:
     stack : float32 array (channels, rows, columns)
     seed_px : (float, float)
         Pixel coordinates in `stack`.
+    inside : bool array (rows, columns), optional
+        The pixels that show ground; all of them when not given.
 
     Notes
     -----
@@ -88,11 +87,11 @@ def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:
     smooth = np.stack([_gaussian(layer, _SMOOTH_PX) for layer in stack])
     count = len(smooth)
     x, y = int(seed_px[0]), int(seed_px[1])
-    near = smooth[
-        :,
-        max(y - _REACH_PX, 0) : y + _REACH_PX,
-        max(x - _REACH_PX, 0) : x + _REACH_PX,
-    ]
+    window = (
+        slice(max(y - _REACH_PX, 0), y + _REACH_PX),
+        slice(max(x - _REACH_PX, 0), x + _REACH_PX),
+    )
+    near = smooth[:, *window]
     difference = np.concatenate(
         [
             (near[:, :, _LAG_PX:] - near[:, :, :-_LAG_PX]).reshape(count, -1),
@@ -100,6 +99,10 @@ def whiten(stack: FloatArray, seed_px: tuple[float, float]) -> FloatArray:
         ],
         axis=1,
     ).astype(np.float64)
+    if inside is not None:
+        known = inside[window]
+        both = known[:, _LAG_PX:] & known[:, :-_LAG_PX], known[_LAG_PX:] & known[:-_LAG_PX]
+        difference = difference[:, np.concatenate([one.ravel() for one in both])]
     floor = _FLOOR * np.eye(count)
     if difference.shape[1] < 10 * count:
         covariance = floor

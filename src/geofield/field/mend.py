@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
+from geofield.field.frame import Frame
 from geofield.field.points import obeying, obeys
 from geofield.field.straight import meeting, ring
 
@@ -30,9 +31,7 @@ _DETAILS_FROM = 3
 _LEVER = 0.3
 
 
-def mended(
-    polygon: Polygon, include: Points, exclude: Points, shape: tuple[int, int]
-) -> list[Polygon]:
+def mended(polygon: Polygon, include: Points, exclude: Points, frame: Frame) -> list[Polygon]:
     """Outlines with a side moved or turned past the first point that the given one disobeys.
 
     Where the other points leave no side anywhere to go, and where a person is at details, one
@@ -44,14 +43,15 @@ def mended(
         Pixel coordinates.
     include, exclude : sequence of (float, float)
         Points that belong, the seed first, and that do not.
-    shape : (int, int)
-        Rows and columns of the picture.
+    frame : Frame
+        Where the picture ends.
     """
     wrong = [(point, 1.0) for point in include if not shapely.contains_xy(polygon, *point)]
     wrong += [(point, -1.0) for point in exclude if shapely.intersects_xy(polygon, *point)]
     if not wrong:
         return []
-    moved = _beyond(polygon, *wrong[0], shape)
+    moved = _beyond(polygon, *wrong[0], frame.shape)
+    moved = frame.within(moved[shapely.is_valid(moved)])
     found = list(moved[obeys(moved, include, exclude)])
     if found and len(include) + len(exclude) - 1 < _DETAILS_FROM:
         return found

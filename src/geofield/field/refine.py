@@ -15,8 +15,9 @@ from shapely import Polygon
 from shapely.affinity import scale
 
 from geofield.field.evidence import channels, whiten
+from geofield.field.frame import Frame
 from geofield.field.points import Points, obeys
-from geofield.field.straight import meeting, on_frame, ring
+from geofield.field.straight import meeting, ring
 from geofield.model import Scene
 from geofield.raster import bilinear
 
@@ -42,7 +43,13 @@ _FRAME_PX = 2.5
 
 
 def carried(
-    scene: Scene, outlines: Sequence[Polygon], factor: int, include: Points, exclude: Points = ()
+    scene: Scene,
+    outlines: Sequence[Polygon],
+    factor: int,
+    include: Points,
+    exclude: Points = (),
+    *,
+    times: int = 1,
 ) -> list[BoolArray]:
     """The pixels of a scene within each of some outlines that were found in its reduced picture.
 
@@ -58,6 +65,8 @@ def carried(
     include, exclude : sequence of (float, float)
         The seed and further points that belong, points that do not; pixel coordinates of the
         reduced picture.
+    times : int
+        So many pixels of the scene were made along one that it came with.
     """
     size, reach = factor, _REACH_PX
     finest = math.ceil(max(scene.grid.shape) / _FINEST_PX)
@@ -65,9 +74,10 @@ def carried(
         points = [
             [(x * factor / size, y * factor / size) for x, y in some] for some in (include, exclude)
         ]
-        stack = whiten(channels(scene, size), points[0][0])
+        frame = Frame.of(scene, size, points[0][0], times)
+        stack = whiten(channels(scene, size), points[0][0], frame.inside)
         layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
-        moved = [aligned(one, layers, reach) for one in outlines]
+        moved = [aligned(one, layers, reach, frame) for one in outlines]
         outlines = [
             one if obeys(one, *points) and not obeys(new, *points) else new
             for one, new in zip(outlines, moved, strict=True)
@@ -97,7 +107,9 @@ def enlarged(mask: BoolArray, factor: int, shape: tuple[int, ...]) -> BoolArray:
     return np.ascontiguousarray(large[: shape[0], : shape[1]])
 
 
-def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> Polygon:
+def aligned(
+    outline: Polygon, layers: NDArray[np.float32], reach_px: float, frame: Frame
+) -> Polygon:
     """An outline with its sides moved onto the strongest border within reach.
 
     Parameters
@@ -107,12 +119,14 @@ def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> P
     layers : float32 array (rows, columns, channels)
         Whitened channels.
     reach_px : float
+    frame : Frame
+        Where the picture ends.
     """
-    shape = layers.shape[0], layers.shape[1]
-    start = _framed(np.clip(ring(outline), 0, [shape[1], shape[0]]), shape)
+    size = frame.shape[::-1]
+    start = frame.onto(np.clip(ring(outline), 0, size), _FRAME_PX)
     end = np.roll(start, -1, axis=0)
-    framed = on_frame(start, shape, 0.75) & on_frame(end, shape, 0.75)
-    framed &= on_frame(0.5 * (start + end), shape, 0.75)
+    framed = frame.near(start, 0.75) & frame.near(end, 0.75)
+    framed &= frame.near(0.5 * (start + end), 0.75)
     long = (np.hypot(*(end - start).T) >= _MOVED_PX) & ~framed
     sides = [
         _moved(a, b, layers, reach_px) if moves else (a, b)
@@ -128,18 +142,8 @@ def aligned(outline: Polygon, layers: NDArray[np.float32], reach_px: float) -> P
             corners.append(0.5 * (before[1] + after[0]) if corner is None else corner)
         else:
             corners.append(before[1] if firm[at - 1] else after[0])
-    polygon = Polygon(np.clip(corners, 0, [shape[1], shape[0]]))
+    polygon = Polygon(np.clip(corners, 0, size))
     return polygon if polygon.is_valid and polygon.area > 0.5 * outline.area else outline
-
-
-def _framed(vertices: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Vertices with sides that run beside the picture's frame put onto it."""
-    onto = vertices.copy()
-    for axis, far in ((0, shape[1]), (1, shape[0])):
-        for frame in (0.0, float(far)):
-            near = np.abs(vertices[:, axis] - frame) < _FRAME_PX
-            onto[near & (np.roll(near, 1) | np.roll(near, -1)), axis] = frame
-    return onto
 
 
 def _moved(

@@ -91,12 +91,26 @@ class Partition:
         return np.asarray(total / self.size_px)
 
 
-def partition(stack: NDArray[np.float32]) -> Partition:
-    """Superpixels of whitened channels, merged across their weakest borders first."""
+def partition(stack: NDArray[np.float32], inside: BoolArray | None = None) -> Partition:
+    """Superpixels of whitened channels, merged across their weakest borders first.
+
+    Parameters
+    ----------
+    stack : float32 array (channels, rows, columns)
+    inside : bool array (rows, columns), optional
+        The pixels that show ground, all of them when not given: what lies outside merges last.
+    """
     labels = superpixels(gradient(stack), STEP_PX)
     count = int(labels.max()) + 1
+    outside = np.zeros(count, bool)
+    if inside is not None:
+        apart = np.where(inside, labels, labels + count)
+        numbers, index = np.unique(apart, return_inverse=True)
+        labels, outside = index.astype(np.int32), numbers >= count
+        count = len(numbers)
     lines = borders(labels, stack)
-    pairs = lines.pairs(count)
+    pairs = first, second, _, strength = lines.pairs(count)
+    strength[outside[first] != outside[second]] = math.inf
     sizes = np.bincount(labels.ravel(), minlength=count).astype(float)
     return Partition(labels, lines, pairs, merge(sizes, *pairs))
 

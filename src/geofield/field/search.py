@@ -23,6 +23,7 @@ from geofield.field.answer import network_outlines
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
+from geofield.field.frame import Frame
 from geofield.field.learned import Learned, shipped
 from geofield.field.looks import Seen, seen
 from geofield.field.mend import mended
@@ -142,9 +143,11 @@ class WindowSearch:
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
         include = (self.seed_px, *include)
-        return self.seen.probability(
-            include, exclude, self.surface.shape, self.factor, self.learned.network
+        frame = self.surface.frame
+        likely = self.seen.probability(
+            include, exclude, frame.shape, self.factor, self.learned.network
         )
+        return likely if frame.inside is None else likely * frame.inside
 
     def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
         """Outlines that obey the points, the best first; none where nothing stands out.
@@ -214,7 +217,7 @@ class WindowSearch:
         add(fitted)
         add(network_outlines(likely, self.seed_px))
         for polygon in before:
-            changed = mended(polygon, *points, self.surface.shape)
+            changed = mended(polygon, *points, self.surface.frame)
             add(dict.fromkeys(changed, self.known[polygon].holes))
         tried: set[Polygon] = set()
 
@@ -222,7 +225,7 @@ class WindowSearch:
             """Add what the best suggest, unless they were asked before."""
             for polygon in [one for one in best if one not in tried]:
                 tried.add(polygon)
-                others = redrawn(polygon, self.seed_px, self.surface.shape)
+                others = redrawn(polygon, self.seed_px, self.surface.frame)
                 add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
 
         for _ in range(_ROUNDS):
@@ -338,15 +341,16 @@ def search_field(
     """
     factor = max(1, math.ceil(max(scene.grid.shape) / COARSE_PX))
     seed = (x_px / factor, y_px / factor)
-    raw = channels(scene, factor)
-    whitened = whiten(raw, seed)
+    frame = Frame.of(scene, factor, seed, times)
+    raw, inside = channels(scene, factor), frame.inside
+    whitened = whiten(raw, seed, inside)
     stack, things = clear(whitened, scene.grid.ground_resolution_m * factor)
-    surface = Surface(stack, partition(stack), things)
+    surface = Surface(stack, partition(stack, inside), things, frame)
     if not len(surface.parted.lines.first):
         raise FieldError("The picture is too small to find a field in.")
     footing = open_ground(surface.parted, things, seed)
     # Another look: nothing painted over, and colour alone where there is near infrared.
-    second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed))
+    second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed, inside), inside)
     return WindowSearch(
         factor,
         surface,

@@ -13,6 +13,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.frame import Frame
+
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -40,17 +42,7 @@ def ring(polygon: Polygon) -> FloatArray:
     return vertices if shapely.is_ccw(border) else vertices[::-1]
 
 
-def on_frame(points: FloatArray, shape: tuple[int, int], near_px: float) -> NDArray[np.bool_]:
-    """Which points lie on the picture's frame."""
-    x, y = points.T
-    rows, columns = shape
-    away = np.minimum(np.minimum(x, columns - x), np.minimum(y, rows - y))
-    return np.asarray(away < near_px)
-
-
-def redrawn(
-    polygon: Polygon, seed_px: tuple[float, float], shape: tuple[int, int]
-) -> list[Polygon]:
+def redrawn(polygon: Polygon, seed_px: tuple[float, float], frame: Frame) -> list[Polygon]:
     """Outlines in which a stretch is replaced by its straight neighbours drawn on.
 
     Parameters
@@ -59,11 +51,11 @@ def redrawn(
         Pixel coordinates.
     seed_px : (float, float)
         All outlines contain it.
-    shape : (int, int)
-        Rows and columns of the picture.
+    frame : Frame
+        Where the picture ends.
     """
     vertices = ring(polygon)
-    sides = _Sides(vertices, shape)
+    sides = _Sides(vertices, frame.shape)
     count, area, length = len(vertices), polygon.area, float(sides.length.sum())
     travelled = np.concatenate([[0.0], np.cumsum(np.tile(sides.length, 2))])
     i, skip = (one.ravel() for one in np.indices((count, count - 1)))
@@ -83,8 +75,9 @@ def redrawn(
         return []
     index = np.repeat(np.arange(len(rings)), [len(one) for one in rings])
     found = np.asarray(shapely.polygons(shapely.linearrings(np.concatenate(rings), indices=index)))
+    found = frame.within(found[shapely.is_valid(found)])
     areas = np.asarray(shapely.area(found))
-    good = shapely.is_valid(found) & (areas >= _AREAS[0] * area) & (areas <= _AREAS[1] * area)
+    good = (areas >= _AREAS[0] * area) & (areas <= _AREAS[1] * area)
     good[good] = shapely.contains_xy(found[good], *seed_px)
     found = found[good]
     alike = np.round(np.column_stack([areas[good], shapely.length(found)]), 1)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield.field.frame import Frame, covered
 from geofield.field.regions import Partition
 
 FloatArray = NDArray[np.float64]
@@ -26,17 +27,19 @@ class Surface:
         Of that stack.
     things : bool array (rows, columns)
         What was painted over.
+    frame : Frame
+        Where it ends.
     """
 
     stack: NDArray[np.float32]
     parted: Partition
     things: BoolArray
+    frame: Frame
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
-        rows, columns = self.stack.shape[1:]
-        return rows, columns
+        return self.frame.shape
 
     @cached_property
     def layers(self) -> NDArray[np.float32]:
@@ -85,13 +88,3 @@ class Surface:
         """The superpixels with their centres in a polygon, given by its vertices (n, 2)."""
         rows, columns = self.centres
         return np.asarray(covered(vertices, self.shape)[rows, columns] > 0)
-
-
-def covered(vertices: FloatArray, shape: tuple[int, int]) -> NDArray[np.uint8]:
-    """The pixels with their centres in a polygon, given by its vertices (n, 2), as ones."""
-    import cv2
-
-    mask = np.zeros(shape, np.uint8)
-    # OpenCV counts from pixel centres, in sixteenths.
-    cv2.fillPoly(mask, [np.rint((vertices - 0.5) * 16).astype(np.int32)], 1, shift=4)
-    return mask
