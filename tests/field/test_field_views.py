@@ -223,8 +223,8 @@ def test_a_slanting_end_of_data_is_judged_as_the_frame_is():
     whole, part = (extract_field(one, lat=made.lat, lon=made.lon) for one in (made.scene, cut))
     assert whole.quality.score - part.quality.score < 0.05
     assert part.quality.trusted
-    found, truth = part.polygon_px(grid), truth.intersection(shown)
-    assert found.intersection(truth).area > 0.975 * found.union(truth).area
+    found, there = part.polygon_px(grid), truth.intersection(shown)
+    assert found.intersection(there).area > 0.975 * found.union(there).area
     assert 0.05 < dict(part.quality.figures)["edge_share"] < 0.5
 
 
