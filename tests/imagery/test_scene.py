@@ -302,11 +302,11 @@ def test_16_bit_shares_one_scaling_between_colours(tmp_path: Path) -> None:
 
 
 def test_a_second_window_takes_the_first_ones_scaling(tmp_path: Path) -> None:
-    values = ground().astype(np.uint16) * 37
-    path = write(tmp_path / "x.tif", values, photometric="RGB")
-    reader = SceneReader.open(path)
+    values = ground(bands=4).astype(np.uint16) * 37
+    values[3] *= 3
+    reader = SceneReader.open(write(tmp_path / "x.tif", values, photometric="MINISBLACK"))
     small = reader.read((40, 40, 16, 16))
-    large = reader.read(scaling=small.scaling)
+    large = reader.read(scaling=small.scaling, nir_scaling=small.nir_scaling)
     assert np.array_equal(large.bands[:, 40:56, 40:56], small.bands)
 
 

@@ -200,6 +200,25 @@ def test_a_gap_that_hides_a_tree_is_told_however_large_the_field(simulated, side
     assert [f"does not show {told} of the field" in each for each in doubts] == [True] * bool(told)
 
 
+def test_parts_of_a_16_bit_picture_show_near_infrared_alike(tmp_path):
+    import rasterio
+
+    from geofield.imagery.reader import SceneReader
+    from geofield.obstacles.picture import part_of, tone_of
+
+    rows = np.linspace(900, 30_000, 64)[:, None].astype(np.uint16)
+    values = np.broadcast_to(rows * np.array([1, 1, 1, 2])[:, None, None], (4, 64, 64))
+    path = tmp_path / "picture.tif"
+    size = {"width": 64, "height": 64, "count": 4, "dtype": "uint16", "crs": "EPSG:32636"}
+    place = Affine(0.5, 0, 548_000, 0, -0.5, 3_881_000)
+    with rasterio.open(path, "w", transform=place, photometric="MINISBLACK", **size) as file:
+        file.write(values.astype(np.uint16))
+    reader = SceneReader.open(str(path))
+    tone = tone_of(reader)
+    parts = [part_of(reader, (0, top, 64, 32), tone).nir for top in (0, 32)]
+    assert np.array_equal(np.concatenate(parts), part_of(reader, (0, 0, 64, 64), tone).nir)
+
+
 def test_a_reader_gives_the_same_as_its_scene(simulated, simulated_tif):
     from geofield.imagery.reader import SceneReader
 

@@ -79,9 +79,13 @@ class TiledPicture:
         return [own * 2.0**level for level in range(levels, -1, -1)]
 
     @cached_property
-    def limits(self) -> tuple[float, float] | None:
-        """File values that become 0 and 255 in every tile."""
-        return self.reader.scaling or self.reader.read(shape_px=self._reduced_px(1024)).scaling
+    def _whole(self) -> Scene:
+        """What file values become 0 and 255 in: those of every tile do so too."""
+        return self.reader.read(shape_px=self._reduced_px(1024))
+
+    def _read(self, window: tuple[int, int, int, int] | None, shape_px: tuple[int, int]) -> Scene:
+        scaling, nir_scaling = self._whole.scaling, self._whole.nir_scaling
+        return self.reader.read(window, shape_px=shape_px, scaling=scaling, nir_scaling=nir_scaling)
 
     @property
     def has_infrared(self) -> bool:
@@ -106,7 +110,7 @@ class TiledPicture:
 
     def reduced(self, long_side_px: int) -> Scene:
         """All of the picture with at most that many pixels on its longer side."""
-        return self.reader.read(shape_px=self._reduced_px(long_side_px), scaling=self.limits)
+        return self._read(None, self._reduced_px(long_side_px))
 
     def _reduced_px(self, long_side_px: int) -> tuple[int, int]:
         shape = self.reader.grid.shape
@@ -120,7 +124,7 @@ class TiledPicture:
         width = min(TILE_PX * step, grid.width_px - c0)
         height = min(TILE_PX * step, grid.height_px - r0)
         shape = (max(1, round(height / step)), max(1, round(width / step)))
-        part = self.reader.read((c0, r0, width, height), shape_px=shape, scaling=self.limits)
+        part = self._read((c0, r0, width, height), shape)
         return np.stack([_padded(band) for band in part.bands]), part.roles, _padded(part.valid)
 
     def _warped(self, corner: tuple[float, float], resolution_m: float) -> _Part:
@@ -132,7 +136,7 @@ class TiledPicture:
             return nothing, ("grey",), nothing[0] > 0
         step = max(1.0, resolution_m / self.reader.grid.ground_resolution_m)
         shape = (max(1, round(window[3] / step)), max(1, round(window[2] / step)))
-        part = self.reader.read(window, shape_px=shape, scaling=self.limits)
+        part = self._read(window, shape)
         bands, valid = _reprojected(part, target, (TILE_PX, TILE_PX), self.crs)
         return bands, part.roles, valid
 

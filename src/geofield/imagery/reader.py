@@ -31,7 +31,7 @@ from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading,
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
-from geofield.imagery.scaling import scale_limits, to_uint8
+from geofield.imagery.scaling import Limits, scaled_bands
 from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource, Scene, outside
 
@@ -228,6 +228,7 @@ class SceneReader:
         *,
         shape_px: tuple[int, int] | None = None,
         scaling: tuple[float, float] | None = None,
+        nir_scaling: tuple[float, float] | None = None,
     ) -> Scene:
         """Read a part of the picture.
 
@@ -237,8 +238,9 @@ class SceneReader:
             Must lie inside the picture; all of it by default.
         shape_px : (rows, columns), optional
             Read that many pixels instead, each the average of those it covers.
-        scaling : (float, float), optional
-            File values that become 0 and 255; a scene's `scaling` makes a second window fit.
+        scaling, nir_scaling : (float, float), optional
+            File values that become 0 and 255, those of near infrared apart; a scene's make a
+            second window fit.
 
         Raises
         ------
@@ -265,13 +267,14 @@ class SceneReader:
         values, valid = there._pixels(Window(column, row, width, height), grid.shape)
         if self.palette:
             roles: tuple[str, ...] = ("red", "green", "blue")
-            bands, limits = values.astype(np.uint8), None
+            bands, limits, own = values.astype(np.uint8), None, None
         else:
             roles = there.shown_roles
-            bands, limits, more = self._scaled(values, roles, valid, scaling or self.scaling)
+            wanted = scaling or self.scaling, nir_scaling
+            bands, (limits, own), more = self._scaled(values, roles, valid, *wanted)
             notes += more
         bands = np.where(valid, bands, np.uint8(0))
-        return Scene(grid, bands, roles, valid, self.source, limits, notes, there.guesses)
+        return Scene(grid, bands, roles, valid, self.source, limits, notes, there.guesses, own)
 
     def _for(self, box: tuple[int, int, int, int]) -> SceneReader:
         """The reader of a part (left, top, right, bottom, pixels): what it has and is guessed."""
@@ -282,24 +285,13 @@ class SceneReader:
         values: NDArray[Any],
         roles: tuple[str, ...],
         valid: NDArray[np.bool_],
-        scaling: tuple[float, float] | None,
-    ) -> tuple[NDArray[np.uint8], tuple[float, float] | None, tuple[str, ...]]:
+        scaling: Limits,
+        nir_scaling: Limits,
+    ) -> tuple[NDArray[np.uint8], tuple[Limits, Limits], tuple[str, ...]]:
         if values.dtype == np.uint8 and scaling in (None, self.scaled_before):
             # What an earlier reading did to the pixels is kept, not repeated.
-            return values, self.scaled_before, ()
-        colour = [i for i, role in enumerate(roles) if role != "nir"]
-        limits = scaling or scale_limits(values[colour or [0]], valid)
-        scaled = to_uint8(values, limits)
-        low, high = limits or (0.0, 255.0)
-        notes = [f"Values {low:.6g} to {high:.6g} ({self.dtype}) became 0 to 255."]
-        if "nir" in roles and colour:
-            # Plants are several times brighter there: the colours' scaling would saturate.
-            near = [roles.index("nir")]
-            own = scale_limits(values[near], valid)
-            scaled[near] = to_uint8(values[near], own)
-            if own is not None:
-                notes.append(f"Near infrared {own[0]:.6g} to {own[1]:.6g} became 0 to 255.")
-        return scaled, limits, tuple(notes)
+            return values, (self.scaled_before, None), ()
+        return scaled_bands(values, roles, valid, scaling, nir_scaling)
 
     def _pixels(
         self, window: Window, shape: tuple[int, int]

@@ -7,6 +7,7 @@ picture every time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,46 @@ from numpy.typing import NDArray
 
 from geofield.errors import ImageryError
 
+Limits = tuple[float, float] | None
 #: The percentiles that become 0 and 255: sun glint and dead pixels lie outside.
 PERCENTILES = (0.5, 99.5)
 
 
-def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[float, float] | None:
+def scaled_bands(
+    values: NDArray[Any],
+    roles: Sequence[str],
+    valid: NDArray[np.bool_],
+    scaling: Limits,
+    nir_scaling: Limits,
+) -> tuple[NDArray[np.uint8], tuple[Limits, Limits], tuple[str, ...]]:
+    """Bands in 8 bits, the limits of the colours and of near infrared, and what was done.
+
+    Parameters
+    ----------
+    values : array (bands, rows, columns)
+    roles : sequence of str
+        What each band shows.
+    valid : bool array (rows, columns)
+    scaling, nir_scaling : (float, float) or None
+        Limits; percentiles when None.
+    """
+    colour = [i for i, role in enumerate(roles) if role != "nir"]
+    limits = scaling or scale_limits(values[colour or [0]], valid)
+    scaled = to_uint8(values, limits)
+    low, high = limits or (0.0, 255.0)
+    notes = [f"Values {low:.6g} to {high:.6g} ({values.dtype}) became 0 to 255."]
+    own: Limits = None
+    if "nir" in roles and colour:
+        # Plants are several times brighter there: the colours' scaling would saturate.
+        near = [roles.index("nir")]
+        own = nir_scaling or scale_limits(values[near], valid)
+        scaled[near] = to_uint8(values[near], own)
+        if own is not None:
+            notes.append(f"Near infrared {own[0]:.6g} to {own[1]:.6g} became 0 to 255.")
+    return scaled, (limits, own), tuple(notes)
+
+
+def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> Limits:
     """The values that become 0 and 255; None for 8 bit bands, which stay as they are.
 
     `bands` are the colour bands (bands, rows, columns), of any real type.
@@ -38,7 +74,7 @@ def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[float, 
     return low, high
 
 
-def to_uint8(bands: NDArray[Any], limits: tuple[float, float] | None) -> NDArray[np.uint8]:
+def to_uint8(bands: NDArray[Any], limits: Limits) -> NDArray[np.uint8]:
     """Bands with the limits stretched to 0..255 and everything outside cut off."""
     if limits is None:
         return np.asarray(bands, np.uint8)

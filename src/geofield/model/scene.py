@@ -76,6 +76,8 @@ class Scene:
         What was done to the picture on the way in (reprojected, rescaled, cut off).
     guesses : tuple of str
         Those of the notes that may be wrong, for a person to look at: what its bands show.
+    nir_scaling : (float, float) or None
+        The same as `scaling` of near infrared, which is several times brighter.
     """
 
     grid: Grid
@@ -86,6 +88,7 @@ class Scene:
     scaling: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
     guesses: tuple[str, ...] = ()
+    nir_scaling: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         grid, source = self.grid, self.source

@@ -40,6 +40,7 @@ class PictureReader(Protocol):
         *,
         shape_px: tuple[int, int] | None = None,
         scaling: tuple[float, float] | None = None,
+        nir_scaling: tuple[float, float] | None = None,
     ) -> Scene:
         """Read a window (column, row, width, height)."""
 
@@ -57,7 +58,7 @@ class Tone:
         What the network may look at; three equal bands are grey.
     low, high : float
         The dark and the bright end of the visible bands: grey levels.
-    scaling : (float, float) or None
+    scaling, nir_scaling : (float, float) or None
         Of a reader's values.
     """
 
@@ -65,6 +66,7 @@ class Tone:
     low: float
     high: float
     scaling: tuple[float, float] | None
+    nir_scaling: tuple[float, float] | None
 
     @property
     def is_flat(self) -> bool:
@@ -95,14 +97,14 @@ def tone_of(picture: Picture) -> Tone:
             bands = "rgb" if scene.nir is None else "nir"
             visible = [band[::step, ::step][valid] for band in rgb]
     low, high = np.percentile(np.concatenate(visible), [2, 98]) if valid.any() else (0, 255)
-    return Tone(bands, float(low), float(high), scene.scaling)
+    return Tone(bands, float(low), float(high), scene.scaling, scene.nir_scaling)
 
 
 def part_of(picture: Picture, window: tuple[int, int, int, int], tone: Tone) -> Scene:
     """Return a window (column, row, width, height) of a picture."""
     if isinstance(picture, Scene):
         return picture.crop(*window)
-    return picture.read(window, scaling=tone.scaling)
+    return picture.read(window, scaling=tone.scaling, nir_scaling=tone.nir_scaling)
 
 
 def search_region(scene: Scene, field: Field | None) -> NDArray[np.bool_]:
