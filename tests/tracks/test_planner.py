@@ -542,6 +542,24 @@ def test_degrees_are_refused() -> None:
             plan_tracks(degrees, crs=crs, spacing_m=4.0)
 
 
+def test_obstacles_in_degrees_are_placed_or_refused() -> None:
+    """Of whatever kind: they were left out, and the tracks ran through all of them."""
+    field, trees = box(0, 0, 100, 40), circles((50, 20, 5)).geometry
+    metres = plan_tracks(field, list(trees), crs=CRS, spacing_m=4.0)
+    assert len(metres.gaps) == 2
+    degrees = trees.to_crs(4326)
+    for own in (degrees, degrees.array):
+        assert len(plan_tracks(field, own, crs=CRS, spacing_m=4.0).gaps) == 2
+    swapped = shapely.transform(degrees.to_numpy(), lambda lonlat: lonlat[:, ::-1])
+    for plain in (list(degrees), degrees.to_numpy(), degrees.iloc[0], list(swapped)):
+        with pytest.raises(CRSMismatchError, match="look like degrees"):
+            plan_tracks(field, plain, crs=CRS, spacing_m=4.0)
+    with pytest.raises(CRSMismatchError, match="swapped"):
+        plan_tracks(field, gpd.GeoSeries(swapped, crs=4326), crs=CRS, spacing_m=4.0)
+    elsewhere = gpd.GeoSeries([box(900, 0, 910, 10)], crs=CRS).to_crs(4326)
+    assert plan_tracks(field, elsewhere, crs=CRS, spacing_m=4.0).gaps.empty
+
+
 def test_spacing_wider_than_the_field() -> None:
     with pytest.warns(TrackWarning, match="no track"):
         tracks = plan_tracks(box(0, 0, 100, 10), crs=CRS, spacing_m=40.0)
@@ -567,11 +585,16 @@ def test_spacing_wider_than_the_field() -> None:
         {"spacing_m": 4.0, "through": (X, float("nan"))},
         {"spacing_m": 4.0, "through": "here"},
         {"spacing_m": 4.0, "through": (X,)},
+        {"spacing_m": 4.0, "through": (15.0, 50.5)},
+        {"spacing_m": 4.0, "through": shapely.Point()},
+        {"spacing_m": 4.0, "direction": [(15.0, 50.5), (15.001, 50.5)]},
         {"spacing_m": 4.0, "min_segment_m": -1.0},
         {"spacing_m": 4.0, "min_segment_m": float("nan")},
         {"spacing_m": 4.0, "straight_tolerance_m": -1.0},
         {"spacing_m": 4.0, "straight_tolerance_m": float("nan")},
         {"spacing_m": 4.0, "clearance_m": -1.0},
+        {"spacing_m": 4.0, "clearance_m": None},
+        {"spacing_m": 4.0, "headland_m": "12"},
         {"spacing_m": 4.0, "obstacles": ["tree"]},
     ],
 )

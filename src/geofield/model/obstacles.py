@@ -179,10 +179,10 @@ def numbered(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
     if "obstacle_no" not in obstacles.columns:
         return obstacles.assign(obstacle_no=pd.array(range(1, len(obstacles) + 1), dtype="Int64"))
-    missing = obstacles["obstacle_no"].isna().to_numpy(bool)
+    numbers = floats(obstacles, "obstacle_no").copy()
+    missing = np.isnan(numbers)
     if not missing.any():
         return obstacles
-    numbers = obstacles["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan).copy()
     numbers[missing] = next_number(obstacles) + np.arange(missing.sum())
     return obstacles.assign(obstacle_no=pd.array(numbers.astype("int64"), dtype="Int64"))
 
@@ -269,5 +269,6 @@ def floats(frame: gpd.GeoDataFrame, column: str) -> FloatArray:
         said = frame[column].dropna()
         words = said[pd.to_numeric(said, errors="coerce").isna()]
         raise ObstacleError(
-            f"The column {column} holds words, as {words.iloc[0]!r}.", hint="Give numbers, metres."
+            f"The column {column} holds words, as {words.iloc[0]!r}.",
+            hint="Give numbers, lengths in metres.",
         ) from None

@@ -22,6 +22,7 @@ from geofield.model.obstacles import (
     numbered,
     shapes_of,
 )
+from geofield.tracks.outline import in_degrees
 
 _POINTS = (shapely.GeometryType.POINT.value, shapely.GeometryType.MULTIPOINT.value)
 _LINES = (
@@ -31,10 +32,13 @@ _LINES = (
 )
 
 
-def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> ObstacleShapes:
+def obstacle_shapes(
+    obstacles: Any, crs: CRS, *, clearance_m: float = 0.0, outline: BaseGeometry | None = None
+) -> ObstacleShapes:
     """Understand obstacles in any of the forms a user may have them.
 
-    Tables in another CRS are reprojected; plain geometries are in `crs`, the field's. Rows whose
+    Tables in another CRS are reprojected; plain geometries are in `crs`, that of the field's
+    `outline`, beside which coordinates that look like degrees are refused. Rows whose
     `status` is ``rejected`` or ``possible`` are left out. Points need a column `radius_m`, or a
     clearance, which grows everything by that much. Numbers are those of the column `obstacle_no`,
     else 1, 2, ... in the order given.
@@ -42,18 +46,16 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     Raises
     ------
     CRSMismatchError
-        When a table without a CRS cannot be in the field's.
+        When shapes without a CRS cannot be in the field's, or latitude and longitude are swapped.
     TrackError
         When a point or line has no width, or a geometry is not finite.
     ObstacleError
         When a radius or margin is negative or infinite.
     """
-    if not np.isfinite(clearance_m) or clearance_m < 0.0:
-        raise TrackError(f"clearance_m is {clearance_m}; it must be 0 or more metres.")
     if obstacles is None:
         none = np.empty(0, np.int64)
         return ObstacleShapes(np.empty((0, 3)), none, np.empty(0, dtype=object), none)
-    frame = _as_table(obstacles, crs)
+    frame = _as_table(obstacles, crs, outline)
     frame = active(numbered(frame))
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     missing = shapely.is_missing(geometry) | shapely.is_empty(geometry)
@@ -75,36 +77,43 @@ def obstacle_shapes(obstacles: Any, crs: CRS, *, clearance_m: float = 0.0) -> Ob
     return _with_thin(shapes, frame, point, line, clearance_m)
 
 
-def _as_table(obstacles: Any, crs: CRS) -> gpd.GeoDataFrame:
-    if isinstance(obstacles, gpd.GeoSeries):
-        obstacles = gpd.GeoDataFrame(geometry=obstacles)
-    if isinstance(obstacles, gpd.GeoDataFrame):
-        if obstacles.crs is None:
-            _refuse_other_units(obstacles, crs)
-            return obstacles.set_crs(crs)
-        return obstacles if obstacles.crs == crs else obstacles.to_crs(crs)
+def _as_table(obstacles: Any, crs: CRS, outline: BaseGeometry | None) -> gpd.GeoDataFrame:
+    if not isinstance(obstacles, gpd.GeoDataFrame):
+        obstacles = gpd.GeoDataFrame(geometry=_plain(obstacles))
+    own = obstacles.crs
+    if own is None:
+        if outline is not None and in_degrees(obstacles.total_bounds, outline):
+            raise CRSMismatchError(
+                "The obstacles name no CRS and their coordinates look like degrees.",
+                hint="Name it: GeoSeries(obstacles, crs=4326), or set_crs(4326) of a table.",
+            )
+        return obstacles.set_crs(crs)
+    if own == crs:
+        return obstacles
+    placed = obstacles.to_crs(crs)
+    if own.is_geographic and outline is not None and not placed.intersects(outline).any():
+        xy = shapely.transform(obstacles.geometry.to_numpy(), lambda lonlat: lonlat[:, ::-1])
+        if gpd.GeoSeries(xy, crs=own).to_crs(crs).intersects(outline).any():
+            raise CRSMismatchError(
+                "The obstacles lie in the field only with latitude and longitude swapped.",
+                hint="Longitude is x and comes first: geopandas.points_from_xy(lon, lat).",
+            )
+    return placed
+
+
+def _plain(obstacles: Any) -> gpd.GeoSeries:
+    """Shapes without columns, with the CRS that they say."""
+    own = getattr(obstacles, "crs", None)
     if isinstance(obstacles, BaseGeometry):
-        shapes = list(shapely.get_parts(obstacles))
-    else:
-        shapes = list(obstacles)
+        obstacles = shapely.get_parts(obstacles)
+    shapes = list(obstacles)
     for shape in shapes:
         if shape is not None and not isinstance(shape, BaseGeometry):
             raise TrackError(
                 f"An obstacle must be a shapely geometry, not {type(shape).__name__}.",
                 hint="Give a GeoDataFrame, a list of shapely geometries, or None.",
             )
-    return gpd.GeoDataFrame(geometry=gpd.GeoSeries(shapes, crs=crs))
-
-
-def _refuse_other_units(obstacles: gpd.GeoDataFrame, crs: CRS) -> None:
-    if len(obstacles) == 0:
-        return
-    x0, y0, x1, y1 = obstacles.total_bounds
-    if max(abs(x0), abs(x1)) <= 180 and max(abs(y0), abs(y1)) <= 90 and x1 - x0 < 1.0 > y1 - y0:
-        raise CRSMismatchError(
-            "The obstacles name no CRS and their coordinates look like degrees.",
-            hint="Name it: obstacles.set_crs('EPSG:4326').",
-        )
+    return gpd.GeoSeries(shapes, crs=own)
 
 
 def _with_thin(

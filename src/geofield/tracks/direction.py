@@ -25,6 +25,7 @@ from geofield.tracks.fewest import fewest_direction
 from geofield.tracks.frame import true_heading_deg
 from geofield.tracks.layout import Strips
 from geofield.tracks.longest_edge import StraightRun, longest_edge
+from geofield.tracks.outline import place_near
 
 METHODS = ("dominant", "longest_edge", "hough", "fewest", "fewest_turns")
 
@@ -118,7 +119,7 @@ def find_baseline(
             raise _unknown(direction) from None
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
-    return _from_ab(direction, north)
+    return _from_ab(direction, north, polygon)
 
 
 def _unknown(direction: Any) -> TrackError:
@@ -158,7 +159,7 @@ def _from_edge(edge: StraightRun, north: float) -> Baseline:
     return Baseline(base.along, base.heading_deg, left=not base.left, edge=edge)
 
 
-def _from_ab(line: Any, north: float) -> Baseline:
+def _from_ab(line: Any, north: float, polygon: Polygon) -> Baseline:
     try:
         points = np.asarray(
             shapely.get_coordinates(line)
@@ -176,4 +177,6 @@ def _from_ab(line: Any, north: float) -> Baseline:
     along = (float(points[1, 0] - points[0, 0]), float(points[1, 1] - points[0, 1]))
     if math.hypot(*along) < 0.01:
         raise TrackError("A and B of the A-B line are the same point.")
-    return _from_vector(along, north, through=(float(points[0, 0]), float(points[0, 1])))
+    return _from_vector(
+        along, north, through=place_near(polygon, points[0], "point A of the A-B line")
+    )

@@ -20,7 +20,7 @@ from geofield.model.rows import replaced
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.settings import TrackSettings
-from geofield.tracks.outline import metric
+from geofield.tracks.outline import NEAR_M, metric, near
 from geofield.tracks.planner import plan_tracks
 
 #: Settings that are arguments of the same name.
@@ -29,8 +29,6 @@ _OF_TRACKS = (
     "min_segment_m", "clearance_m", "step_m", "straight_tolerance_m",
 )  # fmt: skip
 _OF_ROUTE = ("skip", "turning_radius_m", "curve", "margin_m")
-#: A place given for a field is not farther from it, metres.
-_NEAR_M = 20_000.0
 #: So far into an obstacle is no fault, metres.
 _HAIR_M = 0.05
 
@@ -129,17 +127,13 @@ def _place(
     """
     project, (lon, lat) = transformer(LONLAT, crs), lonlat[:2]
     x, y = project.transform(lon, lat)
-    if _near(polygon, x, y):
+    if near(polygon, x, y):
         return float(x), float(y)
-    swapped = abs(lon) <= 90 and _near(polygon, *project.transform(lat, lon))
+    swapped = abs(lon) <= 90 and near(polygon, *project.transform(lat, lon))
     raise TrackError(
         f"The {what} at longitude {lon}, latitude {lat} is far from the field"
         + ("; with the two swapped it is there." if swapped else "."),
         hint=f"Longitude comes first: {lat} {lon}."
         if swapped
-        else f"It may be {_NEAR_M / 1000:.0f} km away. Longitude comes first, both in degrees.",
+        else f"It may be {NEAR_M / 1000:.0f} km away. Longitude comes first, both in degrees.",
     )
-
-
-def _near(polygon: BaseGeometry, x: float, y: float) -> bool:
-    return bool(np.isfinite([x, y]).all() and polygon.distance(shapely.Point(x, y)) < _NEAR_M)

@@ -55,8 +55,6 @@ def main_area(
     TrackError
         When nothing is left.
     """
-    if not np.isfinite(width_m) or width_m < 0.0:
-        raise TrackError(f"headland_m is {width_m}; it must be 0 or more metres.")
     inner = inset(outline, width_m * scale, holes=holes)
     parts = [p for p in shapely.get_parts(inner) if isinstance(p, Polygon) and p.area > 0.0]
     if not parts:

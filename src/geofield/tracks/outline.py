@@ -8,11 +8,15 @@ import numpy as np
 import shapely
 from pyproj import CRS
 from shapely import MultiPolygon, Polygon
+from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import authority_name, is_metric, parse_crs
 from geofield.errors import CRSError, TrackError
+
+#: A place given for a field is not farther from it, metres.
+NEAR_M = 20_000.0
 
 
 def metric(crs: Any) -> CRS:
@@ -91,6 +95,41 @@ def _sound(polygon: BaseGeometry, reason: str) -> tuple[BaseGeometry, str]:
             hint="Repair it by hand, or with Fix geometries in QGIS.",
         )
     return repaired, in_words(repaired.area, left_m2)
+
+
+def near(outline: BaseGeometry, x: float, y: float) -> bool:
+    """Whether a place may be meant for a field; what is not finite is not."""
+    return bool(np.isfinite([x, y]).all() and outline.distance(shapely.Point(x, y)) < NEAR_M)
+
+
+def place_near(outline: BaseGeometry, place: Any, what: str) -> tuple[float, float]:
+    """A place in the field's CRS, given as two numbers or a shapely point.
+
+    Raises
+    ------
+    TrackError
+        When it is none, or far from the field, as degrees are that stand for metres.
+    """
+    try:
+        x, y = (float(c) for c in ((place.x, place.y) if hasattr(place, "x") else place))
+    except (TypeError, ValueError, ShapelyError) as error:
+        raise TrackError(
+            f"The {what} is not two numbers: {place!r}.",
+            hint="Give x and y in the field's CRS, or a shapely point.",
+        ) from error
+    if not near(outline, x, y):
+        raise TrackError(
+            f"The {what} at x {x:.10g}, y {y:.10g} is far from the field.",
+            hint="Give it in the field's CRS: metres, not degrees.",
+        )
+    return x, y
+
+
+def in_degrees(bounds: Any, outline: BaseGeometry) -> bool:
+    """Whether bounds look like degrees, in any order, beside an outline that is in metres."""
+    return bool((np.abs(bounds) <= 180.0).all()) and not outline.intersects(
+        shapely.box(-180.0, -180.0, 180.0, 180.0)
+    )
 
 
 def _refuse_degrees(polygon: BaseGeometry) -> None:

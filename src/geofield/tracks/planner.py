@@ -35,7 +35,7 @@ from geofield.tracks.headland import (
 )
 from geofield.tracks.layout import LastStrip, Strips
 from geofield.tracks.losses import obstacle_losses
-from geofield.tracks.outline import clean_outline, metric
+from geofield.tracks.outline import clean_outline, metric, place_near
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
 from geofield.tracks.tables import (
     BY_HAND,
@@ -149,19 +149,20 @@ def plan_tracks(
     wide_m = spacing_m if width_m is None else width_m
     _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
     limits = {"min_segment_m": min_segment_m, "straight_tolerance_m": straight_tolerance_m}
-    _check_lengths(**limits, offset_m=offset_m or 0.0, none_too=True)
+    limits |= {"offset_m": 0.0 if offset_m is None else offset_m}
+    _check_lengths(**limits, headland_m=headland_m, clearance_m=clearance_m, none_too=True)
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
         warnings.warn(note, TrackWarning, stacklevel=2)
-    shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m)
+    shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m, outline=outline)
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
     _refuse_too_many(outline, shapes, spacing_m * scale, step_m * scale)
     inner: BaseGeometry = outline
     if headland_m != 0.0:
         inner = main_area(outline, headland_m, scale=scale, holes=headland_holes)
-    place = None if through is None else _place(through)
+    place = None if through is None else place_near(outline, through, "place to pass through")
     baseline = find_baseline(
         outline,
         direction,
@@ -260,7 +261,7 @@ def _check_lengths(*, none_too: bool = False, **lengths_m: float) -> None:
         known = isinstance(value, (int, float, np.number)) and np.isfinite(value)
         if not known or value < 0.0 or (value == 0.0 and not none_too):
             least = "0 or more" if none_too else "more than 0"
-            raise TrackError(f"{name} is {value}; it must be {least} metres.")
+            raise TrackError(f"{name} is {value}; it must be a number, {least} metres.")
 
 
 def _nothing_left(min_segment_m: float) -> str:
@@ -335,19 +336,6 @@ def _positions(
     if strips.last_strip == "spread" and len(positions) > 1:
         spacing_m = float(positions[1] - positions[0])
     return positions, spacing_m, ()
-
-
-def _place(through: Any) -> tuple[float, float]:
-    try:
-        x, y = (float(c) for c in ((through.x, through.y) if hasattr(through, "x") else through))
-    except (TypeError, ValueError) as error:
-        raise TrackError(
-            f"The place to pass through is not two numbers: {through!r}.",
-            hint="Give x and y in the field's CRS, or a shapely point.",
-        ) from error
-    if not (np.isfinite(x) and np.isfinite(y)):
-        raise TrackError("The place to pass through is not finite.")
-    return x, y
 
 
 def _tracks(

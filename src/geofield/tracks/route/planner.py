@@ -19,6 +19,7 @@ from geofield.errors import TrackError, TrackWarning
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
+from geofield.tracks.outline import place_near
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
@@ -85,13 +86,13 @@ def plan_route(
     _check(pattern, curve, skip, margin_m)
     # Ways are planned in metres on the ground, and carried back to the CRS when they are done.
     scale = tracks.ground_scale
+    place = None if start is None else np.array(place_near(outline, start, "start")) / scale
     outline, shapes = _on_the_ground(outline, shapes, scale)
     if turning_radius_m is not None:
         _check_radius(turning_radius_m, outline.bounds, margin_m)
     lines = np.asarray(tracks.segments.geometry.to_numpy(), dtype=object)
     ends, legs = _ends(lines) / scale, _legs(lines)
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
-    place = None if start is None else _place(start) / scale
     passage = Passage(outline, shapes, margin_m=margin_m)
     rows, backward = nearest_start(ends, track_no, skip if pattern == "skip" else 0, place)
     if pattern == "shortest":
@@ -170,13 +171,6 @@ def _check_radius(radius_m: float, bounds: tuple[float, ...], margin_m: float) -
             "no turn fits.",
             hint="Give the radius in metres, or leave it out for a route without curves.",
         )
-
-
-def _place(start: Any) -> FloatArray:
-    place = np.array((start.x, start.y) if hasattr(start, "x") else tuple(start), dtype=np.float64)
-    if place.shape != (2,) or not np.isfinite(place).all():
-        raise TrackError("The start must be two finite coordinates in the field's CRS.")
-    return place
 
 
 def _ends(lines: NDArray[np.object_]) -> FloatArray:
