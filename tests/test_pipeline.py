@@ -31,6 +31,26 @@ def plan(simulated: SimulatedField) -> Plan:
     return plan_field(simulated.scene, lat=simulated.lat, lon=simulated.lon, settings=SETTINGS)
 
 
+@pytest.mark.parametrize(
+    ("argument", "next_step"),
+    [
+        ({"settings": {"tracks": {"spacing_m": 6}}}, "load_settings"),
+        ({"boundary": shapely.box(0, 0, 9, 9)}, "Field"),
+        ({"previous": "out/field.gpkg"}, "read_plan"),
+        ({"include": [shapely.Point(33.5, 35.0)]}, "point.x"),
+    ],
+)
+def test_arguments_of_another_kind_are_told(
+    argument: dict[str, Any], next_step: str, simulated: SimulatedField
+) -> None:
+    point: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon}
+    call = gf.extract_field if "include" in argument else plan_field
+    with pytest.raises(gf.GeofieldError, match=next_step):
+        call(simulated.scene, **point, **argument)
+    with pytest.raises(gf.GeofieldError, match="read_scene"):
+        gf.extract_field("scene.tif", **point)  # type: ignore[arg-type]
+
+
 @pytest.fixture
 def file(plan: Plan, tmp_path: Path) -> Path:
     plan.write(tmp_path / "out", formats=["gpkg"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import geopandas as gpd
+import pandas as pd
 import pytest
 import shapely
 from pyproj import CRS
@@ -96,6 +98,36 @@ def test_comparing_plans_plans_nothing(
     monkeypatch.setattr(direction, "longest_edge", refused)
     assert again == plan
     assert again != run_other(plan)
+
+
+@pytest.mark.parametrize("product", ["field.gpkg", "field.rdf"])
+def test_that_nobody_looked_for_obstacles_is_known_again(product: str, tmp_path: Path) -> None:
+    """It came back as a search that had found none, which says that the field is free."""
+    plan = Plan(gf.Field(shapely.box(X, Y, X + 120, Y + 60), crs=UTM))
+    plan.write(tmp_path, formats=["gpkg", "rdf"])
+    again = read_plan(tmp_path / product)
+    assert again.obstacles is None
+    assert again == plan
+
+
+def test_names_of_a_column_of_numbers(tmp_path: Path) -> None:
+    """They ended the writing of a plan in a traceback."""
+    numbers = pd.array([7, 8, pd.NA], dtype="Int64")
+    shape = shapely.box(X, Y, X + 120, Y + 60)
+    field = gf.Field(shape, UTM, name=numbers[0], field_id=numbers[1])
+    Plan(field).write(tmp_path, formats="gpkg")
+    again = read_plan(tmp_path / "field.gpkg").field
+    assert (again.name, again.field_id) == ("7", "8")
+    assert gf.Field(shape, UTM, name=numbers[2]) == gf.Field(shape, UTM)
+
+
+def test_tracks_compare_by_value(plan: Plan) -> None:
+    assert plan.tracks is not None
+    assert copy.deepcopy(plan.tracks) == plan.tracks
+    assert run_tracks(plan, settings=SETTINGS).tracks == plan.tracks
+    fewer = plan.tracks.segments.iloc[1:]
+    assert replace(plan.tracks, segments=fewer) != plan.tracks
+    assert plan.tracks != "tracks"
 
 
 def run_other(plan: Plan) -> Plan:

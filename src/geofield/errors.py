@@ -6,6 +6,8 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
+from typing import Any, get_args
+
 from geofield.wording import in_python
 
 
@@ -45,6 +47,15 @@ class GeofieldError(Exception):
 
 def _rebuild(cls: type[GeofieldError], message: str, hint: str | None) -> GeofieldError:
     return cls(message, hint=hint)
+
+
+def refuse_other(
+    value: object, kind: Any, name: str, hint: str, error: type[GeofieldError] = GeofieldError
+) -> None:
+    """Refuse an argument that is of another kind than a class, or than all of a union."""
+    if not isinstance(value, kind):
+        wanted, *_ = get_args(kind) or (kind,)
+        raise error(f"`{name}` must be a {wanted.__name__}, not {type(value).__name__}.", hint=hint)
 
 
 class SettingsError(GeofieldError):

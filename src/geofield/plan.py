@@ -108,22 +108,11 @@ class Plan:
         """
         if not isinstance(other, Plan):
             return NotImplemented
-        mine, theirs = self._tables(), other._tables()
-        return (
-            self._facts() == other._facts()
-            and mine.keys() == theirs.keys()
-            and all(mine[name].equals(theirs[name]) for name in mine)
+        facts = ("field", "provenance", "grid", "tracks")
+        mine, theirs = self.obstacles, other.obstacles
+        return all(getattr(self, name) == getattr(other, name) for name in facts) and (
+            mine is theirs if mine is None or theirs is None else mine.equals(theirs)
         )
-
-    def _facts(self) -> tuple[Any, ...]:
-        """What is the same in equal plans, besides the tables."""
-        outline = None if self.tracks is None else self.tracks.outline
-        return (self.field, outline, self.provenance, self.grid)
-
-    def _tables(self) -> dict[str, gpd.GeoDataFrame]:
-        """All tables but the field's own and its alternatives, which are proposals."""
-        tables = {} if self.obstacles is None else {schema.OBSTACLES.name: self.obstacles}
-        return tables if self.tracks is None else tables | self.tracks.tables()
 
     @property
     def provenance(self) -> Provenance:
@@ -216,6 +205,8 @@ class Plan:
         field = field_from_row(rows, dataset, evidence)
         obstacles = dataset.tables.get(schema.OBSTACLES.name)
         tracks, recorded = None, Evidence.from_json(evidence)
+        if obstacles is not None and obstacles.empty and not recorded.knows_obstacles:
+            obstacles = None  # a layer to draw in is written where nobody looked, too
         if Tracks.lie_in(dataset.tables, evidence):
             tracks = Tracks.from_tables(
                 dataset.tables, evidence["tracks"], grid=dataset.grid, outline=field.polygon
@@ -240,7 +231,7 @@ class Plan:
         self,
         folder: str | Path,
         *,
-        formats: Sequence[str] | None = None,
+        formats: str | Sequence[str] | None = None,
         overwrite: bool = False,
         options: Mapping[str, Any] | None = None,
         points: bool | None = None,
@@ -253,7 +244,7 @@ class Plan:
         ----------
         folder : path
             Made where it does not exist.
-        formats : sequence of str, optional
+        formats : str or sequence of str, optional
             Names of `geofield formats`; those of the settings when not given.
         overwrite : bool
             Replace products that are there already.
@@ -278,6 +269,7 @@ class Plan:
 
         export = self.settings.export if self.settings else ExportSettings()
         formats = export.formats if formats is None else formats
+        formats = (formats,) if isinstance(formats, str) else tuple(formats)
         wanted = export.points if points is None else points
         if wanted and any("points" in format_named(name).options for name in formats):
             options = {"points": True, **(options or {})}

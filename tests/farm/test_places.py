@@ -135,9 +135,22 @@ def test_a_table_is_as_good_as_its_file(tmp_path: Path) -> None:
         (frame.iloc[:0], "holds no places"),
         (pd.DataFrame({"a": [1]}), "no columns lat and lon"),
         (pd.DataFrame({"lat": [35.0, "x"], "lon": [33.0, 33.0]}), "several kinds"),
+        (pd.concat([POINTS, POINTS[["name"]]], axis=1), "two of one name"),
     ):
         with pytest.raises(gf.GeofieldError, match=message):
             list(gf.plan_fields(bad))
+
+
+def test_a_table_of_shapes_alone_and_names_in_the_index() -> None:
+    """The one was told to be empty, and the names of the other were lost."""
+    alone = as_frame(POINTS)[["geometry"]]
+    assert len(read_places(alone)) == 3
+    named = read_places(as_frame(POINTS).drop(columns="id").set_index("name"))
+    assert [place.name for place in named][:2] == ["Zum See", "b"]
+    machine = POINTS.drop(columns="spacing_m").assign(machine=pd.Series([{"width_m": 6.0}] * 3))
+    assert len(read_places(machine)) == 3
+    with pytest.raises(FormatError, match="row 1: column 'machine'"):
+        read_places(machine.assign(machine=pd.Series([{"wide": 6.0}] * 3)))
 
 
 def test_a_column_named_like_a_setting_holds_for_its_field(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from geofield.errors import PointOutsideError
+from geofield.errors import FieldError, PointOutsideError
 from geofield.field import FieldSearch, extract_field, prepare_field
 from geofield.field.part import Part
 from geofield.raster import resample
@@ -39,6 +39,11 @@ def test_a_field_of_few_pixels_is_found_as_exactly_as_one_of_many(seed, least):
     kept = prepare_field(scene, lat=truth.lat, lon=truth.lon)
     again = extract_field(scene, lat=truth.lat, lon=truth.lon, search=kept)
     assert again.polygon == field.polygon
+    # It gave the outline of the picture that it was prepared for, certain and without a doubt.
+    other = replace(scene, bands=scene.bands[:, ::-1])
+    for picture, lat in ((other, truth.lat), (scene, truth.lat + 1e-5)):
+        with pytest.raises(FieldError, match="prepared for another picture or point"):
+            extract_field(picture, lat=lat, lon=truth.lon, search=kept)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield.crs import ground_areas_m2, ground_scale, is_metric
-from geofield.errors import CRSError, ObstacleError, ObstacleWarning
+from geofield.errors import CRSError, ObstacleError, ObstacleWarning, refuse_other
 from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
 from geofield.evaluation.scores import Counts, Score, score
@@ -140,11 +140,8 @@ def compared(
     import geopandas as gpd
 
     for what, table in (("detected", detected), ("truth", truth)):
-        if not isinstance(table, gpd.GeoDataFrame):
-            raise ObstacleError(
-                f"`{what}` must be a GeoDataFrame, not {type(table).__name__}.",
-                hint="Of a plan give plan.obstacles, of its file gf.read_plan(path).obstacles.",
-            )
+        hint = "Of a plan give plan.obstacles, of its file gf.read_plan(path).obstacles."
+        refuse_other(table, gpd.GeoDataFrame, what, hint, ObstacleError)
     if detected.crs is None or truth.crs is None:
         raise CRSError("Detections and truth need a CRS.", hint="Set it with set_crs.")
     if not is_metric(detected.crs):

@@ -73,11 +73,16 @@ def raw_of(frame: pd.DataFrame) -> RawPlaces:
     shapes = frame.geometry if isinstance(frame, gpd.GeoDataFrame) else None
     if shapes is not None and shapes.crs is None:
         raise CRSError(f"{name} does not say its CRS.", hint="Name it: frame.set_crs(...).")
-    plain = pd.DataFrame(frame[[each for each in frame if frame[each].dtype != "geometry"]])
+    plain = pd.DataFrame(frame.loc[:, (frame.dtypes != "geometry").to_numpy(bool)])
     try:
-        table = pa.Table.from_pandas(plain, preserve_index=False).replace_schema_metadata(None)
-    except pa.ArrowException as error:
-        raise FormatError(f"{name} has a column of several kinds of values: {error}.") from None
+        # The index comes along: it may be the names, and counts the rows where no column does.
+        table = pa.Table.from_pandas(plain, preserve_index=True).replace_schema_metadata(None)
+    except (pa.ArrowException, ValueError) as error:
+        raise FormatError(
+            f"{name} has a column of several kinds of values, or two of one name: {error}."
+        ) from None
+    unnamed = [each for each in table.column_names if each.startswith("__index_level_")]
+    table = table.drop_columns(unnamed)
     if shapes is None:
         return RawPlaces(name, table)
     geometry = pa.array(shapely.to_wkb(shapes.to_numpy()), pa.binary(), from_pandas=True)

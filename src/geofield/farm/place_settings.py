@@ -39,16 +39,19 @@ def as_settings(settings: Settings, said: Mapping[str, Any]) -> Settings:
 
 def check_settings(file: str, said: pa.Table, settings: Settings | None) -> None:
     """Judge every value that occurs, before any work."""
+    import pyarrow as pa
     import pyarrow.compute as pc
 
     for name in said.column_names:
-        for value in pc.unique(said[name]).to_pylist():
+        column = said[name]
+        nested = pa.types.is_nested(column.type)  # a machine as a mapping
+        for value in (column if nested else pc.unique(column)).to_pylist():
             if missing(value):
                 continue
             try:
                 as_settings(settings or Settings(), {name: value})
             except SettingsError as error:
-                row = int(pc.index(said[name], value).as_py()) + 1
+                row = column.to_pylist().index(value) + 1
                 words = error.message.removeprefix("Settings are not valid: ")
                 raise FormatError(
                     f"{file}, row {row}: column {name!r} is named like a setting, and "

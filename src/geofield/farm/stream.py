@@ -6,20 +6,21 @@ import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from geofield.errors import FieldWarning, GeofieldError, ImageryError
+import pandas as pd
+
+from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryError, refuse_other
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
 from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, told
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 #: Places per worker that wait in the scheduler.
 _AHEAD = 4
+_MAKE_TABLE = "Of shapes make a table: gpd.GeoDataFrame(geometry=shapes, crs=crs)."
+_WRITE_IT = "Give the path of a file: table.to_file(path)."
 
 
 def plan_fields(
@@ -61,6 +62,8 @@ def plan_fields(
         With the place's `field_id`, name and columns.
     """
     settings = with_values(settings, **by_name)
+    refuse_other(places, pd.DataFrame | str | Path | Places, "places", _MAKE_TABLE, FormatError)
+    refuse_other(obstacles, str | Path | None, "obstacles", _WRITE_IT, FormatError)
     found = places if isinstance(places, Places) else read_places(places, settings=settings)
     if imagery is not None and "://" not in str(imagery) and not Path(imagery).exists():
         raise ImageryError(

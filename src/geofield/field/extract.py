@@ -12,7 +12,13 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from geofield.errors import FieldError, FieldWarning, SettingsError
+from geofield.errors import (
+    FieldError,
+    FieldWarning,
+    ImageryError,
+    SettingsError,
+    refuse_other,
+)
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
 from geofield.field.part import Part
@@ -25,6 +31,7 @@ from geofield.grid import Grid
 from geofield.methods import FIELD
 from geofield.methods import method as method_of
 from geofield.model import Alternative, Field, FieldQuality, Scene
+from geofield.model.scene import OPEN_IT
 from geofield.model.segmentation import Segmentation
 from geofield.raster import gaps_filled
 
@@ -85,8 +92,8 @@ def extract_field(
         surfaces.
     name : str
     search : FieldSearch, optional
-        What `prepare_field` made of the same scene and point: further points then cost only
-        what they change.
+        What `prepare_field` made of the same scene and point, and of no other: further points
+        then cost only what they change.
 
     Returns
     -------
@@ -105,6 +112,7 @@ def extract_field(
     FieldWarning
         When the outline should not be trusted unseen.
     """
+    refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
     _check(method, regions, (*include, *exclude), holes, smooth)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
@@ -116,6 +124,7 @@ def extract_field(
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
         search = search or FieldSearch((lon, lat))
+        search.refuse_other(scene, (lon, lat))
         view = search.view(picture, *(tuple((x, y) for x, y in one) for one in (include, exclude)))
         part, chosen = view.part, {"search": view.search}
     scene, picture = part.of(scene), part.of(picture)
@@ -192,8 +201,10 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     lat, lon : float
         The point in the field, degrees, WGS 84.
     """
-    search = FieldSearch((lon, lat))
-    search.view(_with_data(scene))
+    refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
+    search, shown = FieldSearch((lon, lat)), _with_data(scene)
+    search.refuse_other(shown, (lon, lat))
+    search.view(shown)
     return search
 
 
@@ -225,7 +236,14 @@ def _check_places(
     """Refuse places off the picture, and a picture that shows nothing."""
     scene.pixel_of(lat=point[1], lon=point[0])
     for option, places in (("--include-lonlat", include), ("--exclude-lonlat", exclude)):
-        for lon, lat in places:
+        for place in places:
+            try:
+                lon, lat = (float(each) for each in place)
+            except (TypeError, ValueError):
+                raise FieldError(
+                    f"{option} is a sequence of pairs (lon, lat) in degrees; {place!r} is none.",
+                    hint="Of a shapely point give (point.x, point.y).",
+                ) from None
             scene.pixel_of(lat=lat, lon=lon, option=option)
     if scene.valid.size == 1:
         raise FieldError(

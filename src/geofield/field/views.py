@@ -9,6 +9,7 @@ field in a wide picture is found as well as in a narrow one.
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -25,6 +26,7 @@ from geofield.field.ranking import WEIGHED
 from geofield.field.regions import Points
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
+from geofield.grid import Grid
 from geofield.learned.network import Network
 from geofield.model import Scene
 
@@ -38,6 +40,8 @@ _WHOLE = 0.75
 #: How near to a side of its view an outline runs along it, pixels of the search; share of its
 #: border there from which the network's ground is taken to go on beyond.
 _NEAR_PX, _GOES_ON = 1.5, 0.25
+#: Every so many pixels tell one picture from another.
+_SAMPLE_PX = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +74,30 @@ class FieldSearch:
         By their level: 0 is the narrowest.
     levels : dict
         Which one was taken, by the points that belong and those that do not.
+    picture : (Grid, int) or None
+        That was searched: where it lies, and a checksum of some of its pixels.
     """
 
     lonlat: tuple[float, float]
     learned: Learned = field(default_factory=shipped)
     views: dict[int, View] = field(default_factory=dict)
     levels: dict[tuple[Places, Places], int] = field(default_factory=dict)
+    picture: tuple[Grid, int] | None = None
+
+    def refuse_other(self, scene: Scene, lonlat: tuple[float, float]) -> None:
+        """Refuse a picture or a point that is not the one of the search.
+
+        Raises
+        ------
+        FieldError
+        """
+        picture = scene.grid, zlib.crc32(scene.bands[:, ::_SAMPLE_PX, ::_SAMPLE_PX].tobytes())
+        if self.picture not in (None, picture) or self.lonlat != lonlat:
+            raise FieldError(
+                "The search that is given was prepared for another picture or point.",
+                hint="Prepare one for each: gf.prepare_field(scene, lat=lat, lon=lon).",
+            )
+        self.picture = picture
 
     def view(self, scene: Scene, include: Places = (), exclude: Places = ()) -> View:
         """The narrowest view that holds the points and the outline.

@@ -66,7 +66,12 @@ def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tupl
     ObstacleError
         If the range is empty, inverted, not finite or not above ``floor``.
     """
-    low, high = (float(value) for value in radius_px)
+    try:
+        low, high = (float(value) for value in radius_px)
+    except (TypeError, ValueError):
+        raise ObstacleError(
+            f"A radius range is two numbers; {radius_px!r} is none.", hint="For example (2, 9)."
+        ) from None
     if not (np.isfinite(low) and np.isfinite(high)) or low <= floor or high < low:
         raise ObstacleError(
             f"The radius range {low:g} to {high:g} is empty or impossible.",

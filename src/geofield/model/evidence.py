@@ -51,6 +51,11 @@ class Evidence:
         return tuple(self.detection.get("doubts", ()))
 
     @property
+    def knows_obstacles(self) -> bool:
+        """Whether a stage looked for obstacles, or left those of a person."""
+        return self.written is not None or bool(self.detection)
+
+    @property
     def unseen(self) -> tuple[str, ...]:
         """Those of ground in the field that the picture did not show, or that nobody searched."""
         seen_not = tuple(each for each in self.obstacle_doubts if each.startswith(UNSEEN))

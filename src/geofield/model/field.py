@@ -27,6 +27,9 @@ from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, words
 from geofield.model.place import place_id
 
+#: The next step where something else stands for a field.
+MAKE_ONE = "Of a polygon in a metric CRS make one: gf.Field(polygon, crs)."
+
 
 def refuse_no_areas(outlines: Iterable[Any]) -> None:
     """Refuse points and lines that stand where an outline does.
@@ -41,6 +44,15 @@ def refuse_no_areas(outlines: Iterable[Any]) -> None:
                 f"The field's outline is a {each.geom_type}; a plan needs a polygon.",
                 hint="Draw it as a polygon in the layer `field` (QGIS: Lines to polygons).",
             )
+
+
+def _text(value: Any) -> str:
+    """A name as text, also of a column of numbers; none where it is missing there."""
+    if isinstance(value, str):
+        return value
+    import pandas as pd
+
+    return "" if pd.isna(value) else str(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +154,8 @@ class Field:
                 hint="Repair it with shapely.make_valid, or Fix geometries in QGIS.",
             )
         object.__setattr__(self, "polygon", shapely.force_2d(shapely.orient_polygons(self.polygon)))
+        for name in ("name", "field_id"):
+            object.__setattr__(self, name, _text(getattr(self, name)))
         if not self.field_id:
             object.__setattr__(self, "field_id", place_id(self.polygon, crs))
         if not self.name:

@@ -21,6 +21,10 @@ ROLES = ("red", "green", "blue", "nir", "grey", "other")
 GREY_WEIGHTS = (0.298, 0.587, 0.114)
 
 
+#: The next step where something else stands for a picture.
+OPEN_IT = "Of a file read one: gf.read_scene(path)."
+
+
 @dataclass(frozen=True, slots=True)
 class ImagerySource:
     """Where a picture comes from and what its terms allow.

@@ -110,6 +110,19 @@ class Tracks:
     written: TracksWritten | None = None
     width_m: float | None = None
 
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all tables, the outline and what is known besides are the same."""
+        if not isinstance(other, Tracks):
+            return NotImplemented
+        mine, theirs = self.tables(), other.tables()
+        return (
+            (self.outline, self.evidence()) == (other.outline, other.evidence())
+            and mine.keys() == theirs.keys()
+            and all(mine[name].equals(theirs[name]) for name in mine)
+        )
+
     def __repr__(self) -> str:
         return words(f"Tracks: {len(self.lines)}", self._facts())
 

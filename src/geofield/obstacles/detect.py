@@ -9,13 +9,13 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.errors import FieldError, ObstacleError
+from geofield.errors import FieldError, ImageryError, ObstacleError, refuse_other
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, Strategy, method
 from geofield.model.circles import Circles, checked_range
-from geofield.model.field import Field
+from geofield.model.field import MAKE_ONE, Field
 from geofield.model.obstacles import from_circles_px, from_polygons
-from geofield.model.scene import Scene
+from geofield.model.scene import OPEN_IT, Scene
 from geofield.obstacles.costs import thresholds
 from geofield.obstacles.default import Found, Polarity, Progress, detect_by_default
 from geofield.obstacles.picture import Picture, search_region
@@ -122,6 +122,8 @@ def detect_obstacles(
         For an impossible radius range, margin, strategy or method.
     FieldError
         When `field` is a shape without a CRS.
+    ImageryError
+        When `scene` is a path.
     """
     if not (np.isfinite(buffer_m) and buffer_m >= 0):
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
@@ -129,12 +131,10 @@ def detect_obstacles(
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
         )
-    if field is not None and not isinstance(field, Field):
-        raise FieldError(
-            f"`field` must be a Field, not {type(field).__name__}.",
-            hint="Of a polygon in a metric CRS make one: gf.Field(polygon, crs).",
-        )
-    low_m, high_m = checked_range(radius_m or (RADIUS_M if strategy == "auto" else STUDY_RADIUS_M))
+    refuse_other(scene, Picture, "scene", OPEN_IT, ImageryError)
+    refuse_other(field, Field | None, "field", MAKE_ONE, FieldError)
+    usual_m = RADIUS_M if strategy == "auto" else STUDY_RADIUS_M
+    low_m, high_m = checked_range(usual_m if radius_m is None else radius_m)
     crs = scene.grid.metric_crs if field is None else field.crs
     detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m], "notes": []}
     if strategy == "auto":

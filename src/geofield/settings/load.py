@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError, create_model
 
-from geofield.errors import SettingsError
+from geofield.errors import SettingsError, refuse_other
 from geofield.settings.explain import explained
 from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
 from geofield.settings.section import Section, nearest
@@ -20,6 +20,7 @@ from geofield.settings.whole import Settings
 
 _KNOWN = (*SECTIONS, "machines")
 _PREFIX = "GEOFIELD_"
+_SAY = 'Load them: gf.load_settings(path), or gf.load_settings(None, {"tracks": {"spacing_m": 6}}).'
 
 
 def load_settings(
@@ -117,6 +118,7 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
     SettingsError
         Naming the setting, its value and the nearest name.
     """
+    refuse_other(settings, Settings | None, "settings", _SAY, SettingsError)
     settings = settings or Settings()
     changed: dict[str, dict[str, Any]] = {}
     for name, value in values.items():

@@ -71,6 +71,7 @@ def cannot_write(target: Path, error: OSError) -> FormatError:
         )
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         return FormatError(
-            f"{target} is not a folder ({error.strerror}).", hint="Choose another --out."
+            f"{target} is not a folder ({error.strerror}).",
+            hint="Choose another folder.",
         )
     return FormatError(f"{target}: {error.strerror or error}.")

@@ -15,7 +15,7 @@ from shapely import Polygon
 from shapely.ops import substring
 
 from geofield import schema
-from geofield.errors import TrackError, TrackWarning
+from geofield.errors import TrackError, TrackWarning, refuse_other
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
@@ -78,6 +78,7 @@ def plan_route(
     TrackError
         When a setting is unfit, or the tracks do not know their field.
     """
+    refuse_other(tracks, Tracks, "tracks", "Of a plan give plan.tracks.", TrackError)
     outline, shapes = tracks.outline, tracks.shapes
     if outline is None or shapes is None:
         raise TrackError(
