@@ -47,6 +47,16 @@ def database(path: Path, *, timeout_s: float = 5.0) -> Iterator[sqlite3.Connecti
         yield connection
 
 
+def is_geopackage(path: Path) -> bool:
+    """Whether a file is a GeoPackage, by its name or content: earlier plans end in .bak."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() == ".gpkg":
+        return True
+    with path.open("rb") as file:
+        return file.read(72)[68:] in (b"GPKG", b"GP10", b"GP11")
+
+
 class _RootSeenError(Exception):
     """The prolog is over: no entity can be defined behind it."""
 

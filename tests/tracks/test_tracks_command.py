@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sqlite3
 import warnings
 from collections.abc import Sequence
@@ -30,6 +31,7 @@ from geofield.tracks import plan_tracks
 from geofield.tracks.fewest import candidate_angles
 
 CRS = 32633
+SAMPLE = Path(__file__).parents[2] / "sample_data"
 
 
 def outlines(count: int) -> gpd.GeoDataFrame:
@@ -265,6 +267,24 @@ def test_plans_in_one_file_keep_what_stands_in_them(tmp_path: Path) -> None:
     untold = CliRunner().invoke(cli, ["tracks", str(made), "-o", str(tmp_path / "two.gpkg")])
     assert "Obstacles  those of made.gpkg" in untold.output
     assert "keeps no settings of its fields: their spacing is 2 m" in untold.output
+
+
+@pytest.mark.filterwarnings("ignore:.*non conformant file extension")
+def test_a_plan_is_one_whatever_its_file_is_called(tmp_path: Path) -> None:
+    """Of field.gpkg.bak, which is geofield's own, the outline alone was taken."""
+    plan, earlier = SAMPLE / "field_1.gpkg", tmp_path / "field.gpkg.bak"
+    shutil.copy(plan, earlier)
+    lengths_m = {
+        file.name: run(file, "--spacing", "6", "-o", tmp_path / f"{number}.gpkg")["fields"][0]
+        for number, file in enumerate((plan, earlier))
+    }
+    assert lengths_m[earlier.name]["segment_count"] == lengths_m[plan.name]["segment_count"] > 31
+    assert read_plan(earlier) == read_plan(plan)
+    for places in (plan, earlier):
+        (planned,) = gf.plan_fields(places, spacing_m=6)
+        assert planned.tracks is not None
+        standing = read_plan(plan).obstacles
+        assert not planned.tracks.segments.intersects(standing.union_all().buffer(-0.01)).any()
 
 
 def test_a_plan_that_lost_its_record_is_told(tmp_path: Path) -> None:

@@ -157,8 +157,9 @@ def _own_plan(file: Path) -> Plan | None:
     from geofield.formats.foreign import layer_names
     from geofield.formats.gpkg_read import is_own
     from geofield.plan import read_plan
+    from geofield.strangers import is_geopackage
 
-    if file.suffix.lower() != ".gpkg":
+    if not is_geopackage(file):
         return None
     own, layers, layer = is_own(file), layer_names(file), schema.FIELD.name
     if layer in layers:

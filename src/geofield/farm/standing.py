@@ -25,6 +25,7 @@ from geofield.model.resized import strips
 from geofield.model.review import reconcile
 from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
 from geofield.plan import Plan
+from geofield.strangers import is_geopackage
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -102,7 +103,7 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
         return read_table(path), []
     # The points of a GPX file's lines are told by the lines.
     names = [name for name in layer_names(path) if name not in ("route_points", "track_points")]
-    if path.suffix.lower() == ".gpkg" and is_own(path):
+    if is_own(path):
         raise FormatError(
             f"{path} is a plan in which no obstacle stands.",
             hint="Leave it out, or search or draw some in it: geofield obstacles, geofield review.",
@@ -158,7 +159,7 @@ def _holds_obstacles(path: Path) -> bool:
     from geofield.formats.foreign import layer_names
 
     layer = schema.OBSTACLES.name
-    if path.suffix.lower() != ".gpkg" or not path.is_file() or layer not in layer_names(path):
+    if not is_geopackage(path) or layer not in layer_names(path):
         return False
     return bool(pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"])
 

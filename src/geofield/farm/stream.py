@@ -13,6 +13,7 @@ import pandas as pd
 from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryError, refuse_other
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
+from geofield.farm.standing import own_obstacles
 from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, told
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
@@ -49,7 +50,8 @@ def plan_fields(
     settings : Settings, optional
         Columns of the places that are named like settings win over them.
     obstacles : path, optional
-        A file of what to avoid.
+        A file of what to avoid; without one, and without a picture, what stands in the plans that
+        the file of the places holds.
     client : distributed.Client, optional
         Of a Dask cluster, whose workers see the same files; here, one after the other, when not
         given. Plans of a cluster come in the order in which they are ready.
@@ -70,6 +72,8 @@ def plan_fields(
             f"There is no picture {imagery}.",
             hint="For other sources use `geofield batch`, or fetch with `geofield tiles`.",
         )
+    if obstacles is None and imagery is None:
+        obstacles = own_obstacles(Path(found.path))
     job = Job(
         settings,
         None if imagery is None else Imagery(str(imagery)),

@@ -16,7 +16,7 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.model import Dataset
-from geofield.strangers import database
+from geofield.strangers import database, is_geopackage
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -256,7 +256,7 @@ def own_layers(connection: sqlite3.Connection, of: str = "main") -> set[str]:
 
 def is_own(path: Path) -> bool:
     """Whether a file is a GeoPackage that geofield wrote."""
-    return path.suffix.lower() == ".gpkg" and path.is_file() and record_of(path) is not None
+    return is_geopackage(path) and record_of(path) is not None
 
 
 def record_of(path: Path) -> origin.Origin | None:

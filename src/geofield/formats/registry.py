@@ -11,7 +11,7 @@ from types import MappingProxyType
 from geofield.errors import FormatError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
-from geofield.strangers import check_vector
+from geofield.strangers import check_vector, is_geopackage
 
 __all__ = ["FORMATS", "Drop", "Format", "detect", "format_named", "product_file"]
 
@@ -65,6 +65,8 @@ def detect(path: Path | str) -> Format:
     for each in FORMATS.values():
         if suffix in each.suffixes:
             return each
+    if is_geopackage(place):
+        return format_named("gpkg")
     if place.name in ("Field.txt", "Boundary.txt", "TrackLines.txt"):
         return format_named("agopengps")
     check_vector(place)
