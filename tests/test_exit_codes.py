@@ -282,3 +282,18 @@ def test_what_is_no_number_is_told_in_words(
     with pytest.raises(SystemExit, match="2"):
         main(["simulate", option, value, "--out", str(tmp_path / "new")])
     assert words in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "told"),
+    [
+        ("long" * 80 + ".gpkg", 1, "File name too long."),
+        ("fl\udce4che.gpkg", 2, r"b'fl\xe4che.gpkg' is no UTF-8: rename the file"),
+    ],
+)
+def test_a_name_that_the_system_or_libraries_refuse(name: str, code: int, told: str) -> None:
+    """They ended in a traceback, as a folder did that may not be looked into."""
+    done = run_geofield("info", name)
+    assert done.returncode == code
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr

@@ -110,6 +110,8 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
         say_note(str(message))
 
 
+#: What the system says of a path that a person named.
+_NOT_OURS = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.EIO)
 _NO_NUMBER = re.compile(r"'(.*)' is not a valid (float|integer)(?: range)?\.")
 
 
@@ -139,6 +141,18 @@ def _end_if_known(error: Exception) -> None:
         place = error.filename or "what was printed has no room"
         say_error(f"The disk is full: {place}.", "Free some space, then repeat.")
         sys.exit(1)
+    if isinstance(error, OSError) and error.errno in _NOT_OURS:
+        say_error(f"{error.filename}: {error.strerror}.", "Name a file or folder you may use.")
+        sys.exit(1)
+
+
+def _refuse_bytes(words: list[str]) -> None:
+    """Refuse what is no text: no library opens such a file, and no format holds such a name."""
+    for word in words:
+        if not word.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in word):
+            raise click.UsageError(
+                f"{os.fsencode(word)!r} is no UTF-8: rename the file, or set LC_ALL=C.UTF-8."
+            )
 
 
 def _open_streams() -> None:
@@ -199,6 +213,7 @@ def _run(args: list[str] | None) -> None:
         around.callback(end_log)
         around.enter_context(stoppable(whole_process=args is None))
         try:
+            _refuse_bytes(sys.argv[1:] if args is None else args)
             # Not standalone, click hands the code of `context.exit` back instead of leaving.
             code = cli.main(args=args, prog_name="geofield", standalone_mode=False)
             sys.exit(code if isinstance(code, int) else 0)
