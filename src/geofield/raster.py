@@ -80,8 +80,6 @@ def gaps_filled(image: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[Any]:
     """
     if valid.all() or not valid.any():
         return image
-    import cv2
-
     gap = ~valid
     # Nearest to a fiftieth; six times as fast as exactly so.
     _, number = cv2.distanceTransformWithLabels(
