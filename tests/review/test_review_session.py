@@ -78,6 +78,18 @@ def test_another_radius_grows_the_circle_and_its_margin_stays(plan: Plan) -> Non
     assert new["radius_px"] / old["radius_px"] == pytest.approx(7.0 / old["radius_m"])
 
 
+def test_an_obstacle_drawn_anew_is_avoided_as_drawn(plan: Plan) -> None:
+    x, y = row(plan, 8).geometry.centroid.coords[0]
+    ring = [[x - 3, y - 3], [x + 4, y - 2], [x + 2, y + 5]]
+    session = Session(plan)
+    session.do({"do": "reshape", "no": 8, "ring": ring})
+    session.do({"do": "status", "no": 3, "status": "rejected"})  # planned once more
+    drawn = row(session.plan, 8)
+    assert drawn.geometry.symmetric_difference(shapely.Polygon(ring)).area < 1e-6
+    assert (drawn["status"], drawn["kind"]) == ("confirmed", "other")
+    assert np.isnan(drawn["radius_m"])
+
+
 def test_what_a_person_draws_is_driven_around(plan: Plan) -> None:
     session = Session(plan)
     x, y = plan.field.polygon.representative_point().coords[0]

@@ -107,7 +107,8 @@ def set_radius(plan: Plan, command: Command) -> Plan:
 
 def reshape(plan: Plan, command: Command) -> Plan:
     """The shape of an obstacle as a person drew it: ``no``, ``ring``."""
-    drawn = {"kind": "other", "radius_m": np.nan, "radius_px": np.nan, "buffer_m": 0.0}
+    # Another buffer_m would be a margin typed for it, by which planning grows what was drawn.
+    drawn = {"kind": "other", "radius_m": np.nan, "radius_px": np.nan}
     return _reshaped(plan, command, _polygon([command["ring"]], "obstacle"), drawn)
 
 
