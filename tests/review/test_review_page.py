@@ -322,6 +322,7 @@ def test_another_program_changed_or_locked_the_file(page: Page, plan_path: Path)
         other.commit()
     page.button("save")
     page.wait(lambda: "Another program changed" in page.text("message"))
+    assert page.text("message").count("under another name") == 1
     page.button("more")
     page.driver.find_element(By.ID, "save-name").send_keys("mine")
     page.button("save-as")
@@ -329,6 +330,26 @@ def test_another_program_changed_or_locked_the_file(page: Page, plan_path: Path)
     saved = read_plan(plan_path.with_name("mine.gpkg"))
     assert saved.obstacles is not None
     assert (saved.obstacles["status"] == "rejected").sum() == 1
+
+
+def test_edits_to_be_made_by_hand_are_named_until_they_were_read(
+    page: Page, plan_path: Path
+) -> None:
+    """They were shown for some seconds, and in German not at all."""
+    page.press("j", "r", "r")
+    page.wait(lambda: page.judged() == 2)
+    first = min(each["no"] for each in page.state()["obstacles"] if each["status"] == "rejected")
+    other = Session(read_plan(plan_path))
+    other.do({"do": "status", "no": first, "status": "confirmed"})
+    save_plan(other.plan, plan_path, read_from=plan_path)
+    page.run("localStorage.setItem('language', 'de')")
+    page.button("save")
+    page.wait(lambda: "Another program" in page.text("message"))
+    page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
+    page.wait(lambda: "1 ihrer 2 Änderungen" in page.text("message"))
+    assert f"von Hand: status: obstacle {first} is not there as it was." in page.text("message")
+    page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
+    assert page.text("message") == ""
 
 
 def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:

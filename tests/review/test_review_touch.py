@@ -113,3 +113,25 @@ def test_corners_of_the_outline_by_fingers(page: Page) -> None:
     page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring) - 1)
     left = {tuple(corner) for corner in page.state()["field"]["rings"][0]}
     assert tuple(moved[at]) not in left
+
+
+def test_what_matters_is_seen_on_a_small_screen(page: Page) -> None:
+    """A doubtful outline lay below the list, unseen, and the menu was wider than the screen."""
+    page.button("more")
+    wide, room = page.run(
+        "const one = document.getElementById('menu');return [one.scrollWidth, one.clientWidth];"
+    )
+    assert wide <= room
+    first = "return document.querySelector('#panel section').getAttribute('aria-labelledby')"
+    assert page.run(first) == "obstacles-h"
+    # An outline up to the picture's edges is in doubt.
+    page.driver.execute_async_script(
+        "const [w, s, e, n] = arguments[0], done = arguments[1];"
+        "import('/api.js').then(api => api.edit({do: 'outline',"
+        " rings: [[[w - 9, s], [e, s], [e, n], [w - 9, n]]]})).then(done, done);",
+        page.state()["bounds"],
+    )
+    assert page.state()["field"]["doubts"]
+    page.driver.refresh()
+    page.wait(lambda: page.run("return document.body.dataset.ready"))
+    assert page.run(first) == "outline-h"

@@ -167,7 +167,7 @@ class Desk:
                 raise ChangedError(
                     f"Another program changed {self.path.name} since it was opened here.",
                     hint="Reload it (edits made here are made again where they fit), or save your "
-                    "edits under another name.",
+                    "edits under another name (see More).",
                 )
             refuse_locked(self.path)
             with _in_words(self.path):

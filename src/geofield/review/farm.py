@@ -68,7 +68,7 @@ class FarmDesk(Desk):
                     f"Another program changed {self._field_id} in the farm since it was opened "
                     "here.",
                     hint="Reload it (edits made here are made again where they fit), or save your "
-                    "edits under another name.",
+                    "edits under another name (see More).",
                 )
             with tempfile.TemporaryDirectory(prefix="geofield-") as name:
                 whole = Path(name) / "field.gpkg"

@@ -55,11 +55,13 @@ function speakOf(command, before) {
 function refused(error) {
   if (ended) return;
   if (error.otherTab) say(error.message, true, {text: t("take"), act: takeOver});
-  else say(error.status === 0 ? t("gone") : error.status === 409 ? `${error.message} ${t("changed")}` : error.message, true);
+  else if (error.status === 409) say(error.message, true, {text: t("reload"), act: reload});
+  else say(error.status === 0 ? t("gone") : error.message, true);
 }
 
 // What the other tab did meanwhile is shown first.
 const takeOver = () => act(() => api.takeOver(), again);
+const reload = () => applied(() => act(() => api.reload(), again));
 
 function again() {
   ended = true;
@@ -124,7 +126,8 @@ function showField() {
   const doubts = [...field.doubts, ...state.doubts].map(told);
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
   const shown = JSON.stringify(field.rings);
-  $("alternatives").replaceChildren(...field.alternatives.map((other, i) => {
+  const choice = field.alternatives.some(other => JSON.stringify(other.rings) !== shown) ? field.alternatives : [];
+  $("alternatives").replaceChildren(...choice.map((other, i) => {
     const item = document.createElement("li");
     const press = node("button", t("outline_no", {n: i + 1, p: number(100 * other.certainty)}));
     press.setAttribute("aria-pressed", String(JSON.stringify(other.rings) === shown));
@@ -306,6 +309,8 @@ async function start() {
   state = await api.open();
   maps.build(state, () => chosen);
   show(state);
+  // On a telephone it would lie below the list, unseen.
+  if ($("doubts").hasChildNodes()) $("panel").prepend($("outline-h").parentElement);
   maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
   tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, explain: word => say(t(word)), scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
@@ -339,7 +344,7 @@ async function start() {
     else if (await save(name)) $("menu").close();
   };
   for (const dialog of document.querySelectorAll("dialog")) dialog.onclose = () => document.body.append($("message"));
-  $("reload").onclick = () => applied(() => act(() => api.reload(), again));
+  $("reload").onclick = reload;
   $("stop").onclick = () => applied(() => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); }));
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
@@ -347,7 +352,8 @@ async function start() {
   });
   window.addEventListener("beforeunload", event => { if ((unsaved() || undone) && !ended) event.preventDefault(); });
   if (!state.yours) say(t("second"), true, {text: t("take"), act: takeOver});
-  else if (state.brought_back) say(told(state.brought_back));
+  // What names the file of edits that were not made again stays until it was read.
+  else if (state.brought_back) say(told(state.brought_back), false, /\.jsonl\.\d/.test(state.brought_back) ? {text: t("close"), act: () => say("")} : null);
   document.body.dataset.ready = "yes";
 }
 
