@@ -445,6 +445,35 @@ def test_half_a_copy_of_the_opened_plan_stops_no_review(
     assert [row(again.session.plan, number)["status"] for number in (3, 4)] == ["rejected"] * 2
 
 
+def test_notes_that_are_gone_are_written_again(plan_path: Path) -> None:
+    """A session whose notes another one had forgotten told that they lie there; they were gone."""
+    first = Desk(plan_path)
+    first.edit({"do": "status", "no": 3, "status": "rejected"})
+    second = Desk(plan_path)
+    second.edit({"do": "status", "no": 4, "status": "rejected"})
+    assert first.edit({"do": "status", "no": 5, "status": "rejected"})["unnoted"]
+    second.save()
+    assert second.end() is None
+    # What both said is no conflict.
+    told = first.reload()["brought_back"]
+    assert "2 of its 2 edits were made again" in told
+    journal_path(plan_path).unlink()
+    assert "lie in" in str(first.end())
+    plan = Desk(plan_path).session.plan
+    assert [row(plan, no)["status"] for no in (3, 4, 5)] == ["rejected"] * 3
+
+
+def test_edits_without_notes_can_be_left_when_they_were_saved_elsewhere(plan_path: Path) -> None:
+    first, second = Desk(plan_path), Desk(plan_path)
+    second.edit({"do": "status", "no": 4, "status": "rejected"})
+    assert first.edit({"do": "status", "no": 5, "status": "rejected"})["unnoted"]
+    with pytest.raises(GeofieldError, match="would be lost"):
+        first.reload()
+    first.save("mine")
+    first.reload()
+    assert [row(first.session.plan, no)["status"] for no in (4, 5)] == ["rejected", "detected"]
+
+
 def test_a_second_session_on_a_plan_takes_no_notes_of_the_first_away(plan_path: Path) -> None:
     first, second, idle = Desk(plan_path), Desk(plan_path), Desk(plan_path)
     for number in (3, 4):

@@ -185,11 +185,12 @@ class Desk:
     def reload(self) -> dict[str, Any]:
         """Read the file again; edits that were not saved are kept beside it."""
         with self.lock:
-            if self.journal.refused:
+            self.journal.flush()
+            if self.journal.refused and self._saved_elsewhere is None:
                 raise FormatError(
                     f"Edits could not be noted on the disk ({self.journal.refused}) and would be "
                     "lost.",
-                    hint="Save them, here or under another name.",
+                    hint="Save them, here or under another name (see More).",
                 )
             self._read()
             return self.opening()
@@ -236,13 +237,19 @@ class Desk:
             return None
         self.journal.flush()
         if self.journal.refused:
-            if self._elsewhere is not None and self._elsewhere[0] is self.session.step:
-                return f"Edits of {self.path} were saved as {self._elsewhere[1]}."
+            if self._saved_elsewhere is not None:
+                return f"Edits of {self.path} were saved as {self._saved_elsewhere}."
             self.lost = True
             return f"Edits of {self.path} are lost: {self.journal.refused}."
         return f"Edits that were not saved lie in {self.journal.path}; the next session has them."
 
     # -- inner -------------------------------------------------------------------------------
+
+    @property
+    def _saved_elsewhere(self) -> str | None:
+        """The name under which the state that is shown was written, if it was."""
+        step, name = self._elsewhere or (None, None)
+        return name if step is self.session.step else None
 
     def _state(self) -> dict[str, Any]:
         return {

@@ -118,25 +118,27 @@ class Journal:
         self.flush()
 
     def flush(self) -> None:
-        """Write what waits, if anything does."""
-        if not self._waiting:
+        """Write what waits, if anything does, and all of it where the file is gone."""
+        there = self.path.is_file()
+        if not self._waiting and (there or not self._kept):
             return
         if not self._is_mine():
             self.refused = "another review of this plan is open, whose notes lie there"
             return
-        lines = "".join(json.dumps(each) + "\n" for each in self._waiting)
+        whole = self._kept + "".join(json.dumps(each) + "\n" for each in self._waiting).encode()
+        kept = len(self._kept) if there else 0
         try:
-            with self.path.open("r+b" if self._kept else "wb") as file:
+            with self.path.open("r+b" if kept else "wb") as file:
                 # A line that was written by half, now or before a kill, is written anew.
-                file.truncate(len(self._kept))
-                file.seek(len(self._kept))
-                file.write(lines.encode())
+                file.truncate(kept)
+                file.seek(kept)
+                file.write(whole[kept:])
                 file.flush()
                 os.fsync(file.fileno())
         except OSError as error:
             self.refused = error.strerror or str(error)
             return
-        self._kept, self._rest = self._kept + lines.encode(), b""
+        self._kept, self._rest = whole, b""
         self._waiting, self.refused = [], None
 
     def before_saving(self) -> None:

@@ -64,7 +64,10 @@ def refitted(plan: Plan, entry: Entry) -> dict[str, Any]:
     if command.get("do") in _OF_OUTLINE and entry.get("was") != _outline_of(plan):
         raise EditError("the outline is another one.")
     if command.get("do") not in _OF_OUTLINE and "no" in command:
-        there = [no for no, was in _obstacles_of(plan).items() if was == entry.get("was")]
+        fits = [entry.get("was")]
+        if command["do"] == "status" and fits[0]:  # said there meanwhile, too
+            fits.append([*fits[0][:-1], command["status"]])
+        there = [no for no, was in _obstacles_of(plan).items() if was in fits]
         if not there:
             raise EditError(f"obstacle {command['no']} is not there as it was.")
         command["no"] = there[0]
