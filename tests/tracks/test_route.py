@@ -28,6 +28,9 @@ FIELD: Any = shapely.difference(
 )
 
 
+_LINESTRINGS = shapely.linestrings
+
+
 def obstacles(count: int = 12) -> list[shapely.Polygon]:
     rng = np.random.default_rng(4)
     places = rng.uniform((500030, 5600030), (500270, 5600170), (count, 2))
@@ -222,21 +225,50 @@ def test_fields_with_nothing_to_drive() -> None:
     assert len(planned.route) == 0
 
 
+def looked_along(stands: Any) -> int:
+    """How many lines are made to find ways around what stands in a field."""
+    field = shapely.box(500000, 5600000, 500200, 5600100)
+    planned = plan_tracks(field, stands, crs=CRS, spacing_m=6.0, direction=90)
+    made: list[int] = []
+
+    def counted(places: Any, **how: Any) -> Any:
+        lines = _LINESTRINGS(places, **how)
+        made.append(np.size(lines))
+        return lines
+
+    with patch.object(shapely, "linestrings", counted):
+        plan_route(planned)
+    return sum(made)
+
+
 def test_round_outlines_cost_no_more_than_circles() -> None:
     rng = np.random.default_rng(3)
     xy = rng.uniform((500020, 5600010), (500180, 5600090), (40, 2))
     circles = gpd.GeoDataFrame({"radius_m": [5.0] * len(xy)}, geometry=shapely.points(xy), crs=CRS)
-
-    def looked_along(stands: Any) -> int:
-        field = shapely.box(500000, 5600000, 500200, 5600100)
-        planned = plan_tracks(field, stands, crs=CRS, spacing_m=6.0)
-        with patch.object(Passage, "_look", autospec=True, side_effect=Passage._look) as look:
-            plan_route(planned)
-        return sum(len(call.args[3]) for call in look.call_args_list)
-
-    drawn = looked_along(circles.buffer(5.0, quad_segs=32))
     # 7 times as many lines; 48 times where ways are looked for between all corners.
-    assert drawn < 8 * looked_along(circles)
+    assert looked_along(circles.buffer(5.0, quad_segs=32)) < 8 * looked_along(circles)
+
+
+def test_a_row_of_trees_is_one_thing_to_go_around() -> None:
+    row = [shapely.Point(500100.0, 5600003.0 + 3.5 * number) for number in range(27)]
+    trees = gpd.GeoDataFrame({"radius_m": [2.0] * len(row)}, geometry=row, crs=CRS)
+    # 73 000 where each tree is a shape of its own, and 14 times as long.
+    assert looked_along(trees) < 40_000
+
+
+def test_a_way_out_of_a_ring_of_trees_is_none_and_one_within_is_found() -> None:
+    angle = np.arange(24) * np.pi / 12
+    ring = np.column_stack((50 + 30 * np.cos(angle), 50 + 30 * np.sin(angle), np.full(24, 5.0)))
+    circles = np.vstack((ring, [50.0, 50.0, 10.0]))
+    shapes = ObstacleShapes(circles, np.arange(25), np.empty(0, dtype=object), np.empty(0, int))
+    passage = Passage(shapely.box(0, 0, 100, 100), shapes)
+    inside, other, outside = np.array([[35.0, 50.0], [65.0, 50.0], [5.0, 50.0]])
+    assert passage.shortest(inside, outside) is None
+    way = passage.shortest(inside, other)
+    assert way is not None
+    length = np.hypot(*np.diff(way, axis=0).T).sum()
+    taut = 2.0 * np.sqrt(15.0**2 - 10.0**2) + 10.0 * (np.pi - 2.0 * np.arccos(10.0 / 15.0))
+    assert taut <= length < taut * 1.01
 
 
 def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:

@@ -3,8 +3,9 @@
 Shortest ways are exact: the way around a few shapes alone is never longer than the way around
 all, so that once it is free of every shape it is the shortest. Shapes come in only
 when the way found so far runs into them (the visibility graph of Lozano-Perez and Wesley 1979,
-grown lazily). A way turns at a corner only where it grazes the shape there, so that of all lines
-between corners few are looked along.
+grown lazily). A way turns at a corner only where it grazes the shape there, and no way of a length
+reaches a corner from which both ends are farther together: few lines between corners are looked
+along.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ _AROUND_M = 0.02
 """Ways keep this distance from corners, so that rounding never takes them inside."""
 _STRAIGHT_M = 0.005
 """What strays less from a line has no corner there, as the vertices along a straight border."""
-_CORNERS = 16
+_QUARTER_CORNERS = 4
 _SHELL = -1
+_FIRST_REACH_M = 10.0
+"""Ways are first sought that are no longer than twice the straight line and this."""
 _GRAZES = 1e-9
 """Lines along an edge count as grazing its corners, whatever their last digits."""
 
@@ -42,23 +45,18 @@ class _Corners:
     into: FloatArray
     out: FloatArray
 
-    def graze(self, at: NDArray[np.int64], along: FloatArray) -> NDArray[np.bool_]:
-        """Whether lines at corners have the shape there on one side of them."""
-        square = np.einsum("ij,ij->i", along, along)
-        return np.asarray(
-            _cross(self.into[at], along) * _cross(self.out[at], along) <= _GRAZES * square
-        )
+    def at(self, kept: NDArray[np.bool_]) -> _Corners:
+        """Some of them."""
+        return _Corners(self.places[kept], self.into[kept], self.out[kept])
 
-
-@dataclass(frozen=True, slots=True)
-class _Sight:
-    """Straight lines between the corners of two shapes, and which shapes each one meets."""
-
-    a: NDArray[np.int64]
-    b: NDArray[np.int64]
-    length: FloatArray
-    line: NDArray[np.int64]
-    shape: NDArray[np.int64]
+    def graze(self) -> NDArray[np.bool_]:
+        """Whether the line from each corner (row) to each has the shapes there on one side."""
+        (x, y), (into_x, into_y), (out_x, out_y) = self.places.T, self.into.T, self.out.T
+        dx, dy = x - x[:, None], y - y[:, None]
+        into = into_x[:, None] * dy - into_y[:, None] * dx
+        into *= out_x[:, None] * dy - out_y[:, None] * dx
+        here = into <= _GRAZES * (dx * dx + dy * dy)
+        return np.asarray(here & here.T)
 
 
 class Passage:
@@ -73,31 +71,33 @@ class Passage:
         self.open_shell: BaseGeometry = shapely.buffer(shell, margin_m + TOUCH_M)
         shapely.prepare(self.open_shell)
         circles, radius = shapely.points(shapes.circles[:, :2]), shapes.circles[:, 2]
-        holes = [Polygon(ring) for ring in outline.interiors]
-        solid = [*shapes.polygons, *holes]
-        self._blocks = np.array(
+        solid = [*shapes.polygons, *map(Polygon, outline.interiors)]
+        round_ones = shapely.buffer(
+            circles, np.maximum(radius - TOUCH_M, 0.0), quad_segs=4 * QUARTER_SEGMENTS
+        )
+        each = np.array(
+            [*round_ones, *shapely.buffer(solid, -TOUCH_M, join_style="mitre")], dtype=object
+        )
+        # Corners of a circle's polygon lie so far out that its edges keep clear of the circle.
+        out = (radius + _AROUND_M) / np.cos(np.pi / (4 * _QUARTER_CORNERS))
+        around = np.array(
             [
-                *shapely.buffer(
-                    circles, np.maximum(radius - TOUCH_M, 0.0), quad_segs=4 * QUARTER_SEGMENTS
-                ),
-                *shapely.buffer(solid, -TOUCH_M, join_style="mitre"),
+                *shapely.buffer(circles, out, quad_segs=_QUARTER_CORNERS),
+                *shapely.buffer(solid, _AROUND_M, join_style="mitre"),
             ],
             dtype=object,
         )
+        # Nothing passes between those that overlap: a row of trees is one shape to go around.
+        self._blocks = shapely.get_parts(shapely.union_all(each))
+        shapely.prepare(self._blocks)
         self._tree = shapely.STRtree(self._blocks)
-        # Corners of a circle's polygon lie so far out that its edges keep clear of the circle.
-        out = (radius + _AROUND_M) / np.cos(np.pi / _CORNERS)
-        corners = [
-            _circle_corners(x, y, r)
-            for x, y, r in zip(*shapes.circles[:, :2].T.tolist(), out.tolist(), strict=True)
-        ]
-        corners += [
-            _corners_of(shapely.buffer(each, _AROUND_M, join_style="mitre")) for each in solid
-        ]
-        self._corners: dict[int, _Corners] = dict(enumerate(corners))
+        shape, of = self._tree.query(each, predicate="intersects")
+        self._corners: dict[int, _Corners] = {
+            block: _corners_of(shapely.union_all(around[shape[of == block]]))
+            for block in range(len(self._blocks))
+        }
         inner = shapely.buffer(shell, margin_m - _AROUND_M, join_style="mitre")
         self._corners[_SHELL] = _corners_of(inner, inward=True)
-        self._sights: dict[tuple[int, int], _Sight] = {}
 
     def fits(self, lines: NDArray[np.object_]) -> NDArray[np.bool_]:
         """Whether each line stays inside the border and outside every obstacle and hole."""
@@ -107,8 +107,22 @@ class Passage:
         """Whether each line runs into an obstacle or hole."""
         hit = np.zeros(len(lines), dtype=bool)
         if len(lines) and len(self._blocks):
-            hit[self._tree.query(lines, predicate="intersects")[0]] = True
+            hit[self._meet(lines)[0]] = True
         return hit
+
+    def _meet(
+        self, lines: NDArray[np.object_], around: list[int] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which lines meet which shapes, of all or of some: the indices of both.
+
+        A tree prepares the lines, which are short, and not the shapes, which are not.
+        """
+        line, shape = self._tree.query(lines)
+        if around is not None:
+            asked = np.isin(shape, around)
+            line, shape = line[asked], shape[asked]
+        met = shapely.intersects(self._blocks[shape], lines[line])
+        return line[met], shape[met]
 
     def outside_m(self, line: BaseGeometry) -> float:
         """Length of a line beyond the border and its margin."""
@@ -121,98 +135,58 @@ class Passage:
 
         It is told by its corners (n, 2), both ends among them.
         """
+        ends = np.stack((start, goal))
         around: list[int] = []
+        reach = 2.0 * float(np.hypot(*(goal - start))) + _FIRST_REACH_M
         while True:
-            way, met = self._way_around(start, goal, around)
-            new = [shape for shape in met if shape not in around]
-            if not new:
+            corners = self._corners_at(ends, around)
+            far = np.hypot(*(corners.places - start).T) + np.hypot(*(corners.places - goal).T)
+            way, length = self._way_along(corners.at(far <= reach), around)
+            if length > reach < far.max():
+                reach *= 2.0
+                continue
+            met = [] if way is None else self._met_by(way, around)
+            if not met:
                 return way
-            around = sorted({*around, *new})
+            around = sorted({*around, *met})
 
-    def _way_around(
-        self, start: FloatArray, goal: FloatArray, around: list[int]
-    ) -> tuple[FloatArray | None, list[int]]:
-        """Shortest way around some shapes only, and which shapes it meets."""
-        groups = [np.stack((start, goal)), *(self._corners[shape].places for shape in around)]
-        first = np.cumsum([0, *map(len, groups)])
-        rows, columns, lengths, sights = [], [], [], []
-        keys = [None, *around]
-        for i, one in enumerate(keys):
-            for j in range(i, len(keys)):
-                two = keys[j]
-                if one is None or two is None:
-                    sight = self._look(groups[i], groups[j], *_pairs(groups[i], groups[j], i == j))
-                else:
-                    sight = self._between(one, two)
-                blocked = np.isin(sight.shape, around)
-                seen = np.ones(len(sight.a), dtype=bool)
-                seen[sight.line[blocked]] = False
-                rows.append(sight.a[seen] + first[i])
-                columns.append(sight.b[seen] + first[j])
-                lengths.append(sight.length[seen])
-                sights.append((sight, np.flatnonzero(seen)))
-        a, b, length = np.concatenate(rows), np.concatenate(columns), np.concatenate(lengths)
-        graph = csr_matrix((length, (a, b)), shape=(first[-1], first[-1]))
+    def _corners_at(self, ends: FloatArray, around: list[int]) -> _Corners:
+        """The ends of a way, at which there is nothing to graze, and the corners of shapes."""
+        found = [_Corners(ends, *np.zeros((2, 2, 2))), *(self._corners[each] for each in around)]
+        return _joined(found)
+
+    def _way_along(self, corners: _Corners, around: list[int]) -> tuple[FloatArray | None, float]:
+        """Shortest way from the first corner to the second around some shapes, and its length."""
+        kept = corners.graze()
+        # Its ends may lie in the narrow strip between a shape and its corners.
+        kept[:2] = True
+        a, b = np.nonzero(np.triu(kept, 1))
+        lines = _lines(corners.places[a], corners.places[b])
+        seen = np.ones(len(lines), dtype=bool)
+        seen[self._meet(lines, around)[0]] = False
+        if _SHELL in around:
+            seen[~shapely.covers(self.open_shell, lines)] = False
+        # Coincident corners must not make an edge of no length: that would be no edge.
+        length = np.maximum(shapely.length(lines[seen]), 1e-9)
+        graph = csr_matrix((length, (a[seen], b[seen])), shape=(len(corners.places),) * 2)
         distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
         if not np.isfinite(distance[1]):
-            return None, self._met_by(np.stack((start, goal)), around)
+            return None, np.inf
         path = [1]
         while path[-1] != 0:
             path.append(int(before[path[-1]]))
-        places = np.concatenate(groups)[path[::-1]]
-        return places, self._met_by(places, around)
+        return corners.places[path[::-1]], float(distance[1])
 
     def _met_by(self, way: FloatArray, around: list[int]) -> list[int]:
-        lines = shapely.linestrings(np.stack((way[:-1], way[1:]), axis=1))
-        met = set(np.unique(self._tree.query(lines, predicate="intersects")[1]).tolist())
+        lines = _lines(way[:-1], way[1:])
+        met = set(np.unique(self._meet(lines)[1]).tolist())
         if not shapely.covers(self.open_shell, lines).all():
             met.add(_SHELL)
         return sorted(met.difference(around))
 
-    def _between(self, one: int, two: int) -> _Sight:
-        """Look between the corners of two shapes; remembered."""
-        key = (one, two)
-        if key not in self._sights:
-            of, to = self._corners[one], self._corners[two]
-            a, b = _pairs(of.places, to.places, one == two)
-            along = to.places[b] - of.places[a]
-            kept = of.graze(a, along) & to.graze(b, along)
-            self._sights[key] = self._look(of.places, to.places, a[kept], b[kept])
-        return self._sights[key]
 
-    def _look(
-        self, one: FloatArray, two: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]
-    ) -> _Sight:
-        if not len(a):
-            none = np.empty(0, np.int64)
-            return _Sight(none, none, np.empty(0), none, none)
-        ends = np.stack((one[a], two[b]), axis=1)
-        lines = shapely.linestrings(ends)
-        line, shape = self._tree.query(lines, predicate="intersects")
-        out = np.flatnonzero(~shapely.covers(self.open_shell, lines))
-        return _Sight(
-            a,
-            b,
-            # Coincident corners must not make an edge of no length: that would be no edge.
-            np.maximum(np.hypot(*(ends[:, 1] - ends[:, 0]).T), 1e-9),
-            np.concatenate((line, out)),
-            np.concatenate((shape, np.full(len(out), _SHELL))),
-        )
-
-
-def _pairs(
-    one: FloatArray, two: FloatArray, same: bool
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Each place of one with each of the other, or each two of the same once."""
-    if same:
-        return np.triu_indices(len(one), 1)
-    a, b = np.indices((len(one), len(two)))
-    return a.ravel(), b.ravel()
-
-
-def _circle_corners(x: float, y: float, radius: float) -> _Corners:
-    angle = np.arange(_CORNERS) * 2.0 * np.pi / _CORNERS
-    return _turning(np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle))))
+def _lines(begin: FloatArray, end: FloatArray) -> NDArray[np.object_]:
+    return np.asarray(shapely.linestrings(np.stack((begin, end), axis=1)), dtype=object)
 
 
 def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> _Corners:
@@ -221,8 +195,12 @@ def _corners_of(shape: BaseGeometry, *, inward: bool = False) -> _Corners:
     Or those that stick into it: of the border, within which ways are.
     """
     plain = shapely.simplify(shapely.get_parts(shape), _STRAIGHT_M)
-    rings = shapely.get_exterior_ring(shapely.orient_polygons(plain))
-    found = [_turning(shapely.get_coordinates(ring)[:-1], inward=inward) for ring in rings]
+    # Of ground that a shape encloses the ring runs the other way: the shape is on its left, too.
+    rings = shapely.get_rings(shapely.orient_polygons(plain))
+    return _joined([_turning(shapely.get_coordinates(ring)[:-1], inward=inward) for ring in rings])
+
+
+def _joined(found: list[_Corners]) -> _Corners:
     none = np.empty((0, 2))
     return _Corners(*(
         np.concatenate([none, *(getattr(each, name) for each in found)])
