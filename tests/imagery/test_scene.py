@@ -27,6 +27,7 @@ from geofield.errors import (
 from geofield.grid import Grid
 from geofield.imagery import SceneReader, read_scene, write_scene
 from geofield.model.scene import ImagerySource, Scene
+from geofield.simulate import SimulatedField
 
 from .pictures import EAST, NORTH, RESOLUTION, UTM, ground, write
 
@@ -583,3 +584,18 @@ def test_near_infrared_tagged_as_alpha_in_degrees(tmp_path: Path) -> None:
     assert scene.valid.mean() > 0.9
     near = scene.bands[3][scene.valid]
     assert near.mean() == pytest.approx(values[3].mean(), abs=2)
+
+
+def test_a_picture_that_the_disk_cut_off_is_told(tmp_path: Path, simulated: SimulatedField) -> None:
+    """GDAL told nobody: a picture without its last rows was left, and the command was content."""
+    resource = pytest.importorskip("resource")
+    whole = write_scene(simulated.scene, tmp_path / "whole.tif").stat().st_size
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for room in (whole // 2, whole - 4096):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
+        try:
+            with pytest.raises(FormatError, match="to its end"):
+                write_scene(simulated.scene, tmp_path / "cut.tif")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.iterdir()] == ["whole.tif"]

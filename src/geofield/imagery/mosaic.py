@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 import rasterio
-import rasterio.shutil
 from numpy.typing import NDArray
 from rasterio.enums import Resampling
 from rasterio.windows import Window
 
 from geofield.imagery.gdal import gdal_env, to_rasterio
 from geofield.imagery.tiling import Block
-from geofield.imagery.write import COG_OPTIONS
+from geofield.imagery.write import write_cog
 
 #: GDAL's block cache, megabytes.
 _CACHE_MB = 96
@@ -97,7 +96,7 @@ def stage_to_cog(staged: Path, target: Path, tags: Mapping[str, str]) -> None:
             file.update_tags(**tags)
             # Seven times cheaper here, from plain pixels, than in the COG driver.
             file.build_overviews(_overviews(max(file.shape)), Resampling.average)
-        rasterio.shutil.copy(str(staged), str(target), **COG_OPTIONS, NUM_THREADS="ALL_CPUS")
+        write_cog(str(staged), target, NUM_THREADS="ALL_CPUS")
 
 
 def _overviews(side_px: int) -> list[int]:

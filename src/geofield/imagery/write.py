@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import rasterio.shutil
+from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp
 from rasterio.errors import RasterioError
 from rasterio.io import MemoryFile
+from rasterio.windows import Window
 
 from geofield.errors import FormatError
 from geofield.imagery.gdal import gdal_env, to_rasterio
@@ -92,8 +94,29 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
                     staged.write_mask(np.where(scene.valid, 255, 0).astype(np.uint8))
                 staged.update_tags(**tags_of(scene))
             with memory.open() as staged:
-                rasterio.shutil.copy(staged, str(temporary), **COG_OPTIONS)
+                write_cog(staged, temporary)
     return Path(path)
+
+
+def write_cog(source: Any, target: Path, **options: Any) -> None:
+    """Write a dataset of rasterio, or a file, as a COG, and see that all of it is there.
+
+    Raises
+    ------
+    FormatError
+        Also where a full disk cut it off, of which GDAL alone does not tell.
+    """
+    try:
+        rasterio.shutil.copy(source, str(target), **COG_OPTIONS, **options)
+        with rasterio.open(target) as written:
+            # Its last block ends the file.
+            last = Window(written.width - 1, written.height - 1, 1, 1)
+            written.read(window=last)
+            written.read_masks(window=last)
+    except (CPLE_BaseError, RasterioError) as error:
+        raise FormatError(
+            f"{target.name} cannot be written to its end.", hint="Check the free space on the disk."
+        ) from error
 
 
 @contextmanager
