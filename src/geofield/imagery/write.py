@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import rasterio.shutil
-from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp
 from rasterio.errors import RasterioError
 from rasterio.io import MemoryFile
@@ -113,7 +112,10 @@ def write_cog(source: Any, target: Path, **options: Any) -> None:
             last = Window(written.width - 1, written.height - 1, 1, 1)
             written.read(window=last)
             written.read_masks(window=last)
-    except (CPLE_BaseError, RasterioError) as error:
+    except Exception as error:
+        # GDAL's own errors come through; the class they have in common is not public.
+        if not type(error).__module__.startswith("rasterio"):
+            raise
         raise FormatError(
             f"{target.name} cannot be written to its end.", hint="Check the free space on the disk."
         ) from error
