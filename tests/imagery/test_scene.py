@@ -247,6 +247,21 @@ def test_given_roles_win(tmp_path: Path) -> None:
             read_scene(path, bands=bad)
 
 
+@pytest.mark.parametrize("bands", [4, 5])
+def test_a_mask_beside_colours_hides_though_nothing_names_it(tmp_path: Path, bands: int) -> None:
+    values = ground(bands=bands)
+    values[-1] = 255
+    values[-1, 5:9, 5:9] = 0
+    marked = [R, G, B, *[UNDEFINED] * (bands - 3)]
+    path = write(tmp_path / "x.tif", values, photometric="RGB", ALPHA="NO", interpretation=marked)
+    scene = read_scene(path)
+    assert scene.roles == ("red", "green", "blue", "nir")[: bands - 1]
+    assert (~scene.valid).sum() == 16
+    values[-1] = 0  # an empty band hides nothing
+    nothing = write(tmp_path / "y.tif", values, photometric="RGB", interpretation=marked)
+    assert read_scene(nothing).valid.all()
+
+
 def test_grey_with_alpha(tmp_path: Path) -> None:
     values = ground(bands=2)
     values[1] = 255

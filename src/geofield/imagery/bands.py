@@ -44,8 +44,9 @@ _WORDS = {
     "pan": "grey",
     "panchromatic": "grey",
 }
-#: What the values of a band without a name look like; flat is one value everywhere, as of no mask.
-Look = Literal["picture", "mask", "flat"]
+#: What the values of a band without a name look like; flat is one value everywhere, as of no mask,
+#: empty is 0 everywhere: as a mask it hides the whole picture, which the file has to say itself.
+Look = Literal["picture", "mask", "flat", "empty"]
 _ROLES = ("red", "green", "blue", "nir", "grey", "alpha", "other")
 _SENTINEL_2 = {"b02": "blue", "b03": "green", "b04": "red", "b08": "nir"}
 #: Other satellites have bands 2, 3 and 4, too; those of Sentinel 2 go with band 8.
@@ -104,7 +105,7 @@ def find_roles(
         described = [""] * count
     roles = [_WORDS.get(name, "") for name in interpretation]
     for i, role in enumerate(roles):
-        if role == "alpha" and looks[i] != "mask":
+        if role == "alpha" and looks[i] not in ("mask", "empty"):
             roles[i] = ""
             if not words[i]:
                 notes.append(
@@ -123,17 +124,15 @@ def find_roles(
 
 
 def look_of(values: NDArray[Any]) -> Look:
-    """What a band's values look like: a mask is 0 or one opaque value nearly everywhere.
-
-    A band that is 0 everywhere hides the whole picture; it counts as a mask only when the
-    file says so, hence is reported as one.
-    """
+    """What a band's values look like: a mask is 0 or one opaque value nearly everywhere."""
     if values.dtype.kind == "f":
         values = values[np.isfinite(values)]
     if values.size == 0:
         return "picture"
     top = values.max()
-    if top in (0, *OPAQUE) or (values.dtype.kind in "ui" and top == np.iinfo(values.dtype).max):
+    if top == values.min() == 0:
+        return "empty"
+    if top in OPAQUE or (values.dtype.kind in "ui" and top == np.iinfo(values.dtype).max):
         binary = np.count_nonzero((values == 0) | (values == top))
         if binary >= _MASK_SHARE * values.size:
             return "mask"
@@ -219,8 +218,13 @@ def _is_consistent(roles: Sequence[str]) -> bool:
 
 
 def _complete_colour(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tuple[str, ...]]:
-    """Bands beside red, green and blue: the first that is a picture is near infrared."""
+    """Bands beside red, green and blue: the first that is a picture is near infrared.
+
+    The last of them is a mask when it looks like one.
+    """
     notes: tuple[str, ...] = ()
+    if "alpha" not in roles and not roles[-1] and looks[-1] == "mask":
+        roles[-1] = "alpha"
     for i in [i for i, role in enumerate(roles) if not role]:
         roles[i] = "other"
         if looks[i] == "picture" and "nir" not in roles and len(roles) - ("alpha" in roles) == 4:
@@ -251,7 +255,7 @@ def _from_count(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tup
             f"The first three of {len(pictures)} unnamed bands are taken as red, green, blue; "
             f"{_HOW}.",
         )
-    if len(pictures) == 4 and looks[pictures[3]] == "flat":
+    if len(pictures) == 4 and looks[pictures[3]] in ("flat", "empty"):
         roles[pictures[3]] = "other"
     elif len(pictures) == 4:
         return roles, (f"Four unnamed bands are taken as red, green, blue, near infrared; {_HOW}.",)
