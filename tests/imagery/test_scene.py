@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -260,6 +261,20 @@ def test_a_mask_beside_colours_hides_though_nothing_names_it(tmp_path: Path, ban
     values[-1] = 0  # an empty band hides nothing
     nothing = write(tmp_path / "y.tif", values, photometric="RGB", interpretation=marked)
     assert read_scene(nothing).valid.all()
+
+
+def test_each_band_may_have_a_no_data_value_of_its_own(tmp_path: Path) -> None:
+    values = ground()
+    values[:, 5:9, 5:9] = np.array([0, 255, 0])[:, None, None]
+    path = write(tmp_path / "x.tif", values, photometric="RGB")
+    view = tmp_path / "x.vrt"
+    rasterio.shutil.copy(path, view, driver="VRT")
+    text = view.read_text()
+    for nodata, colour in (("0", "Red"), ("255", "Green"), ("0", "Blue")):
+        named = f"<ColorInterp>{colour}</ColorInterp>"
+        text = text.replace(named, f"<NoDataValue>{nodata}</NoDataValue>{named}")
+    view.write_text(text)
+    assert (~read_scene(view).valid).sum() == 16
 
 
 def test_grey_with_alpha(tmp_path: Path) -> None:

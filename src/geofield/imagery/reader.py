@@ -311,6 +311,7 @@ class SceneReader:
                 indexes, window=window, out_shape=(len(indexes), *shape), resampling=resampling
             )
             valid = np.ones(shape, bool)
+            said = [raster.nodatavals[i] for i in self.roles.shown]
             nearest = {"window": window, "out_shape": shape, "resampling": Resampling.nearest}
             if self.roles.alpha is not None and self.opaque_at is not None:
                 alpha = raster.read(self.roles.alpha + 1, **nearest)
@@ -320,7 +321,10 @@ class SceneReader:
             elif self.has_mask:
                 valid &= raster.read_masks(1, **nearest) > 0
         if self.warped_from is None and self.nodata is not None and not np.isnan(self.nodata):
-            valid &= ~np.all(values == self.nodata, axis=0)
+            said = [self.nodata if each is None else each for each in said]
+            valid &= ~np.all(
+                [band == each for band, each in zip(values, said, strict=True)], axis=0
+            )
         if values.dtype.kind == "f":
             valid &= np.all(np.isfinite(values), axis=0)
         if self.negative and 0 in self.roles.shown:
