@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 #: Side of the first window where nobody asked for one, ground metres.
 WINDOW_M = 400.0
 _BLANK = (
-    "A part of the picture is pure black and counts as ground: is the file damaged, or does the "
-    "picture end there? `gdal_edit.py -a_nodata 0 PICTURE` says that nothing is seen there."
+    "A part of the picture is pure {} and counts as ground: is the file damaged, or does the "
+    "picture end there? `gdal_edit.py -a_nodata {} PICTURE` says that nothing is seen there."
 )
 #: Ground shown around an outline.
 _AROUND_M = 25.0
@@ -84,10 +84,11 @@ def tell_guesses(scene: Scene, *, after: Scene | None = None) -> None:
 
 
 def _guesses(scene: Scene) -> tuple[str, ...]:
-    from geofield.imagery.fill import has_blank
+    from geofield.imagery.fill import blank_value
 
-    blank = scene.scaling is None and has_blank(scene.bands, scene.valid)
-    return (*scene.guesses, *([_BLANK] if blank else ()))
+    value = None if scene.scaling else blank_value(scene.bands, scene.valid)
+    told = () if value is None else (_BLANK.format("white" if value else "black", value),)
+    return (*scene.guesses, *told)
 
 
 def _read(

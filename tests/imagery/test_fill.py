@@ -13,6 +13,7 @@ from affine import Affine
 
 from geofield import plan_field
 from geofield.imagery import SceneReader, read_scene
+from geofield.imagery.fill import blank_value
 
 from .pictures import EAST, NORTH, ground, write
 
@@ -96,6 +97,16 @@ def test_ground_is_not_taken_for_a_fill(tmp_path: Path) -> None:
     black = ground()
     black[:, :12] = 0  # bytes are not scaled, and stay as they are
     assert read_scene(write(tmp_path / "b.tif", black, photometric="RGB")).valid.all()
+
+
+def test_blank_is_a_black_square_anywhere_or_a_white_one_at_a_side() -> None:
+    picture, valid = ground(rows=160, columns=160), np.ones((160, 160), bool)
+    assert blank_value(picture, valid) is None
+    for value, top, told in ((0, 64, 0), (0, 0, 0), (255, 64, None), (255, 0, 255)):
+        bands = picture.copy()
+        bands[:, top : top + 40, 60:130] = value
+        assert blank_value(bands, valid) == told
+        assert blank_value(bands, valid & (bands != value).any(axis=0)) is None
 
 
 def test_pure_black_that_no_tag_explains_is_told(tmp_path: Path, sample: Path) -> None:

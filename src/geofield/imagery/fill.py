@@ -2,7 +2,7 @@
 
 Such a fill lies far from all values of the ground. Taken for ground it becomes one end of the
 scaling, and what grows on the field one shade of grey. Pictures of 8 bits are not scaled: their
-black or white stays as it is, and a large piece of pure black is told.
+black or white stays as it is, and a large piece of it is told.
 """
 
 from __future__ import annotations
@@ -26,16 +26,25 @@ _MOST_NEAR = 0.05
 #: The picture is looked at in so many small windows each way, or as an overview of this side.
 _WINDOWS, _WINDOW_PX, _OVERVIEW_PX = 5, 128, 512
 
-#: Shadows are not black over all of a square of this side.
-_BLACK_PX = 32
+#: Shadows are not black, nor roofs at the picture's sides white, over all of a square of this side.
+_BLANK_PX = 32
 
 
-def has_blank(bands: NDArray[np.uint8], valid: NDArray[np.bool_]) -> bool:
-    """Whether a picture of 8 bits has a square of nothing but zeros that counts as ground."""
-    zero = valid & ~bands.any(axis=0)
-    rows, columns = (side // _BLACK_PX for side in zero.shape)
-    whole = zero[: rows * _BLACK_PX, : columns * _BLACK_PX]
-    return bool(whole.reshape(rows, _BLACK_PX, columns, _BLACK_PX).all(axis=(1, 3)).any())
+def blank_value(bands: NDArray[np.uint8], valid: NDArray[np.bool_]) -> int | None:
+    """What a square of a picture of 8 bits that counts as ground holds alone: 0, 255 or neither.
+
+    White ones count at the picture's sides: within it they are roofs and plastic sheets.
+    """
+    rows, columns = (side // _BLANK_PX for side in valid.shape)
+    for value in (0, 255):
+        same = valid & (bands == value).all(axis=0)
+        whole = same[: rows * _BLANK_PX, : columns * _BLANK_PX]
+        squares = whole.reshape(rows, _BLANK_PX, columns, _BLANK_PX).all(axis=(1, 3))
+        if value:
+            squares[1:-1, 1:-1] = False
+        if squares.any():
+            return value
+    return None
 
 
 def undeclared_fill(
