@@ -259,6 +259,19 @@ def test_a_plan_that_was_deleted_or_broken_is_told_and_edits_stay(
     assert again.brought_back == "2 edits of a session that ended without saving were brought back."
 
 
+def test_no_session_is_ended_from_the_page_whose_edits_lie_nowhere(
+    visitor: Visitor, plan_path: Path
+) -> None:
+    plan_path.with_name("field.gpkg.review.jsonl").mkdir()  # takes no notes, as a full disk
+    visitor.post("/api/take", {})
+    edit = {"do": "status", "no": 3, "status": "rejected"}
+    assert visitor.post("/api/edit", edit)[1]["unnoted"]
+    status, answer = visitor.post("/api/stop", {})
+    assert (status, "would be lost" in answer["message"]) == (422, True)
+    assert visitor.post("/api/save", {"name": "mine"})[0] == 200
+    assert visitor.post("/api/stop", {}) == (200, {"stopped": True})
+
+
 def test_what_nobody_foresaw_is_told_in_words(
     visitor: Visitor, monkeypatch: pytest.MonkeyPatch
 ) -> None:

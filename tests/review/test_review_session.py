@@ -463,6 +463,16 @@ def test_notes_that_are_gone_are_written_again(plan_path: Path) -> None:
     assert [row(plan, no)["status"] for no in (3, 4, 5)] == ["rejected"] * 3
 
 
+def test_notes_follow_a_plan_that_was_renamed(plan_path: Path) -> None:
+    Desk(plan_path).edit({"do": "status", "no": 3, "status": "rejected"})
+    # Killed here. Notes of a plan that is still there are its own.
+    copy = shutil.copy(plan_path, plan_path.with_name("Kopie.gpkg"))
+    assert Desk(Path(copy)).brought_back is None
+    renamed = plan_path.rename(plan_path.with_name("Nord.gpkg"))
+    assert str(Desk(renamed).brought_back).startswith("1 edits")
+    assert not journal_path(plan_path).exists()
+
+
 def test_edits_without_notes_can_be_left_when_they_were_saved_elsewhere(plan_path: Path) -> None:
     first, second = Desk(plan_path), Desk(plan_path)
     second.edit({"do": "status", "no": 4, "status": "rejected"})

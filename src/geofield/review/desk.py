@@ -185,15 +185,23 @@ class Desk:
     def reload(self) -> dict[str, Any]:
         """Read the file again; edits that were not saved are kept beside it."""
         with self.lock:
-            self.journal.flush()
-            if self.journal.refused and self._saved_elsewhere is None:
-                raise FormatError(
-                    f"Edits could not be noted on the disk ({self.journal.refused}) and would be "
-                    "lost.",
-                    hint="Save them, here or under another name (see More).",
-                )
+            self.refuse_loss()
             self._read()
             return self.opening()
+
+    def refuse_loss(self) -> None:
+        """Refuse to leave edits that lie nowhere on the disk.
+
+        Raises
+        ------
+        FormatError
+        """
+        self.journal.flush()
+        if self.journal.refused and self._saved_elsewhere is None:
+            raise FormatError(
+                f"Edits could not be noted on the disk ({self.journal.refused}) and would be lost.",
+                hint="Save them, here or under another name (see More).",
+            )
 
     def export(self, name: str) -> dict[str, Any]:
         """Write the plan as edited in another format, into a folder of its own beside it."""

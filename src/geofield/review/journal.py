@@ -20,7 +20,7 @@ import shapely
 
 from geofield.errors import GeofieldError
 from geofield.plan import Plan, read_plan
-from geofield.review.plans import journal_path
+from geofield.review.plans import SUFFIX, journal_path
 from geofield.review.refit import refit
 from geofield.review.session import Session
 from geofield.staging import log_of
@@ -64,6 +64,7 @@ class Journal:
         #: What was noted on another version of the plan, and what stands behind a damaged line.
         self._elsewhere: list[dict[str, Any]] = []
         self._damaged: Path | None = None
+        self._adopt()
         self._entries = self._read()
 
     @property
@@ -180,6 +181,19 @@ class Journal:
         there = self.path.read_bytes()
         rest = there[len(self._kept) :]
         return there.startswith(self._kept) and (rest == self._rest or b"\n" not in rest)
+
+    def _adopt(self) -> None:
+        """Take the notes that were made on this plan when its file had another name."""
+        if self.path.exists():
+            return
+        for notes in self.path.parent.glob(f"*{SUFFIX}"):
+            if not notes.is_file() or notes.with_name(notes.name.removesuffix(SUFFIX)).exists():
+                continue
+            entries = [_parsed(line) or {} for line in notes.read_bytes().splitlines(keepends=True)]
+            marks = filter(None, (each.get("saved", each.get("plan")) for each in entries))
+            if [None, *marks][-1] == self._plan:
+                notes.rename(self.path)
+                return
 
     def _read(self) -> list[tuple[dict[str, Any], int]]:
         """The entries of an earlier session; none where they are not of this file, or all saved."""

@@ -173,6 +173,7 @@ class _Handler(BaseHTTPRequestHandler):
         if path == "/api/take":
             return {"yours": shelf.take(tab, force=bool(value.get("force")))}
         if path == "/api/stop":
+            shelf.refuse_loss()
             self.server.stop()
             return {"stopped": True}
         shelf.refuse_others(tab)

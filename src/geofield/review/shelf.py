@@ -57,6 +57,16 @@ class Shelf:
         ended = [desk.end() for desk in self._desks.values()]
         return [words for words in ended if words is not None]
 
+    def refuse_loss(self) -> None:
+        """Refuse to end while edits lie nowhere on the disk.
+
+        Raises
+        ------
+        FormatError
+        """
+        for desk in self._desks.values():
+            desk.refuse_loss()
+
     @property
     def lost(self) -> bool:
         """Whether edits were neither saved nor noted when the session ended."""
