@@ -19,6 +19,7 @@ from axe_core_python.selenium import Axe
 from browser import Page, chromium, served
 from selenium import webdriver
 from selenium.common.exceptions import NoAlertPresentException
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from shapely import Polygon
@@ -291,6 +292,25 @@ def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
         "done(sources.obstacles.getFeatureById(8).getGeometry().getExtent()));"
     )
     assert (shown[0] + shown[2]) / 2 == pytest.approx(x, abs=0.1)
+
+
+def test_a_key_in_the_middle_of_a_drag_moves_no_other_obstacle(page: Page) -> None:
+    """The verdict goes on to the next obstacle, which was moved by the hand that let go."""
+    before = page.state()["obstacles"]
+    page.click(*page.obstacle(8)["centre"])
+    column, line = page.pixel(*page.obstacle(8)["centre"])
+    hand = ActionChains(page.driver, duration=30)
+    pointer = hand.w3c_actions.pointer_action
+    pointer.move_to_location(column, line)
+    pointer.pointer_down()
+    pointer.move_to_location(column + 30, line + 5)
+    hand.perform()
+    page.press("c")
+    page.wait(lambda: page.judged() == 1)
+    ActionChains(page.driver).release().perform()
+    page.wait(lambda: page.obstacle(8)["centre"] != before[7]["centre"])
+    after = page.state()["obstacles"]
+    assert [one["no"] for one, old in zip(after, before, strict=True) if one != old] == [8]
 
 
 def test_edits_come_back_after_the_server_is_killed(

@@ -158,10 +158,12 @@ function mover() {
     layers: layer => layer.getSource() === maps.sources.obstacles,
     hitTolerance: reach,
   });
-  let from = null;
-  const command = event => ({do: "move", no: desk.chosen(), dx_m: at(event.coordinate)[0] - from[0], dy_m: at(event.coordinate)[1] - from[1]});
+  // What the hand took is moved, whatever a key makes the chosen one meanwhile.
+  let from = null, no = null;
+  const command = event => ({do: "move", no, dx_m: at(event.coordinate)[0] - from[0], dy_m: at(event.coordinate)[1] - from[1]});
   translate.on("translatestart", event => {
     from = at(event.startCoordinate ?? event.coordinate);
+    no = desk.chosen();
     maps.sources.handle.clear();
   });
   translate.on("translating", event => live(command(event)));
@@ -177,13 +179,15 @@ function resizer() {
   const translate = new ol.interaction.Translate({
     layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: reach,
   });
+  let row = null;
   const command = event => {
-    const row = desk.row(desk.chosen()), [x, y] = row.centre;
+    const [x, y] = row.centre;
     const away = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
     return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((away * desk.scale() - row.buffer_m) * 1000) / 1000)};
   };
+  translate.on("translatestart", () => { row = desk.row(desk.chosen()); });
   translate.on("translating", event => {
-    const row = desk.row(desk.chosen()), wanted = command(event);
+    const wanted = command(event);
     maps.sources.obstacles.getFeatureById(row.no)?.setGeometry(
       ol.geom.Polygon.fromCircle(new ol.geom.Circle(row.centre, wanted.radius_m + row.buffer_m), 64));
     live(wanted);
