@@ -19,6 +19,7 @@ from formats_plan import NAME, UTM, X0, Y0, make_dataset
 from pyproj import CRS, Transformer
 
 from geofield import theme
+from geofield.errors import GeofieldError
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Provenance
 from geofield_command import run_geofield as geofield
@@ -326,3 +327,19 @@ def test_an_exported_plan_that_a_person_edited_stays_as_the_earlier_one(plan_fil
     done = geofield("undo", copy)
     assert done.returncode == 0, done.stderr
     assert (gpd.read_file(copy, layer="obstacles")["note"] == "a well").all()
+
+
+@pytest.mark.parametrize("name", ["dxf", "shapefile", "gpx", "geojson", "flatgeobuf"])
+def test_a_file_that_found_no_room_is_told(tmp_path, name):
+    """A DXF lost all its lines without a word; a Shapefile ended in a traceback."""
+    resource = pytest.importorskip("resource")
+    whole = write_dataset(make_dataset(), tmp_path / "whole", [name])
+    room = max(path.stat().st_size for path in whole) * 3 // 4
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
+    try:
+        with pytest.raises((GeofieldError, OSError)):
+            write_dataset(make_dataset(), tmp_path / "cut", [name])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not any(path.is_file() for path in (tmp_path / "cut").rglob("*"))

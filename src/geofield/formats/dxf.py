@@ -12,7 +12,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.errors import FormatError
-from geofield.formats.arrow import exact_geometry, gdal_config
+from geofield.formats.arrow import disk_hint, exact_geometry, gdal_config
 from geofield.formats.avoided import avoided
 from geofield.model import Dataset
 
@@ -45,8 +45,13 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     try:
         with gdal_config(DXF_WRITE_HATCH="NO"):
             pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
+        written = pyogrio.read_info(path, force_feature_count=True)["features"]
     except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
-        raise FormatError(f"{path.name} could not be written: {error}.") from error
+        raise FormatError(
+            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
+        ) from error
+    if written < len(frame):  # on a full disk, of which GDAL does not tell
+        raise FormatError(f"{path.name} could not be written whole.", hint=disk_hint(path))
     beside = path.with_suffix(".prj")
     beside.write_text(dataset.crs.to_wkt("WKT1_ESRI") + "\n", encoding="utf-8")
     return [path, beside]

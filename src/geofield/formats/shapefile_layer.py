@@ -195,6 +195,7 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
     `day` (ISO 8601) is that of the last change.
     """
     import fiona
+    from fiona._err import CPLE_BaseError
     from fiona.errors import FionaError
 
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -218,7 +219,7 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
                 {"geometry": mapping(shape), "properties": dict(zip(types, row, strict=True))}
                 for shape, row in zip(layer.shapes, rows, strict=True)
             )
-    except (FionaError, RuntimeError, ValueError) as error:
+    except (CPLE_BaseError, FionaError, RuntimeError, ValueError) as error:
         raise FormatError(
             f"{file.name} could not be written: {error}.", hint=disk_hint(file)
         ) from error
