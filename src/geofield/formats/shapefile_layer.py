@@ -195,8 +195,6 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
     `day` (ISO 8601) is that of the last change.
     """
     import fiona
-    from fiona._err import CPLE_BaseError
-    from fiona.errors import FionaError
 
     place.parent.mkdir(parents=True, exist_ok=True)
     types = {
@@ -219,7 +217,11 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
                 {"geometry": mapping(shape), "properties": dict(zip(types, row, strict=True))}
                 for shape, row in zip(layer.shapes, rows, strict=True)
             )
-    except (CPLE_BaseError, FionaError, RuntimeError, ValueError) as error:
+    except Exception as error:
+        # GDAL's own errors come through; the class they have in common is not public.
+        known = isinstance(error, (RuntimeError, ValueError))
+        if not known and not type(error).__module__.startswith("fiona"):
+            raise
         raise FormatError(
             f"{file.name} could not be written: {error}.", hint=disk_hint(file)
         ) from error
