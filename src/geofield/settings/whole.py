@@ -36,9 +36,9 @@ class Settings(Section):
     export: ExportSettings = ExportSettings()
 
     # What follows from a machine stands in `tracks`, under its name.
-    machines: dict[str, Machine] = Field({}, exclude=True, repr=False)
+    machines: dict[str, Machine] = Field(default={}, exclude=True, repr=False)
     # Keys live here: never written into a product.
-    fetch: FetchSettings = Field(FetchSettings(), exclude=True, repr=False)
+    fetch: FetchSettings = Field(default=FetchSettings(), exclude=True, repr=False)
 
     @model_validator(mode="wrap")
     @classmethod
