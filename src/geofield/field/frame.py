@@ -20,6 +20,9 @@ from geofield.model import Scene
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 
+#: How far the end of data is straightened, pixels.
+_SMOOTH_PX = 3.0
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -54,7 +57,11 @@ class Frame:
         seed = shapely.Point(seed_px[0] * factor, seed_px[1] * factor)
         around = parts[int(np.argmin(shapely.distance(parts, seed)))]
         reduced = scale(around, 1 / factor, 1 / factor, origin=(0, 0))
-        return cls((rows, columns), cast(Polygon, reduced.simplify(max(times, 1.0))))
+        # Outwards, where pixels repeat the ground: a ragged end is no crooked border.
+        smooth_px = max(_SMOOTH_PX, times)
+        smooth = reduced.buffer(smooth_px).simplify(smooth_px)
+        within = shapely.get_parts(smooth.intersection(shapely.box(0, 0, columns, rows)))
+        return cls((rows, columns), cast(Polygon, max(within, key=lambda part: part.area)))
 
     @cached_property
     def inside(self) -> BoolArray | None:
