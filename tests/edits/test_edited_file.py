@@ -275,6 +275,27 @@ def test_no_machine_is_steered_through_an_obstacle_drawn_since(folder: Path) -> 
     geofield("refresh", file)
 
 
+def test_what_stands_where_machines_turn_is_told(tmp_path: Path) -> None:
+    field = shapely.box(500000, 5600000, 500200, 5600100)
+    parcel, file = tmp_path / "parcel.gpkg", tmp_path / "plan.gpkg"
+    gpd.GeoDataFrame(geometry=[field], crs=32633).to_file(parcel)
+    turning = ("--headland", 12, "--route", "boustrophedon", "--turning-radius", 3)
+    geofield("tracks", parcel, "--spacing", 6, *turning, "-o", file)
+    rock = gpd.GeoDataFrame(geometry=[shapely.box(499999, 5600030, 500010, 5600060)], crs=32633)
+    pyogrio.write_dataframe(rock, file, layer="obstacles", append=True)
+    export = ("export", file, "-f", "geojson,isoxml", "--out", tmp_path / "x", "--overwrite")
+    # None of it goes to a terminal, so that nothing is refused.
+    told = geofield(*export)
+    assert "headland passes 1, 2 run through obstacle 1 and turns " in told
+    found = run_geofield("validate", file).stderr
+    assert "headland pass 2, segment 1: runs through" in found
+    assert re.search(r"turn \d+: runs through", found)
+    # A pass that was drawn has no number.
+    drawn = gpd.GeoDataFrame(geometry=[shapely.LineString([(499900, 5600000), (500100, 5600050)])])
+    pyogrio.write_dataframe(drawn.set_crs(32633), file, layer="headland_tracks", append=True)
+    assert "headland pass that was drawn runs out of the field" in geofield(*export)
+
+
 def test_columns_of_ones_own_keep_their_types_and_values(folder: Path) -> None:
     """Of all that an editor can add; most cells stay empty."""
     file = folder / "out/field.gpkg"

@@ -20,33 +20,39 @@ from geofield.model.tracks import Tracks
 _HAIR_M = 0.05
 #: The same for what is hardly wider than two of these, as a fence is; more than formats round to.
 _THIN_HAIR_M = 0.02
+#: What is driven, by layer: the column with its number, one of it, several.
+DRIVEN = {
+    "segments": ("track_no", "track", "tracks"),
+    "headland_tracks": ("pass_no", "headland pass", "headland passes"),
+    "turns": ("turn_no", "turn", "turns"),
+}
 #: So many tracks or obstacles are named.
 _MOST = 5
 
 
-def driven_through(dataset: Dataset) -> list[tuple[int, str]]:
-    """Each segment (its row) that runs through an obstacle to be avoided, with its name."""
-    obstacles, segments = dataset.table("obstacles"), dataset.table("segments")
-    if not len(obstacles) or not len(segments):
+def driven_through(dataset: Dataset, layer: str = "segments") -> list[tuple[int, str]]:
+    """Each line of a layer (its row) that runs through an obstacle to be avoided, with its name."""
+    obstacles, lines = dataset.table("obstacles"), dataset.table(layer)
+    if not len(obstacles) or not len(lines):
         return []
     kept = active(obstacles)
     shapes = np.asarray(kept.geometry.to_numpy(), dtype=object)
     inside = shapely.buffer(shapes, -_HAIR_M)
     thin = shapely.is_empty(inside)
     inside[thin] = shapely.buffer(shapes[thin], -_THIN_HAIR_M)
-    tree = shapely.STRtree(segments.geometry.to_numpy())
+    tree = shapely.STRtree(lines.geometry.to_numpy())
     hit, where = tree.query(inside, predicate="intersects")
     numbers = kept["obstacle_no"].tolist()
     return [(int(row), _obstacle(numbers[at])) for at, row in zip(hit, where, strict=True)]
 
 
-def leaving(dataset: Dataset) -> NDArray[np.int64]:
-    """The segments (their rows) that leave the field."""
-    field, segments = dataset.table("field"), dataset.table("segments")
-    if len(field) != 1 or not len(segments):
+def leaving(dataset: Dataset, layer: str = "segments") -> NDArray[np.int64]:
+    """The lines of a layer (their rows) that leave the field."""
+    field, lines = dataset.table("field"), dataset.table(layer)
+    if len(field) != 1 or not len(lines):
         return np.empty(0, np.int64)
     outline = shapely.buffer(field.geometry.iloc[0], _HAIR_M)
-    return np.flatnonzero(~shapely.covered_by(segments.geometry.to_numpy(), outline))
+    return np.flatnonzero(~shapely.covered_by(lines.geometry.to_numpy(), outline))
 
 
 def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
@@ -58,41 +64,55 @@ def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
         Where `refuse` is true: a machine would follow them.
     """
     for each in datasets:
-        blocked = _blocked(each) if "tracks" in each.provenance.evidence else ""
+        if "tracks" not in each.provenance.evidence:
+            continue
+        blocked = _blocked(each)
         if blocked and refuse:
             raise TrackError(
-                f"{each.name}: {blocked}.",
+                f"{each.name}: {' and '.join(blocked)}.",
                 hint="Machines follow these lines. Plan the tracks again (`geofield tracks "
                 "PLAN.gpkg -o PLAN.gpkg`), then write this anew.",
             )
+        # No terminal is given these: they are told, and refuse nothing.
+        blocked += _in_the_way(each, "headland_tracks") + _in_the_way(each, "turns")
         if blocked:
             warnings.warn(
-                f"{each.name}: {blocked}: plan the tracks again (`geofield tracks`).",
+                f"{each.name}: {' and '.join(blocked)}: plan the tracks again (`geofield tracks`).",
                 TrackWarning,
                 stacklevel=3,
             )
 
 
-def _blocked(dataset: Dataset) -> str:
-    """What is wrong with the tracks of a plan, in words; empty where nothing is."""
+def _blocked(dataset: Dataset) -> list[str]:
+    """What is wrong with the tracks of a plan, in words."""
     evidence = dataset.provenance.evidence
     words = []
     if Tracks.lie_in(dataset.tables, evidence):
         emptied = Tracks.from_tables(dataset.tables, evidence["tracks"]).emptied
         words = [f"its layer `{name}` was emptied" for name in emptied]
-    through, outside = driven_through(dataset), leaving(dataset)
+    return words + _in_the_way(dataset, "segments")
+
+
+def _in_the_way(dataset: Dataset, layer: str) -> list[str]:
+    """Which lines of a layer run where they must not, in words; turns may leave the field."""
+    words = []
+    through = driven_through(dataset, layer)
+    outside = leaving(dataset, layer).tolist() if layer != "turns" else []
     if through:
         named = _listed(name for _, name in through)
-        words += [f"{_tracks(dataset, [row for row, _ in through])} through {named}"]
-    if len(outside):
-        words += [f"{_tracks(dataset, outside.tolist())} out of the field"]
-    return " and ".join(words)
+        words += [f"{_lines(dataset, layer, [row for row, _ in through])} through {named}"]
+    if outside:
+        words += [f"{_lines(dataset, layer, outside)} out of the field"]
+    return words
 
 
-def _tracks(dataset: Dataset, rows: Sequence[int]) -> str:
-    numbers = sorted({int(no) for no in dataset.table("segments")["track_no"].iloc[list(rows)]})
+def _lines(dataset: Dataset, layer: str, rows: Sequence[int]) -> str:
+    number, one, several = DRIVEN[layer]
+    numbers = sorted({int(no) for no in dataset.table(layer)[number].iloc[list(rows)].dropna()})
+    if not numbers:
+        return f"a {one} that was drawn runs"
     many = len(numbers) > 1
-    return f"track{'s' * many} {_listed(map(str, numbers))} run{'s' * (not many)}"
+    return f"{several if many else one} {_listed(map(str, numbers))} run{'s' * (not many)}"
 
 
 def _listed(words: Iterable[str]) -> str:

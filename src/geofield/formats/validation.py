@@ -21,7 +21,7 @@ from geofield.errors import (
     GeofieldError,
     SeveralFieldsError,
 )
-from geofield.formats.clear_way import driven_through, leaving
+from geofield.formats.clear_way import DRIVEN, driven_through, leaving
 from geofield.formats.format import Format
 from geofield.formats.importing import read_dataset
 from geofield.formats.many import apart
@@ -238,14 +238,16 @@ def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
             warnings.simplefilter("ignore", FormatWarning)  # sizes are found already
             areas = widened(dataset.table(schema.OBSTACLES.name))
         dataset = replace(dataset, tables={**dataset.tables, schema.OBSTACLES.name: areas})
-    segments = dataset.table("segments")
-    for segment, obstacle in driven_through(dataset)[:5]:
-        row = segments.iloc[segment]
-        yield Finding(
-            "error",
-            f"segments, track {row['track_no']}, segment {row['segment_no']}",
-            f"runs through {obstacle}: plan the tracks again (geofield tracks)",
-        )
+    for layer, (number, one, _) in DRIVEN.items():
+        lines = dataset.table(layer)
+        for line, obstacle in driven_through(dataset, layer)[:5]:
+            row = lines.iloc[line]
+            segment = f", segment {row['segment_no']}" if "segment_no" in lines else ""
+            yield Finding(
+                "error",
+                f"{layer}, {one} {row[number]}{segment}",
+                f"runs through {obstacle}: plan the tracks again (geofield tracks)",
+            )
 
 
 def _check_searched(dataset: Dataset) -> Iterator[Finding]:
@@ -259,13 +261,14 @@ def _check_searched(dataset: Dataset) -> Iterator[Finding]:
 
 
 def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
-    outside = leaving(dataset)
-    if len(outside):
-        yield Finding(
-            "error",
-            "segments",
-            f"{len(outside)} leave the field: plan the tracks again (geofield tracks)",
-        )
+    for layer in ("segments", "headland_tracks"):
+        outside = leaving(dataset, layer)
+        if len(outside):
+            yield Finding(
+                "error",
+                layer,
+                f"{len(outside)} leave the field: plan the tracks again (geofield tracks)",
+            )
     segments = dataset.table("segments")
     tracks = dataset.table("tracks")
     if not len(tracks) or not len(segments):
