@@ -16,9 +16,10 @@ from geofield.errors import (
     ObstacleError,
     ObstacleWarning,
     TrackWarning,
+    refuse_other,
 )
 from geofield.model.evidence import Evidence, outline_digest
-from geofield.model.field import Field
+from geofield.model.field import MAKE_ONE, Field
 from geofield.model.own_values import empty_columns
 from geofield.model.review import reconcile
 from geofield.model.track_edits import TrackEdits
@@ -163,6 +164,8 @@ def known_outline(
     boundary: Field | None, previous: Plan | None, lat: float, lon: float
 ) -> Field | None:
     """The outline that is there before a picture is looked at: a person's own, or a parcel."""
+    refuse_other(boundary, Field | None, "boundary", MAKE_ONE, FieldError)
+    refuse_other(previous, Plan | None, "previous", "Read it: gf.read_plan(path).")
     if previous is None or not holds(previous, lat=lat, lon=lon):
         return boundary
     stands = keeps_outline(previous) if boundary is None else drew_outline(previous)

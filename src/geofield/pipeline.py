@@ -34,16 +34,9 @@ from geofield.earlier import (
     with_points,
     with_said_tracks,
 )
-from geofield.errors import (
-    FieldError,
-    FieldWarning,
-    GeofieldError,
-    ImageryWarning,
-    TrackError,
-    refuse_other,
-)
+from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarning, TrackError
 from geofield.model.evidence import Evidence, outline_digest
-from geofield.model.field import MAKE_ONE, Field
+from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
@@ -122,8 +115,6 @@ def plan_field(
     Plan
     """
     settings = with_values(settings, **by_name)
-    refuse_other(boundary, Field | None, "boundary", MAKE_ONE, FieldError)
-    refuse_other(previous, Plan | None, "previous", "Read it: gf.read_plan(path).")
     tell = progress or (lambda done, total, what: None)
     timings = timings_s if timings_s is not None else {}
     with _timed("picture", timings, tell):
