@@ -13,10 +13,9 @@ from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
-from geofield.cli.many_tracks import obstacles_for
 from geofield.cli.options import acknowledge_option, stage_options, tell_idle
 from geofield.cli.place_options import place_options, places_of
-from geofield.cli.standing import tell_obstacles, tell_unreached
+from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
 
 if TYPE_CHECKING:

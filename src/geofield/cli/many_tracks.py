@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geofield.cli.console import progress_bar, say, say_note
+from geofield.cli.console import progress_bar, say_note
 from geofield.cli.standing import tell_unreached
 
 if TYPE_CHECKING:
@@ -58,23 +58,6 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     for note in places.notes:
         say_note(note)
     return places
-
-
-def obstacles_for(
-    places: Places | None, given: Path | None, *, imagery: str | None = None
-) -> Path | None:
-    """The file of what stands in fields: the one given, or else that of the places themselves.
-
-    Those of a plan, or of several in one GeoPackage, unless a picture shows what stands there.
-    """
-    from geofield.farm.standing import own_obstacles
-
-    if places is None or given is not None or imagery is not None:
-        return given
-    own = own_obstacles(Path(places.path))
-    if own is not None:
-        say(f"Obstacles  those of {own.name}")
-    return own
 
 
 def tell_spacing(places: Places | None, settings: Settings) -> None:

@@ -1,15 +1,34 @@
-"""What there is to tell of a file of obstacles: what of it is not avoided, or not as it is."""
+"""The file of obstacles: which it is, and what of it is not avoided, or not as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geofield.cli.console import say_note
+from geofield.cli.console import say, say_note
 
 if TYPE_CHECKING:
+    from geofield.farm.places import Places
     from geofield.farm.standing import Shapes
     from geofield.farm.work import Job
+
+
+def obstacles_for(
+    places: Places | None, given: Path | None, *, imagery: str | None = None
+) -> Path | None:
+    """The file of what stands in fields: the one given, or else that of the places themselves.
+
+    Those of a plan, or of several in one GeoPackage, unless a picture shows what stands there.
+    """
+    from geofield.farm.standing import own_obstacles
+
+    if places is None or given is not None or imagery is not None:
+        return given
+    own = own_obstacles(Path(places.path))
+    if own is not None:
+        say(f"Obstacles  those of {own.name}")
+    return own
 
 
 def tell_obstacles(job: Job, *, several: bool) -> None:

@@ -26,7 +26,7 @@ from geofield.cli.options import (
     tell_idle,
 )
 from geofield.cli.refresh import say_outdated
-from geofield.cli.standing import tell_obstacles, tell_unreached
+from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
@@ -91,7 +91,6 @@ def tracks(
         Wanted,
         file_name,
         line_of,
-        obstacles_for,
         of_many,
         parcels_in,
         tell_spacing,
