@@ -245,7 +245,7 @@ def test_round_outlines_cost_no_more_than_circles() -> None:
     rng = np.random.default_rng(3)
     xy = rng.uniform((500020, 5600010), (500180, 5600090), (40, 2))
     circles = gpd.GeoDataFrame({"radius_m": [5.0] * len(xy)}, geometry=shapely.points(xy), crs=CRS)
-    # 7 times as many lines; 48 times where ways are looked for between all corners.
+    # 6 times as many lines; 186 times where ways are looked for between all corners.
     assert looked_along(circles.buffer(5.0, quad_segs=32)) < 8 * looked_along(circles)
 
 

@@ -142,17 +142,20 @@ def _end_if_known(error: Exception) -> None:
         say_error(f"The disk is full: {place}.", "Free some space, then repeat.")
         sys.exit(1)
     if isinstance(error, OSError) and error.errno in _NOT_OURS:
-        say_error(f"{error.filename}: {error.strerror}.", "Name a file or folder you may use.")
+        place = error.filename or "What was named"
+        say_error(f"{place}: {error.strerror}.", "Name a file or folder you may use.")
         sys.exit(1)
 
 
 def _refuse_bytes(words: list[str]) -> None:
     """Refuse what is no text: no library opens such a file, and no format holds such a name."""
     for word in words:
-        if not word.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in word):
+        try:
+            word.encode()
+        except UnicodeEncodeError:
             raise click.UsageError(
                 f"{os.fsencode(word)!r} is no UTF-8: rename the file, or set LC_ALL=C.UTF-8."
-            )
+            ) from None
 
 
 def _open_streams() -> None:

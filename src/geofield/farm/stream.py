@@ -6,9 +6,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryError, refuse_other
 from geofield.farm.place_reader import read_places
@@ -17,6 +15,9 @@ from geofield.farm.standing import own_obstacles
 from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, told
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Places per worker that wait in the scheduler.
 _AHEAD = 4
@@ -63,6 +64,8 @@ def plan_fields(
     Plan
         With the place's `field_id`, name and columns.
     """
+    import pandas as pd
+
     settings = with_values(settings, **by_name)
     refuse_other(places, pd.DataFrame | str | Path | Places, "places", _MAKE_TABLE, FormatError)
     refuse_other(obstacles, str | Path | None, "obstacles", _WRITE_IT, FormatError)

@@ -124,7 +124,7 @@ def extract_field(
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
         search = search or FieldSearch((lon, lat))
-        search.refuse_other(scene, (lon, lat))
+        search.refuse_another(scene, (lon, lat))
         view = search.view(picture, *(tuple((x, y) for x, y in one) for one in (include, exclude)))
         part, chosen = view.part, {"search": view.search}
     scene, picture = part.of(scene), part.of(picture)
@@ -203,7 +203,7 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     """
     refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
     search, shown = FieldSearch((lon, lat)), _with_data(scene)
-    search.refuse_other(shown, (lon, lat))
+    search.refuse_another(shown, (lon, lat))
     search.view(shown)
     return search
 

@@ -84,7 +84,7 @@ class FieldSearch:
     levels: dict[tuple[Places, Places], int] = field(default_factory=dict)
     picture: tuple[Grid, int] | None = None
 
-    def refuse_other(self, scene: Scene, lonlat: tuple[float, float]) -> None:
+    def refuse_another(self, scene: Scene, lonlat: tuple[float, float]) -> None:
         """Refuse a picture or a point that is not the one of the search.
 
         Raises

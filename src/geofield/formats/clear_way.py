@@ -26,6 +26,8 @@ DRIVEN = {
     "headland_tracks": ("pass_no", "headland pass", "headland passes"),
     "turns": ("turn_no", "turn", "turns"),
 }
+#: Of these, what stays within the field: turns may leave it.
+WITHIN = ("segments", "headland_tracks")
 #: So many tracks or obstacles are named.
 _MOST = 5
 
@@ -94,10 +96,10 @@ def _blocked(dataset: Dataset) -> list[str]:
 
 
 def _in_the_way(dataset: Dataset, layer: str) -> list[str]:
-    """Which lines of a layer run where they must not, in words; turns may leave the field."""
+    """Which lines of a layer run where they must not, in words."""
     words = []
     through = driven_through(dataset, layer)
-    outside = leaving(dataset, layer).tolist() if layer != "turns" else []
+    outside = leaving(dataset, layer).tolist() if layer in WITHIN else []
     if through:
         named = _listed(name for _, name in through)
         words += [f"{_lines(dataset, layer, [row for row, _ in through])} through {named}"]

@@ -21,7 +21,7 @@ from geofield.errors import (
     GeofieldError,
     SeveralFieldsError,
 )
-from geofield.formats.clear_way import DRIVEN, driven_through, leaving
+from geofield.formats.clear_way import DRIVEN, WITHIN, driven_through, leaving
 from geofield.formats.format import Format
 from geofield.formats.importing import read_dataset
 from geofield.formats.many import apart
@@ -261,7 +261,7 @@ def _check_searched(dataset: Dataset) -> Iterator[Finding]:
 
 
 def _check_tracks(dataset: Dataset) -> Iterator[Finding]:
-    for layer in ("segments", "headland_tracks"):
+    for layer in WITHIN:
         outside = leaving(dataset, layer)
         if len(outside):
             yield Finding(

@@ -79,13 +79,13 @@ class TiledPicture:
         return [own * 2.0**level for level in range(levels, -1, -1)]
 
     @cached_property
-    def _whole(self) -> Scene:
-        """What file values become 0 and 255 in: those of every tile do so too."""
-        return self.reader.read(shape_px=self._reduced_px(1024))
+    def _limits(self) -> dict[str, tuple[float, float] | None]:
+        """File values that become 0 and 255 in every tile: those of the whole picture."""
+        whole = self.reader.read(shape_px=self._reduced_px(1024))
+        return {"scaling": whole.scaling, "nir_scaling": whole.nir_scaling}
 
     def _read(self, window: tuple[int, int, int, int] | None, shape_px: tuple[int, int]) -> Scene:
-        scaling, nir_scaling = self._whole.scaling, self._whole.nir_scaling
-        return self.reader.read(window, shape_px=shape_px, scaling=scaling, nir_scaling=nir_scaling)
+        return self.reader.read(window, shape_px=shape_px, **self._limits)
 
     @property
     def has_infrared(self) -> bool:
