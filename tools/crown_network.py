@@ -55,7 +55,7 @@ class CrownNetwork(nn.Module):
         self.head = nn.Conv2d(32, len(OUTPUTS), 1)
         self.stands3, self.stands2, self.stands1 = step(c, b), step(b, a), step(a, 16)
         self.stands = nn.Conv2d(16, 1, 1)
-        self.encoder = Encoder(HANDED_ON, capped=False)
+        self.encoder = Encoder(HANDED_ON)
         self.known = nn.ModuleList(
             nn.Conv2d(taken, given, 1, bias=False)
             for taken, given in zip(self.encoder.channels, WIDTHS, strict=True)

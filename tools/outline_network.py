@@ -1,21 +1,25 @@
 """The network that outlines are learned with, as it is trained.
 
-A U-Net that is told the points, beside an encoder that has seen the pictures of ImageNet, as far
-as a sixteenth of the resolution: 400 outlines are too few to learn from what grounds look like.
+A U-Net that is told the points, beside an encoder that has learned which parts of a picture belong
+together: 400 outlines are too few to learn that from.
 """
 
 from __future__ import annotations
 
 import torch
-from pretrained import Encoder
+from tiny_vit import WIDTHS as KNOWN
+from tiny_vit import Mlp, TinyViT, attended
 from torch import Tensor, nn
 from torch.nn import functional
 
-#: After which of the encoder's blocks a quarter, an eighth and a sixteenth of the resolution is
-#: handed on, and the channels that are taken of each.
-HANDED_ON, REDUCED = (2, 4, 10), (24, 32, 64)
+#: Sides of the encoder's windows; of a picture of 256 px they leave no rest.
+WINDOWS = (0, 8, 16, 8)
+#: The channels that are taken of each stage of the encoder.
+REDUCED = (24, 32, 64, 96)
 #: Channels of the U-Net at each depth; so many of the upper ones compare with the points.
-WIDTHS, COMPARED = (32, 48, 72, 96), 2
+WIDTHS, COMPARED = (32, 48, 96, 128), 2
+#: The depth at which every place asks every other, its side, and by how many heads.
+EVERYWHERE, EVERYWHERE_SIDE, HEADS = 2, 16, 4
 
 
 class Block(nn.Module):
@@ -37,6 +41,30 @@ class Block(nn.Module):
         return self.layers(x)
 
 
+class Everywhere(nn.Module):
+    """Every place asks every other; it begins as the identity."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.each = width // HEADS
+        self.where = nn.Parameter(torch.zeros(1, EVERYWHERE_SIDE**2, width))
+        self.norm = nn.LayerNorm(width)
+        self.qkv, self.proj = nn.Linear(width, 3 * width), nn.Linear(width, width)
+        self.mlp = Mlp(width, 2)
+        nn.init.zeros_(self.proj.weight)
+        nn.init.zeros_(self.mlp.fc2.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Apply."""
+        n, width, rows, columns = x.shape
+        y = x.flatten(2).transpose(1, 2)
+        asked = self.qkv(self.norm(y) + self.where).view(n, -1, HEADS, 3 * self.each)
+        z = attended(asked.transpose(1, 2).split(self.each, 3), None, self.training)
+        y = y + self.proj(z.transpose(1, 2).reshape(n, -1, width))
+        y = y + self.mlp(y)
+        return y.transpose(1, 2).reshape(n, width, rows, columns)
+
+
 class OutlineNet(nn.Module):
     """A U-Net that is told the points, and compares every place with them.
 
@@ -46,9 +74,9 @@ class OutlineNet(nn.Module):
 
     def __init__(self, bands: int, points: int) -> None:
         super().__init__()
-        self.encoder = Encoder(HANDED_ON)
+        self.encoder = TinyViT(bands, WINDOWS)
         self.reduced = nn.ModuleList()
-        for channels, width in zip(self.encoder.channels, REDUCED, strict=True):
+        for channels, width in zip(KNOWN, REDUCED, strict=True):
             narrow = nn.Conv2d(channels, width, 1, bias=False)
             self.reduced.append(nn.Sequential(narrow, nn.BatchNorm2d(width), nn.ReLU()))
         self.stem = nn.Sequential(
@@ -60,11 +88,13 @@ class OutlineNet(nn.Module):
             nn.ReLU(),
         )
         taken = 24 + 2 * bands + points
+        extra = (REDUCED[0], REDUCED[1], REDUCED[2] + REDUCED[3], 0)
         self.down = nn.ModuleList()
         for at, width in enumerate(WIDTHS):
-            extra = 2 * REDUCED[at] if at < len(REDUCED) else 0
-            self.down.append(Block(taken + extra, width))
+            self.down.append(Block(taken + 2 * extra[at], width))
             taken = 2 * width if at < COMPARED else width
+        asking = (Everywhere(WIDTHS[EVERYWHERE]), Everywhere(WIDTHS[EVERYWHERE]))
+        self.everywhere = nn.Sequential(*asking)
         self.up = nn.ModuleList()
         for at in reversed(range(len(WIDTHS) - 1)):
             skip = 2 * WIDTHS[at] if at < COMPARED else WIDTHS[at]
@@ -74,7 +104,8 @@ class OutlineNet(nn.Module):
 
     def forward(self, bands: Tensor, points: Tensor) -> Tensor:
         """Log odds of belonging, at a quarter of the resolution."""
-        seen = self.encoder(bands[:, :3])
+        seen = [to(one) for to, one in zip(self.reduced, self.encoder(bands), strict=True)]
+        known = [seen[0], seen[1], torch.cat(seen[2:], 1)]
         quarter = functional.avg_pool2d(bands, 4)
         at_points = points[:, :1]
         x = torch.cat([self.stem(bands), quarter, unlike(quarter, at_points), points], 1)
@@ -83,10 +114,11 @@ class OutlineNet(nn.Module):
             if at:
                 x = functional.max_pool2d(x, 2)
                 at_points = functional.avg_pool2d(at_points, 2)
-            if at < len(REDUCED):
-                known = self.reduced[at](seen[at])
-                x = torch.cat([x, known, unlike(known, at_points)], 1)
+            if at < len(known):
+                x = torch.cat([x, known[at], unlike(known[at], at_points)], 1)
             x = block(x)
+            if at == EVERYWHERE:
+                x = self.everywhere(x)
             if at < COMPARED:
                 x = torch.cat([x, unlike(x, at_points)], 1)
             kept.append(x)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
-import shapely
 from lossy import through_jpeg
 from numpy.typing import NDArray
-from outline_cases import Case
-from scipy import ndimage
+from outline_pictures import Picture
 
-from geofield.field.network import ANSWER_PX, SIDE_PX, normalised, points_maps
+from geofield.field.network import ANSWER_PX, SIDE_PX
 
 FloatArray = NDArray[np.float32]
 #: Shares of pictures without near infrared and without colour.
@@ -23,46 +20,8 @@ NO_NIR, GREY = 0.33, 0.2
 NEAR, LEAST_NEAR_PX = 0.35, 64
 #: How much around a field comes along onto other ground, pixels.
 LEAST_VERGE_PX, MOST_VERGE_PX = 3, 30
-
-
-@dataclass
-class Picture:
-    """A picture with a field in it.
-
-    Attributes
-    ----------
-    mark, site : str
-    bands : uint8 array (4, rows, columns)
-        Red, green, blue, near infrared.
-    masks : list of uint8 array (rows, columns)
-        The field as drawn, 255 inside; the second is the other outline of a doubtful one.
-    seed_px : (float, float)
-    """
-
-    mark: str
-    site: str
-    bands: NDArray[np.uint8]
-    masks: list[NDArray[np.uint8]]
-    seed_px: tuple[float, float]
-
-
-def picture_of(case: Case, side_px: int | None = None) -> Picture:
-    """A case in a size that is trained on."""
-    bands = np.asarray(case.scene.bands, np.uint8)
-    scale = 1.0 if side_px is None else side_px / max(bands.shape)
-    if side_px is not None:
-        size = (side_px, side_px)
-        bands = np.stack([cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in bands])
-    masks = []
-    for outline in (case.truth, case.doubtful):
-        if outline is not None:
-            mask = np.zeros(bands.shape[1:], np.uint8)
-            for part in shapely.get_parts(outline):
-                points = shapely.get_coordinates(part.exterior) * scale
-                # OpenCV counts from pixel centres, in sixteenths.
-                cv2.fillPoly(mask, [np.rint((points - 0.5) * 16).astype(np.int32)], 255, shift=4)
-            masks.append(mask)
-    return Picture(case.mark, case.site, bands, masks, (case.x_px * scale, case.y_px * scale))
+#: Wrong pieces that are narrower need no point, cells of the answer.
+LEAST_DEPTH = 1.5
 
 
 def turned(
@@ -158,18 +117,6 @@ def disturbed(bands: NDArray[np.uint8], rng: np.random.Generator) -> FloatArray:
     return np.clip(f, 0, 255)
 
 
-def place(mask: NDArray[np.bool_], rng: np.random.Generator) -> tuple[float, float] | None:
-    """A place in a mask, mostly not beside its border."""
-    if not mask.any():
-        return None
-    depth = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)[
-        1:-1, 1:-1
-    ]
-    y, x = np.nonzero(depth >= min(5.0, 0.5 * float(depth.max())))
-    k = int(rng.integers(len(y)))
-    return x[k] + 0.5, y[k] + 0.5
-
-
 def laid_onto(
     ground: Picture,
     bands: NDArray[np.uint8],
@@ -197,12 +144,16 @@ def laid_onto(
     return laid, np.where(kept > 127, valid, np.maximum(covered, valid))
 
 
-def sample(
+def lesson(
     picture: Picture, rng: np.random.Generator, ground: Picture | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, list, list]:
-    """Bands, points, target and what counts (both of `ANSWER_PX`); points that do and do not.
+) -> dict[str, NDArray[Any]]:
+    """A field in another light, on other ground where one is given.
 
-    Where a ground is given, the field is laid onto it.
+    Returns
+    -------
+    dict
+        ``values`` (uint8, 4 bands) and ``valid`` of `SIDE_PX`, whether it ``has_nir``; ``target``
+        and what ``counts`` of `ANSWER_PX`.
     """
     while True:
         bands, mask, valid = turned(picture, rng)
@@ -213,40 +164,39 @@ def sample(
         bands, valid = laid_onto(ground, bands, mask, valid, rng)
     values = disturbed(bands, rng)
     dice = rng.random()
-    has_nir = dice >= NO_NIR + GREY
     if dice < GREY:
         luma = values[..., :3] @ np.array([0.298, 0.587, 0.114], np.float32)
         values[..., 0] = values[..., 1] = values[..., 2] = luma
-    seed = place(inside, rng)
-    assert seed is not None
     ok = valid > 127
-    stack = np.moveaxis(values, -1, 0)
-    x = normalised(stack[:3], stack[3] if has_nir else None, ok)
-    points = points_maps([seed], [])
-    target: Any = cv2.resize(
-        (inside & ok).astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA
-    )
-    counts: Any = cv2.resize(ok.astype(np.float32), (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA)
-    return x, points, target, counts, [seed], []
+    return {
+        "values": np.rint(np.moveaxis(values, -1, 0)).astype(np.uint8),
+        "valid": ok,
+        "has_nir": np.array(dice >= NO_NIR + GREY),
+        "target": reduced(inside & ok),
+        "counts": reduced(ok),
+    }
+
+
+def reduced(mask: NDArray[np.bool_]) -> FloatArray:
+    """Shares of a mask in the cells of the answer."""
+    size = (ANSWER_PX, ANSWER_PX)
+    return np.asarray(cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA))
 
 
 def correction(
     odds: FloatArray, target: FloatArray, rng: np.random.Generator
 ) -> tuple[bool, tuple[float, float]] | None:
-    """Whether it belongs, and the middle of the largest wrong piece, full resolution."""
-    wrong = (odds > 0) != (target > 0.5)
-    labels, count = ndimage.label(wrong)
-    if not count:
+    """Whether it belongs, and about the middle of the largest wrong piece, full resolution."""
+    wrong = ((odds > 0) != (target > 0.5)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(wrong, connectivity=4)
+    if count == 1:
         return None
-    depth = cv2.distanceTransform(np.pad(wrong, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
-    sizes = np.bincount(labels.ravel())[1:]
-    largest = 1 + int(np.argmax(sizes))
-    own = np.where(labels == largest, depth, 0)
-    if own.max() < 1.5:
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    own = np.pad((labels == largest).astype(np.uint8), 1)
+    depth = cv2.distanceTransform(own, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
+    if depth.max() < LEAST_DEPTH:
         return None
-    y, x = np.unravel_index(
-        int(np.argmax(own + rng.random(own.shape) * 0.3 * own.max())), own.shape
-    )
-    if labels[y, x] != largest:
-        y, x = np.unravel_index(int(np.argmax(own)), own.shape)
-    return bool(target[y, x] > 0.5), (4.0 * x + 2.0, 4.0 * y + 2.0)
+    about = np.where(depth > 0, depth + rng.random(depth.shape) * 0.3 * depth.max(), 0)
+    y, x = np.unravel_index(int(np.argmax(about)), depth.shape)
+    scale = SIDE_PX / ANSWER_PX
+    return bool(target[y, x] > 0.5), ((x + 0.5) * scale, (y + 0.5) * scale)

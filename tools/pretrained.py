@@ -26,9 +26,6 @@ ROWS = (
     (40, 80, 3, 2, 6),
     (80, 80, 3, 1, 6),
     (80, 80, 3, 1, 6),
-    (80, 112, 5, 1, 6),
-    (112, 112, 5, 1, 6),
-    (112, 112, 5, 1, 6),
 )
 
 
@@ -85,14 +82,13 @@ class Encoder(nn.Module):
     ----------
     handed_on : tuple of int
         The blocks whose features are given, in their order.
-    capped : bool
-        Whether the rectifiers end at 6, as on ImageNet. OpenCV computes those without an end
-        together with their convolution, a fifth faster.
     """
 
-    def __init__(self, handed_on: tuple[int, ...], *, capped: bool = True) -> None:
+    def __init__(self, handed_on: tuple[int, ...]) -> None:
         super().__init__()
-        after = nn.ReLU6() if capped else nn.ReLU()
+        # On ImageNet they ended at 6; OpenCV computes those without an end together with their
+        # convolution, a fifth faster.
+        after = nn.ReLU()
         self.handed_on = handed_on
         self.channels = tuple(ROWS[at][1] for at in handed_on)
         self.stem = Convolution(3, 32, 3, 2, after=after)

@@ -163,7 +163,7 @@ def test_points_that_move_the_border_a_little_do_not_lose_the_field(field):
         (include if number % 2 else exclude).append((at.x, at.y))
         outline = outline_of(field, include, exclude, search)
         found.append(overlap(outline, truth))
-    assert min(found) > 0.95, np.round(found, 2)
+    assert min(found) > 0.94, np.round(found, 2)
 
 
 def test_points_given_at_once_are_taken_one_after_the_other(field):

@@ -31,7 +31,7 @@ def test_real_fields_are_found(shared):
             overlaps[row["image"], x] = overlap
             assert found.is_valid
             assert len(found.exterior.coords) < 60
-    # A guard against getting worse; the goal is a mean of 0.93 and none below 0.88. The network
-    # was trained on five of the seven; the ranking has learned from the two others only.
-    assert np.mean(list(overlaps.values())) > 0.91, overlaps
-    assert min(overlaps.values()) > 0.83, overlaps
+    # A guard against getting worse; the goal is a mean of 0.93 and none below 0.88. What is shipped
+    # has learned from all seven: figures of sites left out are in `field_unseen.md`.
+    assert np.mean(list(overlaps.values())) > 0.92, overlaps
+    assert min(overlaps.values()) > 0.8, overlaps

@@ -19,8 +19,9 @@ _SMALL_M2 = 400.0
 #: A border is found to a fraction of a pixel: of larger ones that is metres.
 _COARSE_M = 3.0
 #: From this score on an outline is used without a warning. The score is the probability of a
-#: good outline, lowered for what that probability knows nothing of.
-TRUSTED = 0.65
+#: good outline, lowered for what that probability knows nothing of. On 552 fields of sites left out
+#: it alone then warns of 87 % of the outlines below .8 of overlap, and of 32 % from .88 on.
+TRUSTED = 0.72
 
 
 def judge(
