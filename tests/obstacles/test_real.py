@@ -76,3 +76,20 @@ def test_few_trees_of_open_land_are_driven_through(shared):
     assert total.things == 340
     assert total.share_driven_through < 0.15
     assert total.share_lost < 0.04
+
+
+def test_vehicles_and_sheds_on_bare_ground_are_driven_around(shared):
+    """Things are learned from painted ones; a network that knows the paint sees no real ones."""
+    scene = read_scene(shared / "data" / "trees_train" / "claremont_2020_17.tif")
+    xy_px = [  # By eye, on a building site: two sheds, two lorries, cars.
+        *([72, 197], [72, 237], [171, 193], [161, 226], [36, 187], [122, 200], [145, 201]),
+        *([161, 201], [142, 215], [58, 213], [70, 213], [217, 200], [229, 219], [191, 235]),
+        *([199, 179], [206, 186], [120, 176], [34, 227], [131, 200], [251, 207]),
+    ]
+    frame = shapely.box(0, 0, scene.grid.width_px, scene.grid.height_px)
+    field = gf.Field(shapely.transform(frame, scene.grid.to_metric_array), scene.grid.metric_crs)
+    found = gf.detect_obstacles(scene, field)
+    things = found[(found["kind"] == "other") & (found["status"] == "detected")]
+    places = shapely.points(scene.grid.to_metric_array(np.array(xy_px, float)))
+    seen = things.geometry.union_all().intersects(places)
+    assert seen.mean() >= 0.7
