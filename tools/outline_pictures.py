@@ -3,8 +3,8 @@
     python tools/outline_pictures.py pictures.npz
 
 Fields drawn by eye, simulated ones, and all chips of the tree labels as other ground that fields
-are laid onto. Training reads this file alone, so it can run where nothing of the package is
-installed. Pictures are kept as JPEG of a high quality: half of the lessons are JPEG of a lower one.
+are laid onto. Training reads this file and no geodata. Pictures are kept as JPEG of a high quality:
+half of the lessons are JPEG of a lower one.
 """
 
 from __future__ import annotations

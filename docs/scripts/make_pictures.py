@@ -42,14 +42,15 @@ def demo_map() -> None:
 
 
 def wrong_outline() -> None:
-    """A simulated field, with a piece of another one."""
+    """A simulated field in haze, with strips of others."""
     hard = SimulationSettings(
         width_px=320, height_px=320, obstacles=60, equal_brightness=True, nir=False
     )
-    made = next(gf.simulate_fields(1, 156, hard))
+    clear = next(gf.simulate_fields(1, 41, hard)).scene
+    hazy = replace(clear, bands=(0.05 * clear.bands + 120).astype("uint8"))
     settings = gf.load_settings(overrides={"tracks": {"spacing_m": 6.0}})
     with tempfile.TemporaryDirectory() as folder:
-        plan = gf.plan_field(made.scene, lat=35.075904, lon=33.531605, settings=settings)
+        plan = gf.plan_field(hazy, lat=35.074785, lon=33.531047, settings=settings)
         plan.write(Path(folder) / "out", formats=["gpkg"])
         _keep(Path(folder) / "out" / "map.png", "wrong_outline.jpg", width_px=900)
 

@@ -86,7 +86,8 @@ def test_every_file_of_the_package_is_in_the_wheel(wheel: Path) -> None:
     wanted = {name.removeprefix("src/") for name in listed.stdout.splitlines()}
     with zipfile.ZipFile(wheel) as archive:
         assert wanted <= set(archive.namelist())
-        assert sum(info.file_size for info in archive.infolist()) < 12_000_000
+        # Of these 14 MB are the network of the outlines.
+        assert sum(info.file_size for info in archive.infolist()) < 20_000_000
 
 
 def test_recipes_say_what_the_project_says() -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -78,8 +79,11 @@ class Page:
         time.sleep(0.3)
 
     def wait(self, condition: Any, seconds: float = 20.0) -> Any:
-        """Until a condition holds."""
-        return WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(lambda _: condition())
+        """Until a condition holds; what the page draws anew meanwhile is asked again."""
+        waiting = WebDriverWait(
+            self.driver, seconds, 0.05, ignored_exceptions=[StaleElementReferenceException]
+        )
+        return waiting.until(lambda _: condition())
 
     def run(self, script: str, *given: Any) -> Any:
         """Run a script in the page."""
