@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import queue
 import threading
-import zlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from outline_cases import fold_of
 from outline_pictures import Picture, kinds
 from outline_samples import correction, lesson
 from torch import Tensor
@@ -20,8 +20,6 @@ from torch.utils.data import DataLoader, IterableDataset
 
 from geofield.field.network import ANSWER_PX, SIDE_PX
 
-#: Sites are left out in so many folds.
-FOLDS = 3
 #: Share of real pictures, and of fields that are laid onto other ground.
 REAL, LAID = 0.85, 0.35
 #: What a site counts by its table: outlines nobody would see are drawn less exactly, and the last
@@ -33,11 +31,6 @@ HANDED, KEPT = 16, 1536
 MOST_POINTS, MOST_FURTHER, FURTHER = 8, 4, 0.45
 #: Width of a point's bell and of its surroundings, as `geofield.field.network` has them.
 BELL, WIDE = 1.4, 10.0
-
-
-def fold_of(site: str) -> int:
-    """As `outline_cases.fold_of`, which needs the package."""
-    return zlib.crc32(site.encode()) % FOLDS
 
 
 class Lessons(IterableDataset):

@@ -17,7 +17,11 @@ from typing import Any
 
 import cv2
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from outline_cases import DATA, Case, labelled, rows, simulated, site_of
+
+from geofield.imagery import read_scene
 
 #: JPEG of pictures with fields, and of other ground.
 QUALITY, GROUND_QUALITY = 95, 93
@@ -50,18 +54,14 @@ class Picture:
 
 def fields() -> Iterator[Picture]:
     """The fields drawn by eye, then the simulated ones."""
-    from outline_cases import labelled, simulated
-
     for case in labelled():
         yield picture_of(case)
     for case in simulated(SIMULATED, SIMULATION_SEED):
         yield picture_of(case, SIMULATED_PX)
 
 
-def picture_of(case: Any, side_px: int | None = None) -> Picture:
-    """A case of `outline_cases` in a size that is trained on."""
-    import shapely
-
+def picture_of(case: Case, side_px: int | None = None) -> Picture:
+    """A case in a size that is trained on."""
     bands = np.asarray(case.scene.bands, np.uint8)
     scale = 1.0 if side_px is None else side_px / max(bands.shape)
     if side_px is not None:
@@ -81,10 +81,6 @@ def picture_of(case: Any, side_px: int | None = None) -> Picture:
 
 def grounds() -> Iterator[Picture]:
     """Chips without outlines."""
-    from outline_cases import DATA, rows, site_of
-
-    from geofield.imagery import read_scene
-
     drawn = {row["image"] for _, _, row in rows()}
     for file in sorted((DATA / "trees_train").glob("*.tif")):
         if file.stem not in drawn:

@@ -48,17 +48,8 @@ import torch
 from learned_with import LEARNED, LEFT_OUT, learned_with
 from numpy.typing import NDArray
 from onnx_file import finish
-from outline_lessons import (
-    FOLDS,
-    FURTHER,
-    MOST_FURTHER,
-    Kept,
-    Lessons,
-    Points,
-    fold_of,
-    maps,
-    normalised,
-)
+from outline_cases import FOLDS, TABLES, fold_of
+from outline_lessons import FURTHER, MOST_FURTHER, Kept, Lessons, Points, maps, normalised
 from outline_network import OutlineNet, Whole
 from outline_pictures import Picture, kinds, read
 from scipy import ndimage
@@ -237,7 +228,7 @@ def write(learner: Learner, known: Sequence[Picture], options: argparse.Namespac
         "outputs": ["log_odds"],
         "learned_by": "tools/train_outlines.py",
         "learned_with": learned_with(
-            [*tables(), pretrained()],
+            [*(table for _, table, _ in TABLES), pretrained()],
             ["torch"],
             seed=SEED,
             # By the clock: learning again gives a network like it, not the same file.
@@ -250,13 +241,6 @@ def write(learner: Learner, known: Sequence[Picture], options: argparse.Namespac
     }
     text = json.dumps(facts, indent=1).replace(",\n  ", ", ")
     file.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
-
-
-def tables() -> list[Path]:
-    """The outlines drawn by eye."""
-    from outline_cases import TABLES
-
-    return [table for _, table, _ in TABLES]
 
 
 def main() -> None:
