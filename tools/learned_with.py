@@ -1,7 +1,8 @@
 """What a model was learned with, kept in its file: data, seed, versions.
 
-Learning again with the same gives the same file, and a test holds the files against the data that
-lie here: a table that grew, or a network that another one was learned behind, is noticed.
+A table that is learned again with the same is the same; a network, which learns by the clock, is
+one like it. A test holds the files against the data that lie here: a table that grew, or a network
+that another one was learned behind, is noticed.
 """
 
 from __future__ import annotations

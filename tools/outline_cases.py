@@ -24,6 +24,7 @@ import numpy as np
 import shapely
 from learned_with import LEFT_OUT
 from lossy import through_jpeg
+from numpy.typing import NDArray
 from rasterio.features import rasterize
 
 from geofield.field.learned import Learned
@@ -212,12 +213,18 @@ def middle_of_error(
         np.zeros(shape, np.uint8) if one.is_empty else rasterize([(one, 1)], shape, dtype=np.uint8)
         for one in (found, truth)
     )
-    wrong = (drawn != true).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(wrong, connectivity=4)
-    if count == 1:
+    depth = depth_in_error(drawn != true)
+    if depth is None:
+        return None
+    y, x = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    return bool(true[y, x]), (float(x) + 0.5, float(y) + 0.5)
+
+
+def depth_in_error(wrong: NDArray[np.bool_]) -> NDArray[np.float32] | None:
+    """How deep each pixel lies in the largest wrong piece; None where nothing is wrong."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(wrong.view(np.uint8), connectivity=4)
+    if len(stats) == 1:
         return None
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     own = np.pad(labels == largest, 1).astype(np.uint8)
-    depth = cv2.distanceTransform(own, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-    y, x = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    return bool(true[y, x]), (float(x) + 0.5, float(y) + 0.5)
+    return np.asarray(cv2.distanceTransform(own, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1])

@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from lossy import through_jpeg
 from numpy.typing import NDArray
+from outline_cases import depth_in_error
 from outline_pictures import Picture
 
-from geofield.field.network import ANSWER_PX, SIDE_PX
+from geofield.field.network import ANSWER_PX, SIDE_PX, normalised
 
 FloatArray = NDArray[np.float32]
 #: Shares of pictures without near infrared and without colour.
@@ -152,8 +153,8 @@ def lesson(
     Returns
     -------
     dict
-        ``values`` (uint8, 4 bands) and ``valid`` of `SIDE_PX`, whether it ``has_nir``; ``target``
-        and what ``counts`` of `ANSWER_PX`.
+        ``bands`` of `SIDE_PX`, as the network takes them; ``target`` and what ``counts``, of
+        `ANSWER_PX`.
     """
     while True:
         bands, mask, valid = turned(picture, rng)
@@ -168,13 +169,11 @@ def lesson(
         luma = values[..., :3] @ np.array([0.298, 0.587, 0.114], np.float32)
         values[..., 0] = values[..., 1] = values[..., 2] = luma
     ok = valid > 127
-    return {
-        "values": np.rint(np.moveaxis(values, -1, 0)).astype(np.uint8),
-        "valid": ok,
-        "has_nir": np.array(dice >= NO_NIR + GREY),
-        "target": reduced(inside & ok),
-        "counts": reduced(ok),
-    }
+    stack = np.moveaxis(values, -1, 0)
+    given = normalised(stack[:3], stack[3] if dice >= NO_NIR + GREY else None, ok)
+    # Half as much to hand over; the network computes in fewer digits still.
+    halves = given.astype(np.float16)
+    return {"bands": halves, "target": reduced(inside & ok), "counts": reduced(ok)}
 
 
 def reduced(mask: NDArray[np.bool_]) -> FloatArray:
@@ -187,14 +186,8 @@ def correction(
     odds: FloatArray, target: FloatArray, rng: np.random.Generator
 ) -> tuple[bool, tuple[float, float]] | None:
     """Whether it belongs, and about the middle of the largest wrong piece, full resolution."""
-    wrong = ((odds > 0) != (target > 0.5)).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(wrong, connectivity=4)
-    if count == 1:
-        return None
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    own = np.pad((labels == largest).astype(np.uint8), 1)
-    depth = cv2.distanceTransform(own, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
-    if depth.max() < LEAST_DEPTH:
+    depth = depth_in_error((odds > 0) != (target > 0.5))
+    if depth is None or depth.max() < LEAST_DEPTH:
         return None
     about = np.where(depth > 0, depth + rng.random(depth.shape) * 0.3 * depth.max(), 0)
     y, x = np.unravel_index(int(np.argmax(about)), depth.shape)

@@ -60,10 +60,7 @@ class Inverted(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         y = functional.gelu(self.conv2(functional.gelu(self.conv1(x))))
-        return functional.gelu(x + self.kept(self.conv3(y)))
-
-    def kept(self, x: Tensor) -> Tensor:
-        return kept(x, self.left_out if self.training else 0.0)
+        return functional.gelu(x + kept(self.conv3(y), self.left_out, self.training))
 
 
 class Attention(nn.Module):
@@ -110,15 +107,14 @@ class WindowBlock(nn.Module):
         self.local_conv = ConvNorm(width, width, 3, groups=width)
 
     def forward(self, x: Tensor) -> Tensor:
-        left_out = self.left_out if self.training else 0.0
         n, width, side, _ = x.shape
         w, k = self.window, side // self.window
         x = x.permute(0, 2, 3, 1)
         y = x.reshape(n, k, w, k, w, width).transpose(2, 3).reshape(n * k * k, w * w, width)
         y = self.attn(y).view(n, k, k, w, w, width).transpose(2, 3).reshape(n, side, side, width)
-        x = x + kept(y, left_out)
+        x = x + kept(y, self.left_out, self.training)
         x = self.local_conv(x.permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
-        return (x + kept(self.mlp(x), left_out)).permute(0, 3, 1, 2)
+        return (x + kept(self.mlp(x), self.left_out, self.training)).permute(0, 3, 1, 2)
 
 
 class Merging(nn.Module):
@@ -213,9 +209,9 @@ def attended(asked: Any, bias: Tensor | None, training: bool) -> Tensor:
     return (fit if bias is None else fit + bias).softmax(-1) @ v
 
 
-def kept(x: Tensor, left_out: float) -> Tensor:
-    """A block's answer, left out of some pictures."""
-    if left_out == 0.0:
+def kept(x: Tensor, left_out: float, training: bool) -> Tensor:
+    """A block's answer, left out of some pictures while it learns."""
+    if not training:
         return x
     keep = torch.rand((len(x),) + (1,) * (x.ndim - 1), device=x.device) >= left_out
     return x * keep.to(x.dtype) / (1 - left_out)

@@ -11,9 +11,9 @@ its own fold, and the ranking is learned behind them. The ``.json`` beside a net
 sites it was learned from.
 
 The learning rate falls to nothing by the clock. All four learned side by side on one accelerator
-(NVIDIA H200, 450 seconds, 1 500 to 1 730 steps of 64 lessons, 62 000 to 106 000 of them drawn anew;
-PyTorch 2.11). Alone, looking once, at an odd of one, they answer for the fields of their own folds
-(four bands, colour, grey):
+(NVIDIA H200, 450 seconds, 1 500 to 1 730 steps of 64 out of 62 000 to 106 000 lessons; PyTorch
+2.11). Alone, looking once, at odds of one, they answer for the fields of their own folds (four
+bands, colour, grey):
 
 | fold | fields | these | with the encoder of ImageNet before, 2 500 to 2 800 steps of 8 |
 | --- | --- | --- | --- |
@@ -21,9 +21,9 @@ PyTorch 2.11). Alone, looking once, at an odd of one, they answer for the fields
 | 1 | 199 | .810 / .805 / .797 | .757 / .759 / .749 |
 | 2 | 163 | .830 / .828 / .810 | |
 
-After a third of the time they gave .797 to .834. With 240 steps of 32, an encoder that saw the
-picture in 448 px gave the same as in 256 (.659 and .664; .33 s of one core for .10), and one that
-learned thrice as fast .659.
+After half of the time they gave .797 to .834 in four bands. With 240 steps of 32, an encoder that
+saw the picture in 448 px gave the same as in 256 (.659 and .664; .33 s of one core for .10), and
+one that learned thrice as fast .659.
 
 What gained nothing with the encoder before, whose networks stood at .75 for want of more lessons:
 a picture seen in four or eight turns; the mean with an earlier network; deeper blocks that did not
@@ -49,15 +49,16 @@ from learned_with import LEARNED, LEFT_OUT, learned_with
 from numpy.typing import NDArray
 from onnx_file import finish
 from outline_cases import FOLDS, TABLES, fold_of
-from outline_lessons import FURTHER, MOST_FURTHER, Kept, Lessons, Points, maps, normalised
+from outline_lessons import FURTHER, MOST_FURTHER, Asked, Kept, Lessons
 from outline_network import OutlineNet, Whole
-from outline_pictures import Picture, kinds, read
-from scipy import ndimage
+from outline_pictures import SIMULATION, Picture, kinds, read
 from tiny_vit import pretrained
 from torch import Tensor, nn
 from torch.nn import functional
 
-from geofield.field.network import ANSWER_PX, BANDS, POINTS, SIDE_PX
+from geofield.field.morphology import filled
+from geofield.field.network import ANSWER_PX, BANDS, POINTS, SIDE_PX, normalised, points_maps
+from geofield.field.segmentation import part_at
 
 SEED = 3
 BATCH, RATE, DECAY, AVERAGE = 64, 2e-3, 2e-2, 0.998
@@ -93,34 +94,27 @@ class Learner:
         pairs = [(mean, now.detach()) for mean, now in both if mean.dtype.is_floating_point]
         self.mean, self.now = [mean for mean, _ in pairs], [now for _, now in pairs]
         self.step, self.loss = 0, torch.zeros((), device=device)
-        self.lesson: tuple[Tensor, Tensor, Tensor] | None = None
-        self.points: Points | None = None
-        self.odds: Tensor | None = None
+        self.asked: Asked | None = None
 
-    def choose(self) -> tuple[tuple[Tensor, Tensor, Tensor], Points]:
+    def choose(self) -> Asked:
         """Other lessons, or the same again with a further point where the answer errs most."""
-        if self.points is not None and self.odds is not None and self.lesson is not None:
-            may = self.step > ALONE and self.points.further < MOST_FURTHER
-            if may and self.rng.random() < FURTHER:
-                self.points.correct(self.odds, self.rng)
-                return self.lesson, self.points
+        again = self.step > ALONE and self.rng.random() < FURTHER
+        if again and self.asked and self.asked.further < MOST_FURTHER:
+            self.asked.correct(self.rng)
+            return self.asked
         self.kept.take_in(2 * BATCH)
-        some = self.kept.draw(BATCH)
-        x = normalised(some["values"], some["valid"], some["has_nir"])
-        last = x.contiguous(memory_format=torch.channels_last)
-        return (last, some["target"], some["counts"]), Points(some["target"])
+        return self.kept.draw(BATCH)
 
     def learn(self, done: float) -> None:
         """One step, at a share of the time."""
-        self.lesson, self.points = self.choose()
-        x, target, counts = self.lesson
+        self.asked = asked = self.choose()
         rate = RATE * min(1.0, self.step / RISING + 0.01) * 0.5 * (1 + math.cos(math.pi * done))
         for group in self.optimiser.param_groups:
             group["lr"] = group["share"] * (rate + 1e-6)
         self.net.train()
         with torch.autocast(self.device, torch.bfloat16):
-            odds = self.net(x, self.points.maps)[:, 0].float()
-        loss = loss_of(odds, target, counts)
+            odds = self.net(asked.bands, asked.maps)[:, 0].float()
+        loss = loss_of(odds, asked.target, asked.counts)
         self.optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self.net.parameters(), 1.0)
@@ -128,7 +122,7 @@ class Learner:
         self.step += 1
         share = 1 - min(AVERAGE, self.step / (self.step + 10))
         torch._foreach_lerp_(self.mean, self.now, share)
-        self.odds = odds.detach()
+        asked.odds = odds.detach()
         self.loss += (loss.detach() - self.loss) * max(0.02, 1 / self.step)
 
 
@@ -149,53 +143,55 @@ def optimiser_of(net: nn.Module) -> torch.optim.Optimizer:
 
 
 def report(net: nn.Module, judged: Sequence[Picture], device: str) -> str:
-    """Mean and median overlaps, of the piece at the point, looking once."""
+    """Mean and median overlaps of the ground with odds above one at the point, looking once."""
+    points = np.stack([points_maps([at_px(one)], []) for one in judged])
     parts = []
     for mode in ("nir", "rgb", "grey"):
-        got = [overlap(net, one, mode, device) for one in judged]
+        bands = np.stack([shown(one, mode) for one in judged])
+        batches = zip(
+            torch.from_numpy(bands).split(BATCH), torch.from_numpy(points).split(BATCH), strict=True
+        )
+        with torch.no_grad():
+            odds = [net(b.to(device), p.to(device))[:, 0].cpu().numpy() for b, p in batches]
+        pairs = zip(np.concatenate(odds), judged, strict=True)
+        got = [overlap(answer > 0, one) for answer, one in pairs]
         parts.append(f"{mode} {np.mean(got):.3f} med {np.median(got):.3f}")
     return "; ".join(parts)
 
 
-def overlap(net: nn.Module, one: Picture, mode: str, device: str) -> float:
-    """Of the ground with odds above one."""
+def at_px(one: Picture) -> tuple[float, float]:
+    """The point of a picture, pixels of `SIDE_PX`."""
+    scale = SIDE_PX / max(one.bands.shape)
+    return one.seed_px[0] * scale, one.seed_px[1] * scale
+
+
+def shown(one: Picture, mode: str) -> NDArray[np.float32]:
+    """A picture as the network takes it."""
     size = (SIDE_PX, SIDE_PX)
-    bands = np.stack([cv2.resize(b, size, interpolation=cv2.INTER_AREA) for b in one.bands])
-    values = torch.from_numpy(bands)[None].to(device)
+    bands = [cv2.resize(band, size, interpolation=cv2.INTER_AREA) for band in one.bands]
+    stack = np.stack(bands).astype(np.float32)
     if mode == "grey":
-        luma = (np.tensordot([0.298, 0.587, 0.114], bands[:3], 1)).round().astype(np.uint8)
-        values[:, :3] = torch.from_numpy(luma).to(device)
-    valid = torch.ones((1, *size), dtype=torch.bool, device=device)
-    x = normalised(values, valid, torch.tensor([mode == "nir"], device=device))
-    at = np.array(one.seed_px) * SIDE_PX / max(one.bands.shape)
-    points = torch.zeros((1, 2, 1, 2), device=device)
-    points[0, 0, 0] = torch.from_numpy(at)
-    with torch.no_grad():
-        odds = net(x, maps(points, torch.tensor([[1, 0]], device=device)))
+        stack[:3] = np.tensordot([0.298, 0.587, 0.114], stack[:3], 1)
+    return normalised(stack[:3], stack[3] if mode == "nir" else None, np.ones(size, np.bool_))
+
+
+def overlap(mask: NDArray[np.bool_], one: Picture) -> float:
+    """Of the part of an answer at the point with the field as drawn."""
+    own = filled(part_at(mask, *(np.array(at_px(one)) * ANSWER_PX / SIDE_PX)))
     truth = cv2.resize(one.masks[0], (ANSWER_PX,) * 2, interpolation=cv2.INTER_AREA) > 127
-    column, row = np.minimum(at * ANSWER_PX / SIDE_PX, ANSWER_PX - 1).astype(int)
-    mask = piece(odds[0, 0].cpu().numpy() > 0, int(row), int(column))
-    return float((mask & truth).sum() / max((mask | truth).sum(), 1))
-
-
-def piece(mask: NDArray[np.bool_], row: int, column: int) -> NDArray[np.bool_]:
-    """What hangs together with a place, without holes; all, where that is not in it."""
-    labels, _ = ndimage.label(mask)
-    own = labels == labels[row, column] if labels[row, column] else mask
-    return np.asarray(ndimage.binary_fill_holes(own), bool)
+    return float((own & truth).sum() / max((own | truth).sum(), 1))
 
 
 def train(options: argparse.Namespace) -> None:
     """Train and write the network."""
     torch.manual_seed(SEED)
-    device = options.device
+    device, left_out = options.device, options.without
     pictures = read(options.pictures)
-    drawn, made, grounds = kinds(pictures)
-    judged = [one for one in drawn if fold_of(one.site) == options.without]
-    known = [one for one in drawn if not any(one is other for other in judged)]
-    print(f"{len(known)} drawn, {len(made)} simulated, {len(grounds)} grounds, {len(judged)} judge")
-    kept = Kept(Lessons(pictures, options.without, SEED), options.workers, device)
-    learner = Learner(kept, device)
+    taught = [one for one in pictures if one.mark == SIMULATION or fold_of(one.site) != left_out]
+    judged = [one for one in kinds(pictures)[0] if fold_of(one.site) == left_out]
+    lessons = Lessons(taught, SEED)
+    print(f"{len(lessons.drawn)} fields, {len(lessons.grounds)} grounds, {len(judged)} judge")
+    learner = Learner(Kept(lessons, options.workers, device), device)
     start = shown = time.time()
     while (now := time.time()) < start + options.seconds:
         learner.learn((now - start) / options.seconds)
@@ -206,11 +202,11 @@ def train(options: argparse.Namespace) -> None:
             print(f"{now - start:.0f} s, step {learner.step}, loss {loss:.3f} {told}", flush=True)
     if judged:
         print("final", report(learner.average, judged, device), flush=True)
-    write(learner, known, options)
+    write(learner, lessons, options)
     print(json.dumps({"steps": learner.step, "seconds": round(time.time() - start)}))
 
 
-def write(learner: Learner, known: Sequence[Picture], options: argparse.Namespace) -> None:
+def write(learner: Learner, lessons: Lessons, options: argparse.Namespace) -> None:
     """Write the network and what it was trained on."""
     net = learner.average.to("cpu", memory_format=torch.contiguous_format)
     shown = torch.zeros(1, len(BANDS) + len(POINTS), SIDE_PX, SIDE_PX)
@@ -237,7 +233,7 @@ def write(learner: Learner, known: Sequence[Picture], options: argparse.Namespac
             device=torch.cuda.get_device_name() if options.device == "cuda" else "cpu",
             without=[options.without, FOLDS],
         ),
-        "sites": sorted({one.site for one in known}),
+        "sites": sorted({one.site for one in lessons.drawn}),
     }
     text = json.dumps(facts, indent=1).replace(",\n  ", ", ")
     file.with_suffix(".json").write_text(text + "\n", encoding="utf-8")

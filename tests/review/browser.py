@@ -81,7 +81,10 @@ class Page:
     def wait(self, condition: Any, seconds: float = 20.0) -> Any:
         """Until a condition holds; what the page draws anew meanwhile is asked again."""
         waiting = WebDriverWait(
-            self.driver, seconds, 0.05, ignored_exceptions=[StaleElementReferenceException]
+            self.driver,
+            seconds,
+            poll_frequency=0.05,
+            ignored_exceptions=[StaleElementReferenceException],
         )
         return waiting.until(lambda _: condition())
 
