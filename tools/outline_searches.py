@@ -73,7 +73,7 @@ def searched(case: Case) -> list[Searched]:
         mark = case.mark if turn == 0 else f"{case.mark} clicked {turn}"
         overlap = common / either
         found.append(Searched(name, mark, case.site, names, values, polygons, overlap, turn))
-        wrong = middle_of_error(polygons[0], truth, search.surface.shape)
+        wrong = middle_of_error(polygons[0], truth, search.frame.shape)
         if wrong is None or zlib.crc32(case.name.encode()) % 2:
             break
         if wrong[0]:

@@ -15,16 +15,13 @@ from geofield.errors import FieldError
 from geofield.field import FieldSearch, extract_field
 from geofield.field.auto import likely_outlines
 from geofield.field.border import measure
-from geofield.field.cuts import divided
-from geofield.field.frame import Frame
+from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import Ranking, exact, log_odds, trained
-from geofield.field.regions import partition
 from geofield.field.said import Said
 from geofield.field.search import Candidate
 from geofield.field.straight import ring
-from geofield.field.surface import Surface
 from geofield.learned import Network, network
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -43,16 +40,14 @@ def several():
     stack[0, 40:120, 40:] += 9
     stack[1, 70:100, 60:110] += 3
     stack[2, 120:] += 5 * rng.random((40, 160), np.float32)
-    surface = Surface(stack, partition(stack), np.zeros((160, 160), bool), Frame((160, 160)))
-    likely = np.clip(surface.parted.mean(stack[0]) / 9 + 0.1, 0.02, 0.97)
+    layers = np.ascontiguousarray(np.moveaxis(stack, 0, -1))
+    likely = np.clip(stack[0] / 9 + 0.1, 0.02, 0.97)
     outlines = [shapely.Polygon(corners) for corners in OUTLINES]
-    inside = [surface.members(ring(one)) for one in outlines]
-    picture = likely[surface.parted.labels].astype(np.float32)
-    said = Said(likely, surface.size_px, picture, ((162.0, 44.0), (150.0, 5.0)), inside[1])
-    told = said.figures(outlines, inside)
+    masks = [covered(ring(one), likely.shape) for one in outlines]
+    said = Said(likely, ((162.0, 44.0), (150.0, 5.0)), masks[1])
     return [
-        {**measure(surface, outline, held), **more}
-        for outline, held, more in zip(outlines, inside, told, strict=True)
+        {**(measure(layers, outline, Frame(likely.shape)) or {}), **said.figures(outline, mask)}
+        for outline, mask in zip(outlines, masks, strict=True)
     ]
 
 
@@ -139,7 +134,7 @@ def test_a_first_outline_agrees_with_the_network_one_after_points_with_beliefs(c
             outline,
             np.zeros((1, 1), bool),
             {
-                "network_exact_overlap": float(log_odds(answer[name])),
+                "network_overlap": float(log_odds(answer[name])),
                 "corrections": float(corrections),
             },
             score[name],
@@ -280,34 +275,3 @@ def test_the_network_takes_its_channels_in_their_order():
     assert max(abs(a - b) for a, b in zip(places["apart_at"], (5, 50), strict=True)) <= 1
     assert maps["belongs_around"].mean() > maps["belongs_at"].mean()
     assert maps["apart_around"].mean() > maps["apart_at"].mean()
-
-
-def test_a_region_holds_the_superpixels_of_its_parts():
-    rng = np.random.default_rng(6)
-    tree = partition(rng.normal(0, 1, (2, 60, 70)).astype(np.float32)).tree
-    for region in range(len(tree.parent)):
-        parts = [] if region < tree.leaf_count else tree.parts[region].tolist()
-        held = [leaf for part in parts for leaf in tree.leaves(part).tolist()] or [region]
-        assert sorted(tree.leaves(region).tolist()) == sorted(held)
-    assert len(tree.leaves(len(tree.parent) - 1)) == tree.leaf_count
-
-
-def test_the_division_follows_the_border_that_the_picture_shows():
-    rng = np.random.default_rng(7)
-    stack = rng.normal(0, 0.3, (2, 100, 160)).astype(np.float32)
-    stack[0, :, 90:] += 15
-    parted = partition(stack)
-    # The network is 20 pixels off, and far from sure.
-    likely = parted.mean(np.where(np.arange(160) < 70, 0.75, 0.3)[None, :].repeat(100, 0))
-    wanted, barred = parted.at(((20.5, 50.5),)), parted.at(((60.5, 10.5),))
-    found, free = divided(
-        likely, parted.size_px, parted.pairs, wanted, [], [(60.0, 0.8), (0.0, 0.0)]
-    )
-    inside = found[parted.labels]
-    assert inside[:, :87].mean() > 0.98
-    assert inside[:, 93:].mean() < 0.02
-    # Where borders cost nothing, the network alone decides.
-    assert np.array_equal(free, likely > 0.5)
-    (obeys,) = divided(likely, parted.size_px, parted.pairs, wanted, barred, [(60.0, 0.8)])
-    assert obeys[wanted].all()
-    assert not obeys[barred].any()

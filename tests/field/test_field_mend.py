@@ -11,13 +11,14 @@ from pyproj import CRS
 from shapely import box
 
 from geofield.field import extract_field, prepare_field
-from geofield.field.frame import Frame
+from geofield.field.frame import Frame, covered
 from geofield.field.mend import mended
-from geofield.field.outline import rough_outline, straight_outline
+from geofield.field.outline import straight_outline
 from geofield.field.points import drawn, obeys
 from geofield.field.ranking import log_odds
 from geofield.field.refine import carried
 from geofield.field.said import Said
+from geofield.field.straight import ring
 from geofield.grid import Grid
 from geofield.model.scene import Scene
 from geofield.simulate import SimulationSettings, simulate_field
@@ -88,12 +89,11 @@ def test_an_outline_is_drawn_as_exactly_as_its_points_need():
     mask[40:42, 70:90] = False  # a notch that a rough outline passes over
     seed, notch = (80.0, 80.0), (80.0, 40.9)
     truth = box(40, 40, 120, 120).difference(box(70, 40, 90, 42))
-    for way in (rough_outline, straight_outline):
-        draw = partial(way, mask)
-        assert len(drawn(draw, (3.0, 1.0), [seed], []).exterior.coords) == 5
-        exact = drawn(draw, (3.0, 1.0), [seed], [notch])
-        assert obeys(exact, [seed], [notch])
-        assert overlap(exact, truth) > 0.98
+    draw = partial(straight_outline, mask)
+    assert len(drawn(draw, (3.0, 1.0), [seed], []).exterior.coords) == 5
+    exact = drawn(draw, (3.0, 1.0), [seed], [notch])
+    assert obeys(exact, [seed], [notch])
+    assert overlap(exact, truth) > 0.98
     assert not obeys(drawn(draw, (3.0, 1.0), [seed], [(60.0, 60.0)]), [seed], [(60.0, 60.0)])
 
 
@@ -123,23 +123,29 @@ def test_points_close_to_each_other_are_no_error_in_a_reduced_picture():
 
 
 def test_what_the_points_say_is_told_of_each_outline():
-    size = np.array([10.0, 20.0, 30.0])
-    picture = np.full((160, 160), 0.1, np.float32)
-    picture[40:120, 40:120] = 0.9
-    likely, before = np.array([0.9, 0.8, 0.1]), np.array([True, True, False])
-    said = Said(likely, size, picture, ((45.0, 80.0),), before)
-    both = [np.array([True, True, False]), np.array([True, False, True])]
-    same, other = said.figures([SQUARE, box(0, 0, 160, 160)], both)
-    assert [same["kept"], other["kept"]] == pytest.approx([1.0, 10 / 60])
+    likely = np.full((160, 160), 0.1, np.float32)
+    likely[40:120, 40:120] = 0.9
+    square, picture = SQUARE, box(0, 0, 160, 160)
+    before, whole = (covered(ring(one), likely.shape) for one in (square, picture))
+    said = Said(likely, ((45.0, 80.0),), before)
+    same, other = said.figures(square, before), said.figures(picture, whole)
+    assert [same["kept"], other["kept"]] == pytest.approx([1.0, 0.25], abs=0.01)
     assert (same["clearance"], other["clearance"]) == (5.0, 12.0)
-    assert same["network_overlap"] > other["network_overlap"]
+    assert (same["corrections"], other["corrections"]) == (1.0, 1.0)
     # Pixel by pixel: what the square holds of all that is likely.
-    area, everywhere = SQUARE.area, float(picture.sum())
-    whole = 0.9 * area / (area + everywhere - 0.9 * area)
-    assert same["network_exact_overlap"] == pytest.approx(float(log_odds(whole)), abs=0.02)
-    assert same["network_exact_overlap"] > other["network_exact_overlap"]
-    first = Said(likely, size, picture).figures([SQUARE], both[:1])[0]
-    assert (first["kept"], first["clearance"]) == (1.0, 12.0)
+    area, everywhere = float(before.sum()), float(likely.sum())
+    common = float(likely[before > 0].sum())
+    share = common / (area + everywhere - common)
+    assert same["network_overlap"] == pytest.approx(float(log_odds(share)), abs=0.02)
+    assert same["network_overlap"] > other["network_overlap"]
+    assert same["network_missed"] == pytest.approx(1 - common / everywhere, abs=0.01)
+    assert other["network_missed"] == pytest.approx(0.0, abs=1e-6)
+    right = np.where(before > 0, likely, 1 - likely)
+    fit = np.log(0.02 - np.log(right).sum() / area)
+    assert same["network_fit_of_area"] == pytest.approx(fit, abs=0.02)
+    assert same["network_fit_of_area"] < other["network_fit_of_area"]
+    first = Said(likely).figures(square, before)
+    assert (first["kept"], first["clearance"], first["corrections"]) == (1.0, 12.0, 0.0)
 
 
 @pytest.fixture(scope="module", params=[11, 29])

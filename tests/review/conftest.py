@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from geofield.model import Alternative
+from geofield.plan import read_plan
+from geofield.plan_files import save_plan
 from geofield_command import run_geofield
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,3 +32,14 @@ def plan_path(run_folder: Path, tmp_path: Path) -> Path:
     for name in ("field.gpkg", "scene.tif"):
         shutil.copy(run_folder / name, tmp_path / name)
     return tmp_path / "field.gpkg"
+
+
+@pytest.fixture
+def doubtful_path(plan_path: Path) -> Path:
+    """The plan, with another outline that may be meant."""
+    plan = read_plan(plan_path)
+    (own,) = plan.field.alternatives
+    narrower = Alternative(own.polygon.buffer(-20.0), 0.01)
+    field = replace(plan.field, alternatives=(own, narrower))
+    save_plan(replace(plan, field=field), plan_path, read_from=plan_path)
+    return plan_path

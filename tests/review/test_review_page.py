@@ -567,7 +567,7 @@ def test_a_folder_of_plans_is_reviewed_in_one_session(
     assert plan_path.with_name("field.gpkg.review.jsonl").exists()
 
 
-def test_ground_is_clicked_and_another_outline_chosen(page: Page) -> None:
+def test_ground_is_clicked_and_another_outline_chosen(doubtful_path: Path, page: Page) -> None:
     before = page.state()
     ring = before["field"]["rings"][0]
     middle = sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)

@@ -218,6 +218,8 @@ def _say(plan: Plan, output: Path, *, alternatives: bool) -> None:
         say("Others     none: only method auto offers alternatives")
     for number, (area_ha, certain) in enumerate(_alternatives(found) if alternatives else (), 1):
         say(f"Outline {number}  {area_ha:.2f} ha, certainty {certain:.0%}")
+    if alternatives and len(found.alternatives) == 1:
+        say("Others     none is likely: say more with --include-lonlat, --exclude-lonlat")
     for change in plan.changes:
         say(f"Changes    {change}")
     say(f"File       {output}")

@@ -1,9 +1,9 @@
 """Auto: the field around points, from what the picture shows and a network has learned.
 
-The picture's channels become surfaces (`evidence`), crowns inside them give way (`clearing`),
-superpixels merge into regions (`regions`); a network that sees the points says how likely each
-place belongs to the field (`network`). Of many straight outlines (`search`) the best is taken
-(`ranking`) and carried to the picture's own pixels (`refine`).
+A network that sees the points says how likely each place belongs to the field (`looks`). Its ground
+at a few levels of likelihood becomes straight outlines (`answer`), what a person said changes those
+that were taken before (`mend`; all in `search`). The best is taken by what the picture shows along
+them (`border`, `ranking`), and carried to the picture's own pixels (`refine`).
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def likely_outlines(found: Sequence[Candidate], search: WindowSearch) -> list[Li
     """
     scores = np.array([one.score for one in found])
     polygons = [one.polygon for one in found]
-    answer = np.array([one.figures["network_exact_overlap"] for one in found])
+    answer = np.array([one.figures["network_overlap"] for one in found])
     answered = agreement(answer, int(found[0].figures["corrections"]))
     belief, expected, overlap = expected_overlaps(polygons, scores, answered)
     ranking = search.learned.ranking
@@ -143,7 +143,7 @@ def _told(
     scene: Scene, search: WindowSearch, likely: Likely, mask: NDArray[np.bool_]
 ) -> Segmentation:
     """An outline on the picture's own pixels, with what is to be told of it."""
-    things = plump(likely.candidate.holes | search.surface.things)
+    things = plump(likely.candidate.holes | search.things)
     holes = inner(enlarged(things, search.factor, mask.shape), mask)
     figures = likely.candidate.figures
     contrast = math.exp(figures["strength_50_above_inside"])

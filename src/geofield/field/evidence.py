@@ -127,21 +127,10 @@ def _trimmed_covariance(difference: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(covariance * _WITHIN / chdtr(count + 2, quantile))
 
 
-def gradient(stack: FloatArray, sigma_px: float = 1.0) -> FloatArray:
-    """Length of the gradient over all channels, from derivatives of a Gaussian."""
-    total = np.zeros(stack.shape[1:], np.float32)
-    for layer in stack:
-        for order in ((0, 1), (1, 0)):
-            total += np.square(_gaussian(layer, sigma_px, order))
-    return np.sqrt(total)
-
-
-def _gaussian(layer: FloatArray, sigma_px: float, order: tuple[int, int] = (0, 0)) -> FloatArray:
-    """A layer under a Gaussian, or its derivative along rows' or columns' axis where order is 1."""
+def _gaussian(layer: FloatArray, sigma_px: float) -> FloatArray:
+    """A layer under a Gaussian."""
     import cv2
 
-    reach = np.arange(-round(4 * sigma_px), round(4 * sigma_px) + 1)
-    bell = np.exp(-0.5 * np.square(reach / sigma_px))
-    bell /= bell.sum()
-    down, right = (bell * reach / sigma_px**2 if one else bell for one in order)
-    return np.asarray(cv2.sepFilter2D(layer, -1, right, down, borderType=cv2.BORDER_REPLICATE))
+    side = 2 * round(4 * sigma_px) + 1
+    smooth = cv2.GaussianBlur(layer, (side, side), sigma_px, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(smooth)

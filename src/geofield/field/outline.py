@@ -97,34 +97,6 @@ def straight_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
     return cast(Polygon, simple) if simple.is_valid else exact
 
 
-def rough_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
-    """The outer border of a mask's largest part, simplified: quick, to two pixels or so.
-
-    Parameters
-    ----------
-    mask : bool array (rows, columns)
-    tolerance_px : float
-        Of Douglas and Peucker's method.
-
-    Returns
-    -------
-    shapely.Polygon
-        Pixel coordinates; empty when there is no part with an area.
-    """
-    import cv2
-
-    contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    if not contours:
-        return Polygon()
-    largest = max(contours, key=len)
-    points = cv2.approxPolyDP(largest, tolerance_px, True)[:, 0].astype(float) + 0.5
-    if len(points) < 3:
-        return Polygon()
-    # Contours run through the outermost pixels' centres.
-    grown = Polygon(points).buffer(0.5, join_style="mitre")
-    return grown if isinstance(grown, Polygon) else Polygon()
-
-
 def mean_deviation_px(outline: Polygon, exact: Polygon) -> float:
     """Mean distance of the exact border (staircase) from the outline's border, pixels."""
     ring = shapely.segmentize(exact.exterior, 1.0)

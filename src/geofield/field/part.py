@@ -1,7 +1,7 @@
 """A part of a picture, as an outline is searched in it: cut out, and enlarged where it is small.
 
-Superpixels, sides and tolerances are so many pixels wide, whatever a pixel is on the ground. In a
-picture of 128 pixels of 1.2 m, or 51 of 3 m, they are too wide for a field.
+Sides, tolerances and what is compared beside a border are so many pixels wide, whatever a pixel is
+on the ground. In a picture of 128 pixels of 1.2 m, or 51 of 3 m, they are too wide for a field.
 """
 
 from __future__ import annotations

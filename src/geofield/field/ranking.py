@@ -185,7 +185,7 @@ def agreement(answer: FloatArray, corrections: int) -> FloatArray | None:
     Parameters
     ----------
     answer : float array (outlines,)
-        The figure ``network_exact_overlap``, log odds.
+        The figure ``network_overlap``, log odds.
     corrections : int
         What the points say of the outline before them counts more than the answer to them.
     """

@@ -6,96 +6,97 @@ the last of them errs: what they do not correct was right, and they lie well wit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from geofield.field.answer import exact_overlaps
 from geofield.field.ranking import log_odds
 
-BoolArray = NDArray[np.bool_]
+Mask = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
 #: From here on a border is clear of the corrections, pixels.
 _CLEAR_PX = 12.0
+#: Likelihoods count up to here.
+_SURE = 0.005, 0.995
+#: An outline that goes with all that is likely misses it by this much, per pixel of its area.
+_FIT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Said:
-    """What points say of the superpixels of a picture.
+    """What points say of a picture.
 
     Attributes
     ----------
-    likely, size_px : float array (superpixels,)
-        How likely each belongs to the field; its pixels.
-    picture : float32 array (rows, columns)
-        How likely each pixel belongs to it.
+    likely : float32 array (rows, columns)
+        How likely each pixel belongs to the field.
     corrections : sequence of (float, float)
-        The points but the seed, pixel coordinates of the searched picture.
-    before : bool array (superpixels,) or None
-        Which the outline held that was taken before the last correction.
+        The points but the seed, pixel coordinates.
+    before : uint8 array (rows, columns) or None
+        What the outline held, as ones, that was taken before the last correction.
     """
 
-    likely: FloatArray
-    size_px: FloatArray
-    picture: NDArray[np.float32]
+    likely: NDArray[np.float32]
     corrections: Points = ()
-    before: BoolArray | None = None
+    before: Mask | None = None
 
-    def figures(
-        self, polygons: Sequence[Polygon], inside: Sequence[BoolArray]
-    ) -> list[dict[str, float]]:
-        """The figures of outlines.
+    @cached_property
+    def _layers(self) -> NDArray[np.float32]:
+        """Likelihood, and what is gained by holding a pixel, log odds."""
+        sure = np.clip(self.likely, *_SURE)
+        return np.dstack([self.likely, np.log(sure) - np.log1p(-sure)]).astype(np.float32)
+
+    @cached_property
+    def _of_all(self) -> tuple[float, float]:
+        """The whole likelihood, and what it costs to hold nothing, log likelihood."""
+        nothing = np.log1p(-np.clip(self.likely, *_SURE))
+        return float(self.likely.sum()), float(nothing.sum())
+
+    def figures(self, polygon: Polygon, mask: Mask) -> dict[str, float]:
+        """The figures of an outline.
 
         Parameters
         ----------
-        polygons : sequence of Polygon
-            Pixel coordinates of the searched picture; at least one.
-        inside : sequence of bool array (superpixels,)
-            Which each holds.
+        polygon : Polygon
+            Pixel coordinates.
+        mask : uint8 array (rows, columns)
+            Ones where it is.
         """
-        figures = {
-            **self._shares(np.array(inside)),
-            "network_exact_overlap": log_odds(exact_overlaps(self.picture, polygons)),
-            "clearance": self._clearance(polygons),
-            "corrections": np.full(len(polygons), float(len(self.corrections))),
-        }
-        rows = np.column_stack(list(figures.values())).tolist()
-        return [dict(zip(figures, row, strict=True)) for row in rows]
+        import cv2
 
-    def _shares(self, members: BoolArray) -> dict[str, FloatArray]:
-        """Of the ground: what agrees with the network's answer, what is kept of the one before."""
-        likely, size_px = self.likely, self.size_px
-        sure, field = np.clip(likely, 0.005, 0.995), likely > 0.5
-        without = np.log1p(-sure)
-        before = np.zeros_like(field) if self.before is None else self.before
-        counted = size_px[:, None] * np.column_stack(
-            [np.ones_like(likely), likely, field, likely < 0.3, np.log(sure) - without, before]
-        )
-        area, common, both, unlikely, gain, kept = (members @ counted).T
-        everywhere, fields, earlier = (float(size_px @ one) for one in (likely, field, before))
-        fit = size_px @ without + gain
+        area = max(cv2.countNonZero(mask), 1)
+        common, gain = (area * each for each in cv2.mean(self._layers, mask)[:2])
+        everywhere, nothing = self._of_all
+        # All of it was right where nothing was taken before.
+        kept = 1.0 if self.before is None else overlap(mask, self.before)
         return {
-            "network_overlap": log_odds(common / (area + everywhere - common)),
-            "network_field_overlap": log_odds(both / (area + fields - both)),
-            "network_inside": common / area,
+            "network_overlap": float(log_odds(common / (area + everywhere - common))),
             "network_missed": 1.0 - common / max(everywhere, 1e-9),
-            "network_unlikely_share": unlikely / area,
-            "network_fit": np.log(0.02 - fit / size_px.sum()),
-            "network_fit_of_area": np.log(0.02 - fit / area),
-            # Whole where nothing was taken before.
-            "kept": np.ones_like(area) if self.before is None else kept / (area + earlier - kept),
+            "network_fit_of_area": math.log(_FIT - (nothing + gain) / area),
+            "kept": kept,
+            "clearance": self._clearance(polygon),
+            "corrections": float(len(self.corrections)),
         }
 
-    def _clearance(self, polygons: Sequence[Polygon]) -> FloatArray:
-        """How far borders keep from the nearest correction, pixels, up to a bound."""
+    def _clearance(self, polygon: Polygon) -> float:
+        """How far the border keeps from the nearest correction, pixels, up to a bound."""
         if not self.corrections:
-            return np.full(len(polygons), _CLEAR_PX)
-        borders = shapely.boundary(np.array(polygons))
-        away = shapely.distance(borders, shapely.multipoints(self.corrections))
-        return np.minimum(away, _CLEAR_PX)
+            return _CLEAR_PX
+        away = shapely.distance(polygon.exterior, shapely.multipoints(self.corrections))
+        return min(float(away), _CLEAR_PX)
+
+
+def overlap(one: Mask, other: Mask) -> float:
+    """Common share of two masks of ones."""
+    import cv2
+
+    common = cv2.countNonZero(one & other)
+    return common / max(cv2.countNonZero(one | other), 1)

@@ -1,18 +1,16 @@
 """Search: possible outlines around the points, each with its score; kept for further points.
 
-The regions around the points become straight outlines, the best of them redrawn along their own
-straight sides. What the points say is obeyed by every outline. What was measured is kept, so
-that a further point costs the network's answer to it and a few new outlines: it corrects what was
-found before it, and what was right there should stay.
+The ground that the network takes for the field becomes straight outlines. What the points say is
+obeyed by every outline. What was measured is kept, so that a further point costs the network's
+answer to it and a few new outlines: it corrects what was found before it, and what was right there
+should stay.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,26 +21,17 @@ from geofield.field.answer import network_outlines
 from geofield.field.border import measure
 from geofield.field.clearing import clear
 from geofield.field.evidence import channels, whiten
-from geofield.field.frame import Frame
+from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
 from geofield.field.looks import Seen, seen
 from geofield.field.mend import mended
-from geofield.field.outline import rough_outline, straight_outline
-from geofield.field.points import EXACT_PX, drawn, obeys
+from geofield.field.points import obeys
 from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures
-from geofield.field.regions import (
-    SMALLEST_PX,
-    SMALLEST_SHARE,
-    Partition,
-    Points,
-    partition,
-    regions,
-)
-from geofield.field.said import Said
-from geofield.field.straight import redrawn, ring
-from geofield.field.surface import Surface
+from geofield.field.said import Said, overlap
+from geofield.field.straight import ring
 from geofield.model import Scene
 
+Points = tuple[tuple[float, float], ...]
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -50,19 +39,8 @@ BoolArray = NDArray[np.bool_]
 COARSE_PX = 400
 #: How far from the seed open ground is looked for, pixels.
 _STRAY_PX = 20
-#: How far the first outlines may leave their regions' borders, pixels.
-_TOLERANCE_PX = 3.0
-_TOLERANCES_PX = _TOLERANCE_PX, EXACT_PX
-#: So many of the regions' outlines get well fitted sides; so many are redrawn, so many times.
-_FITTED, _BREADTH, _ROUNDS = 5, 4, 2
-#: So many times the most exact one is redrawn once more.
-_POLISHED = 2
-#: Outlines that overlap more than this are alike.
-_ALIKE = 0.95
-#: So many earlier outlines are mended at new points.
-_MENDED = 4
-#: Of what an outline suggests, so many that agree best with the network are measured.
-_SUGGESTED = 12
+#: A picture of fewer pixels a side shows nothing.
+_SMALLEST_PX = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +52,7 @@ class Candidate:
     polygon : Polygon
         Pixel coordinates of the searched picture; no holes.
     holes : bool array
-        What was filled in the region that it began as.
+        What was filled in the ground that it began as.
     figures : mapping
         What was measured on it, by name.
     score : float
@@ -93,7 +71,7 @@ class Held:
 
     polygon: Polygon
     holes: BoolArray
-    inside: BoolArray
+    mask: NDArray[np.uint8]
     figures: Figures | None
 
 
@@ -107,9 +85,12 @@ class WindowSearch:
     ----------
     factor : int
         Pixels of the scene along one of the searched picture.
-    surface : Surface
-    second : Partition
-        Of another look at the same picture.
+    layers : float32 array (rows, columns, channels)
+        Whitened channels of the searched picture, small things painted over.
+    things : bool array (rows, columns)
+        What was painted over.
+    frame : Frame
+        Where the searched picture ends.
     seen : Seen
     seed_px : (float, float)
         Open ground at the seed or beside it, pixel coordinates of the searched picture.
@@ -126,8 +107,9 @@ class WindowSearch:
     """
 
     factor: int
-    surface: Surface
-    second: Partition
+    layers: NDArray[np.float32]
+    things: BoolArray
+    frame: Frame
     seen: Seen
     seed_px: tuple[float, float]
     moved: bool
@@ -143,11 +125,10 @@ class WindowSearch:
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
         include = (self.seed_px, *include)
-        frame = self.surface.frame
         likely = self.seen.probability(
-            include, exclude, frame.shape, self.factor, self.learned.network
+            include, exclude, self.frame.shape, self.factor, self.learned.network
         )
-        return likely if frame.inside is None else likely * frame.inside
+        return likely if self.frame.inside is None else likely * self.frame.inside
 
     def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
         """Outlines that obey the points, the best first; none where nothing stands out.
@@ -180,15 +161,8 @@ class WindowSearch:
         """Outlines that obey the points, after some that were taken without the last one."""
         likely = self.likely(include, exclude)
         points = (self.seed_px, *include), exclude
-        ground = self.surface.parted.mean(likely)
-        said = Said(
-            ground,
-            self.surface.size_px,
-            likely,
-            (*include, *exclude),
-            self.known[before[0]].inside if before else None,
-        )
-        earlier = self._earlier(said) if include or exclude else []
+        taken = self.known[before[0]].mask if before else None
+        said = Said(likely, (*include, *exclude), taken)
         found: dict[Polygon, Candidate] = {}
 
         def add(outlines: Mapping[Polygon, BoolArray]) -> None:
@@ -200,38 +174,12 @@ class WindowSearch:
                 found[one.polygon] = Candidate(one.polygon, one.holes, figures, score)
 
         add({polygon: one.holes for polygon, one in self.known.items()})
-        second = self.second.mean(likely)
-        around = [
-            *regions(self.surface.parted, ground, *points, earlier),
-            *regions(self.second, second, *points),
-        ]
-        rough = {
-            drawn(partial(rough_outline, one.mask), _TOLERANCES_PX, *points): one for one in around
-        }
-        add({polygon: one.holes for polygon, one in rough.items()})
-        fitted = {}
-        for polygon in self._different([one for one in best_first(found) if one in rough], _FITTED):
-            with suppress(FieldError):
-                outline = straight_outline(rough[polygon].mask, tolerance_px=_TOLERANCE_PX)
-                fitted[Polygon(outline.exterior)] = rough[polygon].holes
-        add(fitted)
-        add(network_outlines(likely, self.seed_px))
-        for polygon in before:
-            changed = mended(polygon, *points, self.surface.frame)
-            add(dict.fromkeys(changed, self.known[polygon].holes))
-        tried: set[Polygon] = set()
-
-        def redraw(best: Iterable[Polygon]) -> None:
-            """Add what the best suggest, unless they were asked before."""
-            for polygon in [one for one in best if one not in tried]:
-                tried.add(polygon)
-                others = redrawn(polygon, self.seed_px, self.surface.frame)
-                add(dict.fromkeys(self._agreeing(others, ground), found[polygon].holes))
-
-        for _ in range(_ROUNDS):
-            redraw(self._different(best_first(found), _BREADTH))
-        for _ in range(_POLISHED if found else 0):
-            redraw([self._most_exact(found)])
+        holes = network_outlines(likely, self.seed_px)
+        add(holes)
+        holes = {polygon: self.known[polygon].holes for polygon in before} | holes
+        for polygon in holes:
+            changed = mended(polygon, *points, self.frame)
+            add(dict.fromkeys(changed, holes[polygon]))
         return found
 
     def _before(self, shorter: Sequence[tuple[Points, Points]]) -> list[Polygon]:
@@ -245,61 +193,32 @@ class WindowSearch:
 
     def _most_exact(self, found: Mapping[Polygon, Candidate]) -> Polygon:
         """Of the outlines that hold much the same ground as the best, the most exact one."""
-        size = self.surface.size_px
-        ranked = best_first(found)[:WEIGHED]
-        inside = np.array([self.known[polygon].inside for polygon in ranked])
-        common = inside @ (size * inside[0])
-        alike = common >= SAME_GROUND * (inside @ size + size @ inside[0] - common)
-        figures = [found[polygon].figures for polygon in ranked]
-        exactness = self.learned.ranking.exactness(figures)
-        return ranked[int(np.argmax(np.where(alike, exactness, -np.inf)))]
+        best, *others = best_first(found)[:WEIGHED]
+        mask = self.known[best].mask
+        alike = [
+            best,
+            *(one for one in others if overlap(self.known[one].mask, mask) >= SAME_GROUND),
+        ]
+        exactness = self.learned.ranking.exactness([found[polygon].figures for polygon in alike])
+        return alike[int(np.argmax(exactness))]
 
     def _scored(self, held: Sequence[Held], said: Said) -> Iterator[tuple[Held, Figures, float]]:
         """Outlines that are no scraps, with all their figures and their scores."""
-        some = [one for one in held if one.figures is not None]
-        if not some:
-            return
-        told = said.figures([one.polygon for one in some], [one.inside for one in some])
-        figures = [{**(one.figures or {}), **more} for one, more in zip(some, told, strict=True)]
-        scores = self.learned.ranking.scores(figures).tolist()
-        yield from zip(some, figures, scores, strict=True)
-
-    def _earlier(self, said: Said) -> list[BoolArray]:
-        """The best of what is known, also where it does not obey the points."""
-        scored = self._scored(list(self.known.values()), said)
-        ranked = sorted(((one.inside, score) for one, _, score in scored), key=lambda one: -one[1])
-        return [inside for inside, _ in ranked[:_MENDED]]
-
-    def _different(self, ranked: Sequence[Polygon], most: int) -> list[Polygon]:
-        """The first outlines that hold different ground: each gets its well drawn sides."""
-        size = self.surface.size_px
-        chosen: list[Polygon] = []
-        grounds: list[BoolArray] = []
-        for polygon in ranked:
-            inside = self.known[polygon].inside
-            if all(size @ (inside & one) < _ALIKE * (size @ (inside | one)) for one in grounds):
-                chosen.append(polygon)
-                grounds.append(inside)
-            if len(chosen) == most:
-                break
-        return chosen
-
-    def _agreeing(self, polygons: Sequence[Polygon], ground: FloatArray) -> list[Polygon]:
-        """Of many outlines those that agree best with the network: measuring takes longer."""
-        if len(polygons) <= _SUGGESTED:
-            return list(polygons)
-        size = self.surface.size_px
-        inside = np.array([self.surface.members(ring(one)) for one in polygons])
-        common, area = inside @ (size * ground), inside @ size
-        overlap = common / (area + float(size @ ground) - common)
-        return [polygons[at] for at in np.argsort(-overlap, kind="stable")[:_SUGGESTED]]
+        some = [
+            (one, {**one.figures, **said.figures(one.polygon, one.mask)})
+            for one in held
+            if one.figures is not None
+        ]
+        if some:
+            scores = self.learned.ranking.scores([figures for _, figures in some]).tolist()
+            yield from ((*one, score) for one, score in zip(some, scores, strict=True))
 
     def _held(self, polygon: Polygon, holes: BoolArray) -> Held:
         """What is known of an outline; it is measured once."""
         if polygon not in self.known:
-            inside = self.surface.members(ring(polygon))
-            figures = measure(self.surface, polygon, inside)
-            self.known[polygon] = Held(polygon, holes, inside, figures)
+            mask = covered(ring(polygon), self.frame.shape)
+            figures = measure(self.layers, polygon, self.frame)
+            self.known[polygon] = Held(polygon, holes, mask, figures)
         return self.known[polygon]
 
 
@@ -339,22 +258,20 @@ def search_field(
     FieldError
         When the picture is too small.
     """
+    if min(scene.grid.shape) < _SMALLEST_PX:
+        raise FieldError("The picture is too small to find a field in.")
     factor = max(1, math.ceil(max(scene.grid.shape) / COARSE_PX))
     seed = (x_px / factor, y_px / factor)
     frame = Frame.of(scene, factor, seed, times)
     raw, inside = channels(scene, factor), frame.inside
     whitened = whiten(raw, seed, inside)
     stack, things = clear(whitened, scene.grid.ground_resolution_m * factor)
-    surface = Surface(stack, partition(stack, inside), things, frame)
-    if not len(surface.parted.lines.first):
-        raise FieldError("The picture is too small to find a field in.")
-    footing = open_ground(surface.parted, things, seed)
-    # Another look: nothing painted over, and colour alone where there is near infrared.
-    second = partition(whitened if len(raw) < 4 else whiten(raw[:3], seed, inside), inside)
+    footing = open_ground(things, seed)
     return WindowSearch(
         factor,
-        surface,
-        second,
+        np.ascontiguousarray(np.moveaxis(stack, 0, -1)),
+        things,
+        frame,
         seen(scene, times),
         footing,
         footing != seed,
@@ -362,31 +279,16 @@ def search_field(
     )
 
 
-def open_ground(
-    parted: Partition, things: BoolArray, seed_px: tuple[float, float]
-) -> tuple[float, float]:
-    """The seed, or the nearest place on open ground where it is on a crown or the like.
-
-    That is ground of the surface which the crown stands in, where it is known: beyond a border
-    nearby there is other ground.
-    """
-    labels, tree = parted.labels, parted.tree
+def open_ground(things: BoolArray, seed_px: tuple[float, float]) -> tuple[float, float]:
+    """The seed, or the nearest place on open ground where it is on a crown or the like."""
     x, y = int(seed_px[0]), int(seed_px[1])
-    smallest = max(SMALLEST_PX, SMALLEST_SHARE * labels.size)
-    around = tree.surface_around(int(labels[y, x]), smallest)
-    if around is None and not things[y, x]:
+    if not things[y, x]:
         return seed_px
     top, left = max(y - _STRAY_PX, 0), max(x - _STRAY_PX, 0)
-    near = (slice(top, y + _STRAY_PX + 1), slice(left, x + _STRAY_PX + 1))
-    leaves = np.unique(labels[near])
-    specks = [leaf for leaf in leaves if tree.surface_around(int(leaf), smallest) is not None]
-    free = ~np.isin(labels[near], specks) & ~things[near]
-    row, column = np.indices(free.shape)
-    distance = np.hypot(row + top - y, column + left - x)
-    if around is not None:
-        own = free & np.isin(labels[near], tree.leaves(around))
-        free = own if own.any() else free
+    free = ~things[top : y + _STRAY_PX + 1, left : x + _STRAY_PX + 1]
     if not free.any():
         return seed_px
+    row, column = np.indices(free.shape)
+    distance = np.hypot(row + top - y, column + left - x)
     down, right = np.unravel_index(np.argmin(np.where(free, distance, np.inf)), free.shape)
     return (float(left + right) + 0.5, float(top + down) + 0.5)

@@ -22,8 +22,8 @@ from geofield.field.learned import Learned, shipped
 from geofield.field.looks import seen
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
+from geofield.field.points import Points
 from geofield.field.ranking import WEIGHED
-from geofield.field.regions import Points
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
 from geofield.grid import Grid
