@@ -25,7 +25,6 @@ from geofield.errors import FieldError
 from geofield.learned import facts
 
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Figures = Mapping[str, float]
 
 #: Where a curve bends, and where it ends, in units of the figure's spread.

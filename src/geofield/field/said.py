@@ -19,7 +19,6 @@ from shapely import Polygon
 from geofield.field.ranking import log_odds
 
 Mask = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
 #: From here on a border is clear of the corrections, pixels.

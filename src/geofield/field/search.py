@@ -32,7 +32,6 @@ from geofield.field.straight import ring
 from geofield.model import Scene
 
 Points = tuple[tuple[float, float], ...]
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 #: The search works on a picture reduced to at most this many pixels a side.
