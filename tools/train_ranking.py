@@ -22,16 +22,16 @@ one, was .750 where the choice was .748 on the picture of the search (fields lef
 Curves of their own for outlines that points corrected, which also count how deep the last point
 lies in the piece that it changes and how large that is, took .836, .872 and .893 with two, three
 and four points where the common ones take .831, .865 and .885 (the best there are .906, .921,
-.930; 552 fields, folds left out): too little for a second table.
-
-Both were measured behind an earlier network.
+.930; 552 fields, folds left out): too little for a second table. Both were measured behind an
+earlier network.
 
 Nine figures are all that a ranking needs: with 63 of them (strengths, strips beside the border,
 what is rough, uneven or strange inside, shape) outlines taken of fields left out overlap by .824,
 after one, two and three points by .871, .903 and .911; with these by .825, .872, .902 and .911.
-Superpixels merged into a tree, minimum cuts, and outlines redrawn along their long sides made
-twenty times as many outlines: the best of all had .884, what was taken .825 as well, and by
-.869, .896, .917 and .925 where without them it was .873, .899, .922 and .928 (46 fields).
+Superpixels merged into a tree, minimum cuts, and outlines redrawn along their long sides made many
+more outlines: the best of all had .884 (.855 without), what was taken .825 as well; after none to
+three points .869, .896, .917 and .925 where without them it was .873, .899, .922 and .928 (46
+fields).
 """
 
 from __future__ import annotations
