@@ -90,9 +90,9 @@ def _along(
     # A step, or a ridge between like grounds: a fence, a track, a ditch.
     changes = _smoothed(np.stack([high - low, middle - 0.5 * (low + high)]))
     strength = np.sqrt(np.einsum("...c,...c->...", changes, changes)).max(axis=0)
-    own, inside = (strength[part].max(axis=0) for part in np.split(np.arange(len(offsets)), [3]))
-    base = math.log(max(float(median(strength[3:].ravel())), 0.4) + 0.3)
-    own, inside = np.sort(np.log(own + 0.3)), np.sort(np.log(inside + 0.3))
+    at, within = strength[: len(_AT_PX)], strength[len(_AT_PX) :]
+    base = math.log(max(float(median(within.ravel())), 0.4) + 0.3)
+    own, inside = (np.sort(np.log(each.max(axis=0) + 0.3)) for each in (at, within))
     count = len(places)
     return {
         "strength_25_above_inside": float(own[int(0.25 * count)]) - base,

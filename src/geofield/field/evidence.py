@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtr, chdtri
 
 from geofield.model import Scene
+from geofield.raster import smoothed
 
 FloatArray = NDArray[np.float32]
 
@@ -84,7 +85,7 @@ def whiten(
     The covariance of differences between pixels a few steps apart is trimmed to the most
     usual ones, so that borders and trees near the seed do not count.
     """
-    smooth = np.stack([_gaussian(layer, _SMOOTH_PX) for layer in stack])
+    smooth = np.stack([smoothed(layer, _SMOOTH_PX, truncate=4.0) for layer in stack])
     count = len(smooth)
     x, y = int(seed_px[0]), int(seed_px[1])
     window = (
@@ -125,12 +126,3 @@ def _trimmed_covariance(difference: NDArray[np.float64]) -> NDArray[np.float64]:
     # (Chi squared; scipy.stats would cost a second of imports.)
     quantile = chdtri(count, 1.0 - _WITHIN)
     return np.asarray(covariance * _WITHIN / chdtr(count + 2, quantile))
-
-
-def _gaussian(layer: FloatArray, sigma_px: float) -> FloatArray:
-    """A layer under a Gaussian."""
-    import cv2
-
-    side = 2 * round(4 * sigma_px) + 1
-    smooth = cv2.GaussianBlur(layer, (side, side), sigma_px, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(smooth)

@@ -25,7 +25,7 @@ Points = Sequence[tuple[float, float]]
 _CLEAR_PX = 12.0
 #: Likelihoods count up to here.
 _SURE = 0.005, 0.995
-#: An outline that goes with all that is likely misses it by this much, per pixel of its area.
+#: What fits badly, per pixel of an outline, counts from here on: a perfect one has no logarithm.
 _FIT = 0.02
 
 
