@@ -13,10 +13,10 @@ import shapely
 
 from geofield.errors import FieldError
 from geofield.field import FieldSearch, extract_field
-from geofield.field.auto import likely_outlines
 from geofield.field.border import measure
 from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
+from geofield.field.likely import likeliest
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import Ranking, exact, log_odds, trained
 from geofield.field.said import Said
@@ -141,11 +141,10 @@ def test_a_first_outline_agrees_with_the_network_one_after_points_with_beliefs(c
         )
         for name, outline in outlines.items()
     ]
-    ranking = SimpleNamespace(
+    ranking: Any = SimpleNamespace(
         exactness=lambda some: np.zeros(len(some)), certainty=lambda what, evidence: 0.5
     )
-    search: Any = SimpleNamespace(learned=SimpleNamespace(ranking=ranking))
-    first, *_ = likely_outlines(found, search)
+    first = likeliest(found, ranking)
     assert first.candidate.polygon == outlines[taken]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -15,14 +16,17 @@ from geofield.field.segmentation import part_at
 
 BoolArray = NDArray[np.bool_]
 
-#: From which likelihoods on ground is taken for the field; the first is the network's own answer.
-_LEVELS = 0.5, 0.3, 0.7, 0.15, 0.85
+#: From which likelihood on ground is the network's own answer; from which ones it may be the field.
+ANSWER = (0.5,)
+LEVELS = *ANSWER, 0.3, 0.7, 0.15, 0.85
 #: How far its outlines may leave its ground, pixels.
 _TOLERANCES_PX = 3.0, 1.5
 
 
 def network_outlines(
-    likely: NDArray[np.float32], seed_px: tuple[float, float]
+    likely: NDArray[np.float32],
+    seed_px: tuple[float, float],
+    levels: Sequence[float] = LEVELS,
 ) -> dict[Polygon, BoolArray]:
     """Straight outlines of the ground at the seed, with what was filled in them.
 
@@ -31,9 +35,11 @@ def network_outlines(
     likely : float32 array (rows, columns)
         How likely each pixel belongs to the field.
     seed_px : (float, float)
+    levels : sequence of float
+        From which likelihoods on.
     """
     found: dict[Polygon, BoolArray] = {}
-    for level in _LEVELS:
+    for level in levels:
         if not (likely > level).any():
             continue
         part = part_at(likely > level, *seed_px)

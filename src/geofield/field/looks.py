@@ -98,6 +98,8 @@ class Seen:
         shape: tuple[int, int],
         factor: int,
         network: Network,
+        *,
+        once: bool = False,
     ) -> FloatArray:
         """How likely each pixel of the scene, reduced by a factor, belongs to the field.
 
@@ -110,12 +112,14 @@ class Seen:
         factor : int
         network : Network
             The one that is asked.
+        once : bool
+            Look at the whole picture alone.
         """
         scale = factor * self.scale
         belong, apart = ([(x * scale, y * scale) for x, y in one] for one in (include, exclude))
         first = self._look(self.whole, belong, apart, network)
         odds = _onto(first, self.whole, shape, scale)
-        near = self._near(first, belong)
+        near = None if once else self._near(first, belong)
         if near is not None:
             second = _onto(self._look(near, belong, apart, network), near, shape, scale)
             row, column = ((np.arange(length) + 0.5) * scale for length in shape)

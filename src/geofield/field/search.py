@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.answer import network_outlines
+from geofield.field.answer import ANSWER, network_outlines
 from geofield.field.border import measure
 from geofield.field.clearing import clear
+from geofield.field.doubt import doubtful
 from geofield.field.evidence import channels, whiten
 from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
@@ -28,6 +29,7 @@ from geofield.field.mend import mended
 from geofield.field.points import obeys
 from geofield.field.ranking import SAME_GROUND, WEIGHED, Figures
 from geofield.field.said import Said, overlap
+from geofield.field.segmentation import part_at
 from geofield.field.straight import ring
 from geofield.model import Scene
 
@@ -101,6 +103,8 @@ class WindowSearch:
         What was measured, by outline.
     taken : dict
         The best outlines of each question, by its points.
+    told : dict
+        The last question and what the network told of it.
     answered : dict
         The last question and its candidates.
     """
@@ -115,6 +119,7 @@ class WindowSearch:
     learned: Learned = field(default_factory=shipped)
     known: dict[Polygon, Held] = field(default_factory=dict)
     taken: dict[tuple[Points, Points], list[Polygon]] = field(default_factory=dict)
+    told: dict[tuple[Points, Points], NDArray[np.float32]] = field(default_factory=dict)
     answered: dict[tuple[Points, Points], list[Candidate]] = field(default_factory=dict)
 
     def place(self, x_px: float, y_px: float) -> tuple[float, float]:
@@ -123,9 +128,17 @@ class WindowSearch:
 
     def likely(self, include: Points = (), exclude: Points = ()) -> NDArray[np.float32]:
         """How likely each pixel of the searched picture belongs to the field."""
-        include = (self.seed_px, *include)
+        if (include, exclude) not in self.told:
+            self.told.clear()
+            self.told[include, exclude] = self._likely(include, exclude)
+        return self.told[include, exclude]
+
+    def _likely(
+        self, include: Points, exclude: Points, *, once: bool = False
+    ) -> NDArray[np.float32]:
+        points = (self.seed_px, *include), exclude
         likely = self.seen.probability(
-            include, exclude, self.frame.shape, self.factor, self.learned.network
+            *points, self.frame.shape, self.factor, self.learned.network, once=once
         )
         return likely if self.frame.inside is None else likely * self.frame.inside
 
@@ -153,6 +166,27 @@ class WindowSearch:
         self.answered.clear()
         self.answered[include, exclude] = [found[polygon] for polygon in ranked]
         return self.answered[include, exclude]
+
+    def imagined(self) -> list[Candidate]:
+        """Outlines as they would be if a person spoke of the most doubtful ground, either way.
+
+        They hold the seed alone, for nobody has spoken. On 80 fields of left-out sites the nearest
+        of them and the network's own ground has .874 of the truth in common, where that has .855;
+        .876 by two looks at each, in twice the time.
+        """
+        likely = self.likely()
+        holes: dict[Polygon, BoolArray] = {}
+        for place, belongs in doubtful(likely, part_at(likely > 0.5, *self.seed_px)):
+            include, exclude = ((place,), ()) if belongs else ((), (place,))
+            answer = self._likely(include, exclude, once=True)
+            holes |= network_outlines(answer, self.seed_px, ANSWER)
+        # Not kept: what further points find does not hang on whether this was asked.
+        held = [self._measured(polygon, one) for polygon, one in holes.items()]
+        some = [one for one in held if obeys(one.polygon, (self.seed_px,), ())]
+        return [
+            Candidate(one.polygon, one.holes, figures, score)
+            for one, figures, score in self._scored(some, Said(likely))
+        ]
 
     def _found(
         self, include: Points, exclude: Points, before: Sequence[Polygon]
@@ -215,10 +249,12 @@ class WindowSearch:
     def _held(self, polygon: Polygon, holes: BoolArray) -> Held:
         """What is known of an outline; it is measured once."""
         if polygon not in self.known:
-            mask = covered(ring(polygon), self.frame.shape)
-            figures = measure(self.layers, polygon, self.frame)
-            self.known[polygon] = Held(polygon, holes, mask, figures)
+            self.known[polygon] = self._measured(polygon, holes)
         return self.known[polygon]
+
+    def _measured(self, polygon: Polygon, holes: BoolArray) -> Held:
+        mask = covered(ring(polygon), self.frame.shape)
+        return Held(polygon, holes, mask, measure(self.layers, polygon, self.frame))
 
 
 def _shorter(include: Points, exclude: Points) -> list[tuple[Points, Points]]:

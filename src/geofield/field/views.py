@@ -17,13 +17,12 @@ import numpy as np
 from shapely import Polygon, affinity
 
 from geofield.errors import FieldError, PointOutsideError
-from geofield.field.auto import likely_outlines
 from geofield.field.learned import Learned, shipped
+from geofield.field.likely import likeliest
 from geofield.field.looks import seen
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
 from geofield.field.points import Points
-from geofield.field.ranking import WEIGHED
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
 from geofield.grid import Grid
@@ -146,7 +145,7 @@ class FieldSearch:
         )
         if not found:
             return False
-        first, *_ = likely_outlines(found[:WEIGHED], search)
+        first = likeliest(found, self.learned.ranking)
         return not view.cuts(first.candidate.polygon)
 
     def _at(self, scene: Scene, level: int) -> View:

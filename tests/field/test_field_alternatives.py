@@ -1,0 +1,86 @@
+"""Other outlines that are offered: which they are, and that to ask for them changes nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.field.alternatives import other_outlines
+from geofield.field.doubt import doubtful
+from geofield.field.likely import Likely
+from geofield.field.search import Candidate, search_field
+from geofield.simulate import SimulationSettings, simulate_field
+
+
+def candidate(polygon: shapely.Polygon, score: float) -> Candidate:
+    return Candidate(polygon, np.zeros((1, 1), bool), {}, score)
+
+
+def taken(one: Candidate, certainty: float = 0.6) -> Likely:
+    return Likely(one, certainty, certainty + 0.1, certainty - 0.1)
+
+
+def test_most_doubt_adds_up_where_a_wide_piece_is_doubtful():
+    likely = np.full((120, 160), 0.02, np.float32)
+    likely[20:100, 20:120] = 0.98
+    # A narrow strip that is doubted more than a wide piece, on either side of the border.
+    likely[20:100, 20:23], likely[40:80, 80:120] = 0.55, 0.7
+    likely[10:13, 20:120], likely[60:100, 120:150] = 0.45, 0.3
+    (inside, belongs), (outside, belong_too) = doubtful(likely, likely > 0.5)
+    assert (belongs, belong_too) == (False, True)
+    assert shapely.box(80, 40, 120, 80).contains(shapely.Point(inside))
+    assert shapely.box(120, 60, 150, 100).contains(shapely.Point(outside))
+
+
+def test_ground_that_fills_the_picture_is_doubted_inside_alone():
+    likely = np.full((60, 60), 0.9, np.float32)
+    likely[:20] = 0.6
+    ((x, y), belongs), *others = doubtful(likely, likely > 0.5)
+    assert not belongs
+    assert not others
+    assert 0 < x < 60
+    assert 0 < y < 20
+
+
+def test_what_is_offered_covers_what_may_be_meant_and_not_twice_the_same():
+    own = candidate(shapely.box(0, 0, 100, 100), 2.0)
+    # Half of it is believed in most, in two outlines alike; least in a scrap.
+    half, alike = (candidate(shapely.box(0, 0, 50 + more, 100), 1.0) for more in (0, 2))
+    wide = candidate(shapely.box(0, 0, 160, 100), 0.0)
+    scrap = candidate(shapely.box(0, 0, 100, 20), -4.0)
+    same = candidate(shapely.box(0, 0, 98, 100), 1.9)
+    others = other_outlines(taken(own), [own, same, half, alike, wide, scrap])
+    grounds = [one.candidate for one in others]
+    assert grounds[0] in (half, alike)
+    assert grounds[1:] == [wide]
+    sure = [one.certainty for one in others]
+    assert sure == sorted(sure, reverse=True)
+    # Both are dealt from what the taken one leaves; the scrap keeps the rest of it.
+    assert 0.39 < sum(sure) < 0.4
+
+
+def test_the_same_ground_is_no_alternative():
+    own = candidate(shapely.box(0, 0, 100, 100), 0.0)
+    same = candidate(shapely.box(0, 0, 95, 100), 0.0)
+    assert other_outlines(taken(own), [own, same]) == []
+
+
+@pytest.mark.parametrize("seed", [3, 11])
+def test_imagined_outlines_hold_the_point_and_change_nothing_that_is_found_later(seed: int):
+    one = simulate_field(seed, SimulationSettings(width_px=256, height_px=256))
+    at = one.scene.pixel_of(lat=one.lat, lon=one.lon)
+    asked, unasked = search_field(one.scene, *at), search_field(one.scene, *at)
+    first = asked.candidates()
+    imagined = asked.imagined()
+    assert imagined
+    for each in imagined:
+        assert each.polygon.contains(shapely.Point(asked.seed_px))
+        assert each.figures["corrections"] == 0
+    # Some of them are none that were found.
+    assert {each.polygon for each in imagined} - {each.polygon for each in first}
+    beside = ((asked.seed_px[0] + 9.0, asked.seed_px[1] + 5.0),)
+    later = asked.candidates((), beside)
+    assert [each.polygon for each in later] == [
+        each.polygon for each in unasked.candidates((), beside)
+    ]
