@@ -28,6 +28,7 @@ import shapely
 import shapely.affinity
 
 from common import DATA, machine, overlap, write_page
+from field_rivals import felzenszwalb, random_walker
 from geofield.errors import GeofieldError
 from geofield.field import FieldSearch, extract_field, prepare_field
 from geofield.imagery import read_scene
@@ -71,6 +72,7 @@ class Result:
     """Of one outline: overlap, whether it was warned of, its certainty, processor seconds.
 
     Of a field that two outlines were drawn of, `nearer` is the overlap with the one more like it.
+    `offered` are the overlaps of all outlines that are offered, the one taken among them.
     """
 
     mark: str
@@ -80,6 +82,7 @@ class Result:
     warned: bool
     certainty: float
     seconds: float
+    offered: tuple[float, ...] = ()
 
 
 def found(case: Case) -> Result:
@@ -101,7 +104,14 @@ def found(case: Case) -> Result:
     shared = overlap(outline, case.truth)
     nearer = None if case.doubtful is None else max(shared, overlap(outline, case.doubtful))
     certain = figures.get("certainty", 0.0)
-    return Result(case.mark, case.drawn, shared, nearer, not quality.trusted, certain, seconds)
+    others = [
+        replace(field, polygon=one.polygon).polygon_px(case.scene.grid)
+        for one in field.alternatives[1:]
+    ]
+    offered = tuple(overlap(one, case.truth) for one in (outline, *others))
+    return Result(
+        case.mark, case.drawn, shared, nearer, not quality.trusted, certain, seconds, offered
+    )
 
 
 def searched(case: Case) -> FieldSearch:
@@ -216,49 +226,7 @@ def ours(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
     return run
 
 
-def random_walker(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
-    """Discs at the points, the picture's frame as what does not belong."""
-    from skimage.segmentation import random_walker as walk
-
-    picture = case.scene.rgb.astype(float)
-
-    def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
-        markers = np.zeros(picture.shape[:2], int)
-        if not exclude:
-            markers[[0, -1], :] = markers[:, [0, -1]] = 2
-        row, column = np.indices(markers.shape)
-        for number, points in ((2, exclude), (1, include)):
-            for x, y in points:
-                markers[np.hypot(row + 0.5 - y, column + 0.5 - x) < 6] = number
-        labels = walk(picture, markers, beta=800, mode="cg_j", tol=1e-3, channel_axis=-1)
-        return polygon_of(labels == 1)
-
-    return run
-
-
-def felzenszwalb(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:
-    """The pieces at the points that belong, without those at the others; the seed's stays."""
-    from skimage.segmentation import felzenszwalb as segment
-
-    labels = segment(case.scene.rgb, scale=600, sigma=1.0, min_size=400)
-
-    def run(include: list[Point], exclude: list[Point]) -> shapely.Polygon:
-        wanted = {labels[int(y), int(x)] for x, y in include}
-        seed = labels[int(case.y_px), int(case.x_px)]
-        wanted -= {labels[int(y), int(x)] for x, y in exclude} - {seed}
-        return polygon_of(np.isin(labels, list(wanted)))
-
-    return run
-
-
 WAYS = {"geofield": ours, "random walker": random_walker, "felzenszwalb": felzenszwalb}
-
-
-def polygon_of(mask: np.ndarray) -> Any:
-    from rasterio.features import shapes
-
-    parts = [shapely.geometry.shape(one) for one, _ in shapes(mask.astype(np.uint8), mask=mask)]
-    return shapely.union_all([shapely.make_valid(one) for one in parts])
 
 
 def row(name: str, results: Sequence[Result]) -> str:
@@ -364,6 +332,14 @@ def main() -> None:
         lines.append(row("of these, drawn two ways: the first", two))
         nearer = [replace(one, overlap=one.nearer or 0.0) for one in two]
         lines.append(row("of these, drawn two ways: the nearer", nearer))
+        best = [replace(one, overlap=max(one.offered, default=0.0)) for one in results["4 bands"]]
+        several = [one for one in best if len(one.offered) > 1]
+        lines.append(row("the nearest of those offered", best))
+        lines.append(row("of these, several are offered", several))
+        below = [
+            one for one, own in zip(best, results["4 bands"], strict=True) if own.overlap < BAD
+        ]
+        lines.append(row("of these, the one taken is below .8", below))
         lines += ["", "## Certainty", "", *certainty(results["4 bands"])]
         lines += ["## Further points", ""]
         heads = [f"{number} point{'s' * (number > 1)}" for number in TOLD_POINTS]
