@@ -38,6 +38,7 @@ from geofield.obstacles.picture import (
     working_factor,
 )
 from geofield.obstacles.standing import StandingMap
+from geofield.obstacles.upright import Turn
 from geofield.raster import Window, windows
 
 Progress = Callable[[int, int, str], None]
@@ -61,9 +62,10 @@ class Found:
     Attributes
     ----------
     trees : Circles
-        Pixels of the scene; the strength is the probability that a tree stands there.
+        Pixels of the scene, from north to south; the strength is the probability that a tree
+        stands there.
     shapes : list of Polygon
-        Pixels of the scene.
+        Pixels of the scene, from north to south.
     shape_confidence : float64 array
     detection : dict
         Method, thresholds, doubts and notes.
@@ -108,6 +110,8 @@ def detect_by_default(
     """
     if polarity not in ("dark", "bright", "both"):
         raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark, bright or both.")
+    turn = Turn.upright(picture.grid)
+    picture = turn.picture(picture)
     resolution = picture.grid.ground_resolution_m
     factor = working_factor(resolution)
     tone = tone_of(picture)
@@ -138,6 +142,8 @@ def detect_by_default(
         shapes, answers_there = standing.things(outline, sure, facts["standing"]["least"])
         shape_confidence = calibrated(np.array(answers_there), facts["standing"]["calibration"])
         likely = np.flatnonzero(shape_confidence >= least)
+        middles = shapely.get_coordinates(shapely.centroid([shapes[i] for i in likely]))
+        likely = likely[np.lexsort(middles.T)]
         shapes = [shapely.transform(shapes[i], lambda c: c * factor) for i in likely]
         shape_confidence = shape_confidence[likely]
     measured_m = crowns.radius_px * factor * resolution
@@ -151,9 +157,11 @@ def detect_by_default(
         shapely.prepare(ring)
         away = shapely.distance(ring, shapely.points(trees.x_px, trees.y_px))
         keep &= np.asarray(away <= trees.radius_px)
+    trees = trees.take(keep & (p >= least))
+    trees = trees.take(np.lexsort((trees.x_px, trees.y_px)))
     return Found(
-        trees.take(keep & (p >= least)),
-        shapes,
+        turn.circles_back(trees),
+        turn.shapes_back(shapes),
         shape_confidence,
         {
             "method": f"network_{tone.bands}",

@@ -113,7 +113,8 @@ def detect_obstacles(
     Returns
     -------
     GeoDataFrame
-        The layer ``obstacles`` in the metric CRS, ordered by row and column of the centre;
+        The layer ``obstacles`` in the metric CRS, ordered by row and column of the centre, for
+        ``auto`` those of the picture with north above;
         ``attrs["detection"]`` says how they were found.
 
     Raises
@@ -168,7 +169,9 @@ def detect_obstacles(
             grey_check=grey_check,
             min_share=min_share,
         )
-        table = _of_circles(circles, share, scene.grid, crs, buffer_m)
+        order = np.lexsort((circles.x_px, circles.y_px))
+        share = None if share is None else share[order]
+        table = _of_circles(circles.take(order), share, scene.grid, crs, buffer_m)
         detection |= told
     table.attrs["detection"] = detection
     return table
@@ -188,16 +191,14 @@ def _of_circles(
     crs: CRS,
     buffer_m: float,
 ) -> gpd.GeoDataFrame:
-    """Return circles as obstacles, in the order of rows and columns."""
-    order = np.lexsort((circles.x_px, circles.y_px))
-    circles = circles.take(order)
+    """Return circles as obstacles, in their order."""
     return from_circles_px(
         circles.x_px,
         circles.y_px,
         circles.radius_px,
         grid,
         buffer_m=buffer_m,
-        confidence=None if confidence is None else confidence[order],
+        confidence=confidence,
         crs=crs,
     )
 
@@ -220,7 +221,7 @@ def _with_shapes(
     grid: Grid,
     buffer_m: float,
 ) -> gpd.GeoDataFrame:
-    """Append polygons of kind `other`, numbered on in the order of their rows."""
+    """Append polygons of kind `other`, numbered on."""
     import pandas as pd
 
     crs = table.crs
@@ -228,15 +229,12 @@ def _with_shapes(
     def to_metric(c: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack(grid.to_crs(c[:, 0], c[:, 1], crs))
 
-    every = np.asarray(shapes, dtype=object)
-    centre = shapely.centroid(every)
-    order = np.lexsort((shapely.get_x(centre), shapely.get_y(centre)))
     rows = from_polygons(
-        shapely.transform(every[order], to_metric),
+        shapely.transform(np.asarray(shapes, dtype=object), to_metric),
         crs,
         buffer_m=buffer_m,
         grid=grid,
-        confidence=confidence[order],
+        confidence=confidence,
         first_no=len(table) + 1,
     )
     joined = pd.concat([table, rows]) if len(table) else rows

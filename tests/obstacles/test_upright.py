@@ -1,0 +1,98 @@
+"""A picture gives the same obstacles whichever way its file runs."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from pyproj import CRS
+
+import geofield as gf
+from geofield.imagery import SceneReader
+from geofield.imagery.gdal import to_rasterio
+from geofield.obstacles.upright import Turn
+
+UTM = CRS("EPSG:32633")
+TURNS = {
+    "south-up": lambda a, t, w, h: (a[..., ::-1, :], t @ Affine(1, 0, 0, 0, -1, h)),
+    "west": lambda a, t, w, h: (a[..., ::-1], t @ Affine(-1, 0, w, 0, 1, 0)),
+    "half": lambda a, t, w, h: (a[..., ::-1, ::-1], t @ Affine(-1, 0, w, 0, -1, h)),
+    "quarter": lambda a, t, w, h: (
+        a.swapaxes(-1, -2)[..., ::-1],
+        t @ Affine(0, 1, 0, 1, 0, 0) @ Affine(-1, 0, h, 0, 1, 0),
+    ),
+    "exchanged": lambda a, t, w, h: (a.swapaxes(-1, -2), t @ Affine(0, 1, 0, 1, 0, 0)),
+}
+
+
+def turned(scene, turn):
+    """The same picture in a file that runs another way."""
+    grid = scene.grid
+    size = grid.width_px, grid.height_px
+    bands, transform = TURNS[turn](scene.bands, grid.transform, *size)
+    valid, _ = TURNS[turn](scene.valid, grid.transform, *size)
+    other = gf.Grid(bands.shape[2], bands.shape[1], transform, grid.crs)
+    return dataclasses.replace(scene, grid=other, bands=bands.copy(), valid=valid.copy())
+
+
+@pytest.fixture(scope="module")
+def oblong(simulated):
+    """A part of a picture whose sides are whole multiples of nothing."""
+    return simulated.scene.crop(3, 5, 371, 290)
+
+
+def assert_same(found, expected):
+    assert len(expected) >= 8
+    assert found.obstacle_no.tolist() == expected.obstacle_no.tolist()
+    assert found.kind.tolist() == expected.kind.tolist()
+    for column in ("radius_m", "confidence", "lat", "lon"):
+        assert found[column].to_numpy() == pytest.approx(expected[column].to_numpy(), abs=1e-7)
+    assert found.geometry.hausdorff_distance(expected.geometry).max() < 1e-6
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_obstacles_lie_where_they_lie(simulated, oblong, turn):
+    expected = gf.detect_obstacles(oblong, simulated.field)
+    picture = turned(oblong, turn)
+    found = gf.detect_obstacles(picture, simulated.field)
+    assert_same(found, expected)
+    x, y = picture.grid.from_lonlat(found.lon.to_numpy(), found.lat.to_numpy())
+    assert found[["x_px", "y_px"]].to_numpy() == pytest.approx(np.column_stack([x, y]), abs=1e-5)
+
+
+@pytest.mark.parametrize("turn", ["south-up", "quarter"])
+def test_pictures_read_in_parts_too(simulated, oblong, turn, tmp_path, monkeypatch):
+    monkeypatch.setattr("geofield.obstacles.default.CORE_PX", 256)
+    found = []
+    for name, scene in (("as-it-is", oblong), (turn, turned(oblong, turn))):
+        path = tmp_path / f"{name}.tif"
+        profile = {"driver": "GTiff", "dtype": "uint16", "count": len(scene.bands)}
+        height, width = scene.grid.shape
+        crs, transform = to_rasterio(scene.grid.crs), scene.grid.transform
+        with rasterio.open(
+            path, "w", height=height, width=width, crs=crs, transform=transform, **profile
+        ) as file:
+            file.write(scene.bands.astype(np.uint16) * 9 + 300)
+        reader = SceneReader.open(str(path))
+        found.append(gf.detect_obstacles(reader, simulated.field))
+    assert_same(found[1], found[0])
+
+
+@pytest.mark.parametrize("degrees", [-40, -10, 0, 10, 40])
+def test_a_picture_that_is_askew_stays_as_it_lies(degrees):
+    transform = Affine.rotation(degrees) @ Affine.scale(0.5, -0.5)
+    assert not Turn.upright(gf.Grid(30, 20, transform, UTM))
+
+
+@pytest.mark.parametrize("degrees", [50, 90, 130, 180, 230, 270, 310])
+def test_a_picture_is_brought_to_within_an_eighth_of_a_turn_of_north(degrees):
+    transform = Affine.rotation(degrees) @ Affine.scale(0.5, -0.5)
+    grid = gf.Grid(30, 20, transform, UTM)
+    turn = Turn.upright(grid)
+    upright = turn.grid(grid)
+    assert turn
+    assert not Turn.upright(upright)
+    here = np.array([[3.0, 4.0]])
+    x, y = upright.to_native(*here.T)
+    assert np.column_stack(grid.from_native(x, y)) == pytest.approx(turn.points_back(here))
