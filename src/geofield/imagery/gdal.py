@@ -17,6 +17,7 @@ from rasterio.io import DatasetReader
 from geofield import __version__
 from geofield.crs import parse_crs
 from geofield.errors import CRSError, ImageryError
+from geofield.imagery.damage import made_up
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.vrt import check_beside, check_vrt
 
@@ -32,6 +33,7 @@ _OPTIONS: dict[str, Any] = {
     "GDAL_HTTP_TIMEOUT": "120",
     "GDAL_HTTP_MERGE_CONSECUTIVE_RANGES": "YES",
     "GDAL_INGESTED_BYTES_AT_OPEN": "32768",
+    "GDAL_PNG_WHOLE_IMAGE_OPTIM": "NO",  # of a PNG that was cut off it gives zeros for an error
 }
 
 #: Their files hold the pixels themselves, and name no other file or host.
@@ -176,15 +178,19 @@ def _drivers_for(path: str, reach: Reach) -> list[str]:
 
 @contextmanager
 def reading(path: str) -> Iterator[None]:
-    """Turn GDAL's read errors into one that says what to do."""
-    try:
-        yield
-    except (RasterioError, OSError) as error:
-        _tell_refused(path)
+    """Turn GDAL's read errors, and warnings of damage, into one that says what to do."""
+    why = ""
+    with made_up() as said:
+        try:
+            yield
+        except (RasterioError, OSError) as error:
+            _tell_refused(path)
+            why = reason(error, path)
+    if why or said:
         raise ImageryError(
-            f"The picture {display_name(path)} cannot be read to its end: {reason(error, path)}.",
+            f"The picture {display_name(path)} cannot be read to its end: {why or said[0]}.",
             hint="The file is truncated or damaged: copy or download it again.",
-        ) from None
+        )
 
 
 def reason(error: BaseException, path: str) -> str:

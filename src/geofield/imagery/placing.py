@@ -14,6 +14,7 @@ from affine import Affine
 from pyproj import CRS
 from rasterio.transform import from_gcps
 from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
 
 from geofield.crs import GEOD, LONLAT, metric_crs, transformer
 from geofield.errors import CRSError
@@ -41,6 +42,25 @@ class WarpOrigin:
 
     crs: CRS
     transform: Affine | None = None
+
+    def window(self, shape: tuple[int, int], grid: Grid) -> Window:
+        """The pixels of the file, of `shape` (rows, columns), that a reprojected grid shows."""
+        height, width = shape
+        whole = Window(0, 0, width, height)
+        if self.transform is None:
+            return whole
+        edge = np.linspace(0.0, 1.0, 9)
+        x, y = (each.ravel() for each in np.meshgrid(edge * grid.width_px, edge * grid.height_px))
+        native = Grid(width, height, self.transform, self.crs)
+        x, y = native.from_crs(*grid.to_crs(x, y, self.crs), self.crs)
+        if not (np.isfinite(x).all() and np.isfinite(y).all()):
+            return whole
+        # Between the places looked at, and to sample between pixels, a little more is shown.
+        (left, right), (top, bottom) = (
+            np.clip((np.floor(v.min()) - 2, np.ceil(v.max()) + 2), 0, side).astype(int).tolist()
+            for v, side in ((x, width), (y, height))
+        )
+        return Window(left, top, right - left, bottom - top)
 
 
 @dataclass(frozen=True, slots=True)

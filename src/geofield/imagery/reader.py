@@ -8,23 +8,23 @@ reprojected to the metric CRS, because the trees in it would not be round.
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import rasterio.shutil
 from numpy.typing import NDArray
-from rasterio.enums import ColorInterp, MaskFlags, Resampling
+from rasterio.enums import MaskFlags, Resampling
 from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
 from geofield.crs import parse_crs
 from geofield.errors import ImageryError
 from geofield.grid import Grid
+from geofield.imagery.as_taken import as_taken
 from geofield.imagery.bands import BandRoles
+from geofield.imagery.damage import check_blocks
 from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of, top_of
 from geofield.imagery.fill import undeclared_fill
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading, to_rasterio
@@ -302,7 +302,7 @@ class SceneReader:
             gdal_env(self.path),
             open_picture(self.path, self.reach) as dataset,
             reading(self.path),
-            _as_it_is_taken(dataset, self) as plain,
+            as_taken(dataset, self.nodata, alpha=self.roles.alpha is not None) as plain,
             self._through_warp(plain) as raster,
         ):
             full = shape == (window.height, window.width)
@@ -310,6 +310,12 @@ class SceneReader:
             values = raster.read(
                 indexes, window=window, out_shape=(len(indexes), *shape), resampling=resampling
             )
+            if full or not dataset.overviews(1):
+                part = self.grid.crop(window.col_off, window.row_off, window.width, window.height)
+                origin = self.warped_from
+                check_blocks(
+                    dataset, window if origin is None else origin.window(dataset.shape, part)
+                )
             valid = np.ones(shape, bool)
             said = [raster.nodatavals[i] for i in self.roles.shown]
             nearest = {"window": window, "out_shape": shape, "resampling": Resampling.nearest}
@@ -363,33 +369,3 @@ class SceneReader:
             **options,
         ) as warped:
             yield warped
-
-
-@contextmanager
-def _as_it_is_taken(dataset: Any, reader: SceneReader) -> Iterator[Any]:
-    """The dataset; where it says other than what it is taken for, a view that says that.
-
-    GDAL's warper takes every band that is tagged as alpha for a mask, near infrared too; and
-    what is read coarser would mix the ground with a fill that no tag names.
-    """
-    fill, tagged = reader.nodata, ColorInterp.alpha in dataset.colorinterp
-    tagged = tagged and reader.roles.alpha is None
-    filled = fill is not None and not np.isnan(fill) and dataset.nodata != fill
-    if not (tagged or filled):
-        yield dataset
-        return
-    view = f"/vsimem/{uuid.uuid4().hex}.vrt"
-    rasterio.shutil.copy(dataset, view, driver="VRT")
-    try:
-        with rasterio.open(view, "r+") as plain:
-            if tagged:
-                plain.colorinterp = [
-                    ColorInterp.undefined if each is ColorInterp.alpha else each
-                    for each in plain.colorinterp
-                ]
-            if filled:
-                plain.nodata = fill
-        with rasterio.open(view) as plain:
-            yield plain
-    finally:
-        rasterio.shutil.delete(view)
