@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,6 +12,12 @@ import numpy as np
 import rasterio
 import rasterio.shutil
 from rasterio.enums import ColorInterp
+from rasterio.windows import Window
+
+_MASK_BAND = (
+    '<MaskBand><VRTRasterBand dataType="Byte"><SimpleSource><SourceFilename>{}</SourceFilename>'
+    "<SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></MaskBand></VRTDataset>"
+)
 
 
 @contextmanager
@@ -41,3 +48,37 @@ def as_taken(dataset: Any, fill: float | None, *, alpha: bool) -> Iterator[Any]:
             yield plain
     finally:
         rasterio.shutil.delete(view)
+
+
+@contextmanager
+def masked_by_values(dataset: Any, bands: Sequence[int], window: Window) -> Iterator[Any]:
+    """A view of a picture with a mask for what its bands (0-based) say of no data, in a window.
+
+    GDAL's warper knows one value of no data for all bands. Where they name several, as those of a
+    VRT may, nothing is seen where each holds its own.
+    """
+    values = [dataset.nodatavals[band] for band in bands]
+    there = [each for each in values if each is not None and not np.isnan(each)]
+    if len(set(there)) < 2:
+        yield dataset
+        return
+    shown = dataset.read([band + 1 for band in bands], window=window)
+    nothing = [
+        np.ones(band.shape, bool) if each is None else band == each
+        for band, each in zip(shown, values, strict=True)
+    ]
+    name = f"/vsimem/{uuid.uuid4().hex}"
+    height, width = dataset.shape
+    profile = {"driver": "GTiff", "width": width, "height": height, "count": 1, "dtype": "uint8"}
+    with rasterio.open(f"{name}.tif", "w", tiled=True, SPARSE_OK=True, **profile) as mask:
+        mask.write(np.where(np.all(nothing, axis=0), 0, 255).astype(np.uint8), 1, window=window)
+    rasterio.shutil.copy(dataset, f"{name}.vrt", driver="VRT")
+    with rasterio.open(f"{name}.vrt") as plain:
+        text = re.sub("<NoDataValue>.*?</NoDataValue>", "", plain.tags(ns="xml:VRT")["xml:VRT"])
+    text = text.replace("</VRTDataset>", _MASK_BAND.format(f"{name}.tif"))
+    try:
+        with rasterio.open(text) as plain:
+            yield plain
+    finally:
+        for kind in ("tif", "vrt"):
+            rasterio.shutil.delete(f"{name}.{kind}")

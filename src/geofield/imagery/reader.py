@@ -22,7 +22,7 @@ from rasterio.windows import Window
 from geofield.crs import parse_crs
 from geofield.errors import ImageryError
 from geofield.grid import Grid
-from geofield.imagery.as_taken import as_taken
+from geofield.imagery.as_taken import as_taken, masked_by_values
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.damage import check_blocks
 from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of, top_of
@@ -298,12 +298,13 @@ class SceneReader:
     ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """The shown bands (bands, rows, columns) in the file's type, and what is valid."""
         indexes = [i + 1 for i in self.roles.shown]
+        part = self.grid.crop(window.col_off, window.row_off, window.width, window.height)
         with (
             gdal_env(self.path),
             open_picture(self.path, self.reach) as dataset,
             reading(self.path),
             as_taken(dataset, self.nodata, alpha=self.roles.alpha is not None) as plain,
-            self._through_warp(plain) as raster,
+            self._through_warp(plain, part) as raster,
         ):
             full = shape == (window.height, window.width)
             resampling = Resampling.nearest if full or self.palette else Resampling.average
@@ -311,7 +312,6 @@ class SceneReader:
                 indexes, window=window, out_shape=(len(indexes), *shape), resampling=resampling
             )
             if full or not dataset.overviews(1):
-                part = self.grid.crop(window.col_off, window.row_off, window.width, window.height)
                 origin = self.warped_from
                 check_blocks(
                     dataset, window if origin is None else origin.window(dataset.shape, part)
@@ -343,7 +343,7 @@ class SceneReader:
         return values, valid
 
     @contextmanager
-    def _through_warp(self, dataset: Any) -> Iterator[Any]:
+    def _through_warp(self, dataset: Any, part: Grid) -> Iterator[Any]:
         """The dataset itself, or its reprojection: without an alpha band, a mask is its last."""
         if self.warped_from is None:
             yield dataset
@@ -361,11 +361,16 @@ class SceneReader:
         options["add_alpha"] = alpha is None
         if alpha is not None:
             options["src_alpha"] = alpha + 1
-        with WarpedVRT(
-            dataset,
-            crs=to_rasterio(self.grid.crs),
-            resampling=Resampling.nearest if self.palette else Resampling.bilinear,
-            src_nodata=self.nodata,
-            **options,
-        ) as warped:
+        own_mask = alpha is not None or self.has_mask
+        bands = () if own_mask else self.roles.shown
+        with (
+            masked_by_values(dataset, bands, origin.window(dataset.shape, part)) as masked,
+            WarpedVRT(
+                masked,
+                crs=to_rasterio(self.grid.crs),
+                resampling=Resampling.nearest if self.palette else Resampling.bilinear,
+                src_nodata=self.nodata if masked is dataset else None,
+                **options,
+            ) as warped,
+        ):
             yield warped
