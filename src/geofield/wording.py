@@ -31,6 +31,15 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
     return f" Did you mean {close[0]!r}?" if close else ""
 
 
+def counted(number: int, one: str, many: str | None = None) -> str:
+    """A number and what is counted: its plural is `many`, or ends with an s.
+
+    >>> counted(1, "edit"), counted(3, "edit"), counted(2, "doubt about it", "doubts about it")
+    ('1 edit', '3 edits', '2 doubts about it')
+    """
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
 def learn(names: dict[str, str]) -> None:
     """Tell what options are called in Python: those of the settings know their own names."""
     _NAMES.update(names)

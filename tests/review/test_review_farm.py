@@ -86,7 +86,7 @@ def test_fields_come_in_the_order_of_doubt_and_go_back_into_the_farm(farm: Path)
     # Killed here: the edit of the second field comes back, and that field comes first.
     again = Shelf(farm)
     assert again.names[0].split(" ")[0] == shown[1]
-    assert str(again.desk.brought_back).startswith("1 edits")
+    assert str(again.desk.brought_back).startswith("1 edit of")
     assert again.names[1].endswith("✓")
     again.desk.edit({"do": "undo"})
     assert again.end() == []

@@ -326,7 +326,7 @@ def test_edits_come_back_after_the_server_is_killed(
         page.wait(lambda: "geofield has ended" in page.text("message"))
     with served(plan_path) as (address, _):
         page = Page(driver, address)
-        assert "1 edits of a session" in page.text("message")
+        assert "1 edit of a session" in page.text("message")
         assert page.judged() == 1
 
 

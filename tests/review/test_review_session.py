@@ -241,7 +241,7 @@ def test_the_same_plan_in_other_bytes_has_its_edits(plan_path: Path) -> None:
         file.execute("PRAGMA journal_mode=wal")
         file.execute("SELECT count(*) FROM obstacles")
     assert plan_path.read_bytes() != before
-    assert str(Desk(plan_path).brought_back).startswith("1 edits")
+    assert str(Desk(plan_path).brought_back).startswith("1 edit of")
 
 
 @pytest.mark.parametrize(("line", "left"), [(0, 0), (1, 0), (3, 2)])
@@ -469,7 +469,7 @@ def test_notes_follow_a_plan_that_was_renamed(plan_path: Path) -> None:
     copy = shutil.copy(plan_path, plan_path.with_name("Kopie.gpkg"))
     assert Desk(Path(copy)).brought_back is None
     renamed = plan_path.rename(plan_path.with_name("Nord.gpkg"))
-    assert str(Desk(renamed).brought_back).startswith("1 edits")
+    assert str(Desk(renamed).brought_back).startswith("1 edit of")
     assert not journal_path(plan_path).exists()
 
 

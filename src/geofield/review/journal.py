@@ -21,9 +21,11 @@ import shapely
 from geofield.errors import GeofieldError
 from geofield.plan import Plan, read_plan
 from geofield.review.plans import SUFFIX, journal_path
+from geofield.review.presence import hold, is_open_elsewhere, release
 from geofield.review.refit import refit
 from geofield.review.session import Session
 from geofield.staging import log_of
+from geofield.wording import counted
 
 
 def fingerprint(plan_path: Path) -> str:
@@ -65,7 +67,11 @@ class Journal:
         self._elsewhere: list[dict[str, Any]] = []
         self._damaged: Path | None = None
         self._adopt()
+        #: Whether the notes that were found are those of a session that still runs.
+        self._is_shared = is_open_elsewhere(self.path)
         self._entries = self._read()
+        if self._kept:
+            hold(self.path)
 
     @property
     def begins_at(self) -> Path:
@@ -74,7 +80,7 @@ class Journal:
         return self.opened if saved else self.plan_path
 
     def replay(self, session: Session) -> str | None:
-        """Make the edits of a session that ended without saving again.
+        """Make the edits of a session that ended without saving, or still runs, again.
 
         The session is on the plan in :attr:`begins_at`. What was brought back, or why it was not,
         is told in words.
@@ -96,16 +102,24 @@ class Journal:
                 # What follows is no part of this session: its next edit is written over it.
                 self._kept, self._rest = whole[:begin], whole[begin:]
                 kept = self._copy()
-                return f"{done} edits were brought back; then: {error} All are in {kept.name}."
+                return f"{_back(done)} brought back; then: {error} All are in {kept.name}."
             begin = end
             done, unsaved = done + 1, unsaved + 1
         if self._damaged is not None:
             return (
-                f"{done} edits were brought back; the line of the notes after them is damaged. All "
+                f"{_back(done)} brought back; the line of the notes after them is damaged. All "
                 f"are in {self._damaged.name}, where what follows can be read."
             )
+        if unsaved and self._is_shared:
+            edits = counted(unsaved, "edit")
+            return (
+                f"Another review of this plan is open: what it did not save ({edits}) is here, "
+                "too. Go on in one of them and close the other: only one can note and save edits."
+            )
         if unsaved:
-            return f"{unsaved} edits of a session that ended without saving were brought back."
+            were = "was" if unsaved == 1 else "were"
+            edits = counted(unsaved, "edit")
+            return f"{edits} of a session that ended without saving {were} brought back."
         return told
 
     def write(self, entry: Mapping[str, Any]) -> None:
@@ -141,6 +155,7 @@ class Journal:
             return
         self._kept, self._rest = whole, b""
         self._waiting, self.refused = [], None
+        hold(self.path)
 
     def before_saving(self) -> None:
         """Keep the plan as it was opened, so that what was done on it can be undone."""
@@ -169,6 +184,7 @@ class Journal:
         self._kept, self._waiting, self._entries, self.refused = b"", [], [], None
 
     def _remove(self) -> None:
+        release(self.path)
         for path in (self.path, self.opened):
             if path.is_file():  # a folder that takes no notes may refuse to forget any, too
                 path.unlink()
@@ -238,9 +254,13 @@ class Journal:
         made, lost = refit(session, self._elsewhere)
         for entry in made:
             self.write(entry)
+        since = "an earlier session ended without saving"
+        if self._is_shared:
+            since = "another review of it, which is still open, noted its edits"
         words = (
-            f"The plan was changed since an earlier session ended without saving: {len(made)} of "
-            f"its {len(made) + len(lost)} edits were made again."
+            f"The plan was changed since {since}: {len(made)} of "
+            f"its {counted(len(made) + len(lost), 'edit')} {'was' if len(made) == 1 else 'were'} "
+            "made again."
         )
         if not lost and self._damaged is None and self.refused is None:
             kept.unlink()
@@ -254,6 +274,10 @@ class Journal:
             number += 1
         shutil.copyfile(self.path, kept)
         return kept
+
+
+def _back(done: int) -> str:
+    return f"{counted(done, 'edit')} {'was' if done == 1 else 'were'}"
 
 
 def play(session: Session, entry: Mapping[str, Any]) -> None:
