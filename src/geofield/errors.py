@@ -6,6 +6,8 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
+from math import isfinite
+from numbers import Real
 from typing import Any, get_args
 
 from geofield.wording import in_python
@@ -56,6 +58,30 @@ def refuse_other(
     if not isinstance(value, kind):
         wanted, *_ = get_args(kind) or (kind,)
         raise error(f"`{name}` must be a {wanted.__name__}, not {type(value).__name__}.", hint=hint)
+
+
+def refuse_no_number(
+    error: type[GeofieldError], wanted: str = "", *, none_too: bool = False, **values: object
+) -> None:
+    """Refuse arguments, by their names, that are no numbers, as text is none.
+
+    `wanted` says what they are, behind "a number"; `none_too` lets None pass.
+    """
+    for name, value in values.items():
+        known = isinstance(value, Real) and not isinstance(value, bool)
+        if not (known or getattr(value, "ndim", None) == 0 or (none_too and value is None)):
+            raise error(
+                f"{name} is {value!r}; it must be a number{wanted and f', {wanted}'}.",
+                hint=f"Write {name}={value}." if _is_written(value) else None,
+            )
+
+
+def _is_written(value: object) -> bool:
+    """Whether text is a number but for its quotes."""
+    try:
+        return isinstance(value, str) and isfinite(float(value))
+    except ValueError:
+        return False
 
 
 class SettingsError(GeofieldError):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from affine import Affine
@@ -26,7 +26,7 @@ from geofield.crs import (
     side_of_cross_m,
     transformer,
 )
-from geofield.errors import CRSError, GridError
+from geofield.errors import CRSError, GridError, refuse_no_number
 
 #: Radius of the Web Mercator sphere, metres (METHOD.md, section 1).
 EARTH_RADIUS_M = 6378137.0
@@ -66,9 +66,19 @@ class Grid:
     transform: Affine
     crs: CRS
 
+    if TYPE_CHECKING:  # made from anything that says a CRS, which its own type does not tell
+
+        def __init__(self, width_px: int, height_px: int, transform: Affine, crs: Any) -> None: ...
+
     def __post_init__(self) -> None:
+        refuse_no_number(GridError, "pixels", width_px=self.width_px, height_px=self.height_px)
         object.__setattr__(self, "crs", parse_crs(self.crs))
-        object.__setattr__(self, "transform", Affine(*tuple(self.transform)[:6]))
+        try:
+            object.__setattr__(self, "transform", Affine(*tuple(self.transform)[:6]))
+        except TypeError:
+            raise GridError(
+                f"transform is {self.transform!r}; it must be an Affine, or its six numbers."
+            ) from None
         if self.width_px < 1 or self.height_px < 1:
             raise GridError(f"A grid of {self.width_px} x {self.height_px} px has no pixels.")
         if not all(map(math.isfinite, self.transform[:6])) or self.transform.determinant == 0:
@@ -99,6 +109,9 @@ class Grid:
         width_px, height_px : int
             Size of the picture.
         """
+        refuse_no_number(GridError, "degrees", lat=lat, lon=lon)
+        refuse_no_number(GridError, f"0 to {MAX_ZOOM}", zoom=zoom)
+        refuse_no_number(GridError, "pixels", width_px=width_px, height_px=height_px)
         if not 0 <= zoom <= MAX_ZOOM:
             raise GridError(f"Zoom {zoom} does not exist.", hint=f"Use 0 to {MAX_ZOOM}.")
         if not abs(lat) <= WEB_MERCATOR_MAX_LAT:

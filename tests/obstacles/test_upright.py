@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import rasterio
 from affine import Affine
-from pyproj import CRS
 
 import geofield as gf
 from geofield.imagery import SceneReader
 from geofield.imagery.gdal import to_rasterio
 from geofield.obstacles.upright import Turn
 
-UTM = CRS("EPSG:32633")
+UTM = "EPSG:32633"
 TURNS = {
     "south-up": lambda a, t, w, h: (a[..., ::-1, :], t @ Affine(1, 0, 0, 0, -1, h)),
     "west": lambda a, t, w, h: (a[..., ::-1], t @ Affine(-1, 0, w, 0, 1, 0)),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, refuse_no_number
 
 FloatArray = NDArray[np.float64]
 
@@ -73,6 +73,7 @@ def match_points(detected: ArrayLike, truth: ArrayLike, distance: float) -> Matc
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    refuse_no_number(ObstacleError, "metres, above zero", distance_m=distance)
     if not (np.isfinite(distance) and distance > 0):
         raise ObstacleError(f"The matching distance {distance:g} is not above zero.")
     found = np.asarray(detected, dtype=float).reshape(-1, 2)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, refuse_no_number
 from geofield.imagery.pictures import open_reader
 from geofield.imagery.reader import MAX_SIDE_PX, SceneReader
 from geofield.model.scene import ImagerySource, Scene
@@ -85,6 +85,10 @@ def read_scene(
         )
     if size_m is not None and size_px is not None:
         raise ImageryError("The size is given twice.", hint="Give size_m or size_px, not both.")
+    refuse_no_number(ImageryError, "degrees", none_too=True, lat=lat, lon=lon)
+    metres = {"size_m": size_m, "resolution_m": resolution_m, "least_m": least_m}
+    refuse_no_number(ImageryError, "metres on the ground", none_too=True, **metres)
+    refuse_no_number(ImageryError, "pixels", none_too=True, size_px=size_px)
     known: dict[str, Any] = {"bands": bands, "crs": crs, "scaling": scaling, "source": source}
     reader = open_reader(str(path), lat=lat, lon=lon, allow=allow, **known)
     if lat is None or lon is None:

@@ -14,10 +14,10 @@ from rasterio.errors import RasterioError
 from rasterio.io import MemoryFile
 from rasterio.windows import Window
 
-from geofield.errors import FormatError
+from geofield.errors import FormatError, refuse_other
 from geofield.imagery.gdal import gdal_env, to_rasterio
 from geofield.imagery.tags import tags_of
-from geofield.model.scene import Scene
+from geofield.model.scene import OPEN_IT, Scene
 from geofield.staging import staged_file
 
 #: Creation options of GDAL's COG driver.
@@ -68,6 +68,7 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
     FormatError
         The folder does not exist, is read-only or full.
     """
+    refuse_other(scene, Scene, "scene", OPEN_IT, FormatError)
     grid, count = scene.grid, len(scene.roles)
     with replacing(path, overwrite=overwrite) as temporary, gdal_env(GDAL_TIFF_INTERNAL_MASK=True):
         profile = {

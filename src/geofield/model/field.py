@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -137,6 +137,23 @@ class Field:
     licence: str = ""
     own: tuple[tuple[str, Any], ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+
+    if TYPE_CHECKING:  # made from anything that says a CRS, which its own type does not tell
+
+        def __init__(
+            self,
+            polygon: Polygon,
+            crs: Any,
+            name: str = "",
+            field_id: str = "",
+            method: str = "given",
+            quality: FieldQuality | None = None,
+            imagery: str = "",
+            imagery_date: str | None = None,
+            licence: str = "",
+            own: tuple[tuple[str, Any], ...] = (),
+            alternatives: tuple[Alternative, ...] = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         crs = parse_crs(self.crs)

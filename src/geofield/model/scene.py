@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.crs import authority_name
-from geofield.errors import ImageryError, PointOutsideError
+from geofield.errors import ImageryError, PointOutsideError, refuse_no_number
 from geofield.grid import Grid
 from geofield.model.card import words
 from geofield.model.frame import Shown, shown_ground
@@ -202,7 +202,10 @@ class Scene:
         PointOutsideError
             Outside the picture (says so when latitude and longitude look swapped), or
             where it has no data.
+        ImageryError
+            Latitude or longitude is no number.
         """
+        refuse_no_number(ImageryError, "degrees", lat=lat, lon=lon)
         x, y = self.grid.from_lonlat(lon, lat)
         if not self.grid.contains_px(x, y):
             raise outside(self.grid, lat, lon, option)

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.errors import FieldError, ImageryError, ObstacleError, refuse_other
+from geofield.errors import FieldError, ImageryError, ObstacleError, refuse_no_number, refuse_other
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, Strategy, method
 from geofield.model.circles import Circles, checked_range
@@ -126,6 +126,9 @@ def detect_obstacles(
     ImageryError
         When `scene` is a path.
     """
+    refuse_no_number(ObstacleError, "metres", buffer_m=buffer_m)
+    refuse_no_number(ObstacleError, "above zero", cost_missed=cost_missed)
+    refuse_no_number(ObstacleError, "0 to 1", none_too=True, min_confidence=min_confidence)
     if not (np.isfinite(buffer_m) and buffer_m >= 0):
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
     if strategy not in STRATEGIES:

@@ -17,7 +17,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import LONLAT, transformer, utm_crs
-from geofield.errors import SettingsError
+from geofield.errors import SettingsError, refuse_no_number
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.obstacles import from_circles_px
@@ -71,6 +71,7 @@ def simulate_field(seed: int, settings: SimulationSettings | None = None) -> Sim
     SettingsError
         When the seed is below zero.
     """
+    refuse_no_number(SettingsError, "0 or more", seed=seed)
     if seed < 0:
         raise SettingsError(f"The seed {seed} is below zero.")
     settings = settings or SimulationSettings()

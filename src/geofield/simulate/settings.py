@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from geofield.errors import SettingsError
+from geofield.errors import SettingsError, refuse_no_number
 
 Climate = Literal["temperate", "dry", "lush", "bare"]
 CLIMATES: tuple[Climate, ...] = ("temperate", "dry", "lush", "bare")
@@ -49,6 +49,10 @@ class SimulationSettings:
     lon: float = 33.531142
 
     def __post_init__(self) -> None:
+        refuse_no_number(SettingsError, "pixels", width_px=self.width_px, height_px=self.height_px)
+        refuse_no_number(SettingsError, "metres", resolution_m=self.resolution_m)
+        refuse_no_number(SettingsError, "degrees", lat=self.lat, lon=self.lon)
+        refuse_no_number(SettingsError, none_too=True, obstacles=self.obstacles)
         if min(self.width_px, self.height_px) < 64:
             raise SettingsError("A simulated picture has at least 64 x 64 px.")
         if not 0 < self.radius_m[0] <= self.radius_m[1] < math.inf:

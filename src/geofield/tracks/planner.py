@@ -261,7 +261,7 @@ def _check_lengths(*, none_too: bool = False, **lengths_m: float) -> None:
         known = isinstance(value, (int, float, np.number)) and np.isfinite(value)
         if not known or value < 0.0 or (value == 0.0 and not none_too):
             least = "0 or more" if none_too else "more than 0"
-            raise TrackError(f"{name} is {value}; it must be a number, {least} metres.")
+            raise TrackError(f"{name} is {value!r}; it must be a number, {least} metres.")
 
 
 def _nothing_left(min_segment_m: float) -> str:
