@@ -1,4 +1,4 @@
-"""Graph: triples as plain texts, by predicate: what the readers look things up in."""
+"""Graph: triples by predicate: what the readers and the shapes look things up in."""
 
 from __future__ import annotations
 
@@ -8,31 +8,34 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import chain
+from typing import Any, Generic, TypeVar, cast
 
 import pyoxigraph as ox
 
 from geofield.formats.rdf.namespaces import ONTOLOGY, TYPE, expand, resource
 
+Value = TypeVar("Value")
+
 
 @dataclass(slots=True)
-class Graph:
+class Columns(Generic[Value]):
     """Triples as columns. Classes and predicates are asked for by prefixed name or full IRI."""
 
     #: Predicate to subject to its first value, in the order of the file.
-    columns: dict[str, dict[str, str]] = field(default_factory=dict)
+    columns: dict[str, dict[str, Value]] = field(default_factory=dict)
     #: Predicate to subject to its further values, where it has any.
-    more: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+    more: dict[str, dict[str, list[Value]]] = field(default_factory=dict)
     #: Class to subjects, made when first asked for.
     by_type: dict[str, dict[str, None]] = field(default_factory=dict, repr=False)
 
-    @classmethod
-    def of(cls, quads: Iterable[ox.Quad]) -> Graph:
+    @staticmethod
+    def of(quads: Iterable[ox.Quad]) -> Graph:
         """The graph of what a parser tells."""
-        graph = cls()
+        graph = Graph()
         graph.add((s.value, p.value, o.value) for s, p, o, _ in quads)
         return graph
 
-    def add(self, triples: Iterable[tuple[str, str, str]]) -> None:
+    def add(self, triples: Iterable[tuple[str, str, Value]]) -> None:
         """Take in triples: subjects, predicates and values."""
         columns, more = self.columns, self.more
         self.by_type.clear()
@@ -43,7 +46,7 @@ class Graph:
             if column.setdefault(subject, value) is not value:
                 more.setdefault(predicate, {}).setdefault(subject, []).append(value)
 
-    def merge(self, other: Graph) -> None:
+    def merge(self, other: Columns[Value]) -> None:
         """Take in another graph."""
         self.by_type.clear()
         for predicate, column in other.columns.items():
@@ -55,17 +58,17 @@ class Graph:
         for predicate, further in other.more.items():
             self.add((s, predicate, value) for s, values in further.items() for value in values)
 
-    def column(self, predicate: str) -> dict[str, str]:
+    def column(self, predicate: str) -> dict[str, Value]:
         """Each subject's first value of a predicate."""
         return self.columns.get(expand(predicate), {})
 
-    def pairs(self, predicate: str) -> Iterator[tuple[str, str]]:
+    def pairs(self, predicate: str) -> Iterator[tuple[str, Value]]:
         """Every subject with every value of a predicate."""
         more = self.more.get(expand(predicate), {})
         further = ((subject, value) for subject, values in more.items() for value in values)
         return chain(self.column(predicate).items(), further)
 
-    def everywhere(self, predicate: str) -> Iterator[str]:
+    def everywhere(self, predicate: str) -> Iterator[Value]:
         """The values of a predicate, whatever the subject."""
         return (value for _, value in self.pairs(predicate))
 
@@ -78,7 +81,7 @@ class Graph:
         if not self.by_type:
             by_type: defaultdict[str, list[str]] = defaultdict(list)
             for iri, each in self.pairs(TYPE):
-                by_type[each].append(iri)
+                by_type[str(each)].append(iri)
             self.by_type.update((each, dict.fromkeys(iris)) for each, iris in by_type.items())
         found = [self.by_type[name] for name in map(expand, types) if name in self.by_type]
         if len(found) < 2:
@@ -86,19 +89,25 @@ class Graph:
         every = set().union(*found)
         return [iri for iri in self.column(TYPE) if iri in every]
 
-    def values(self, subject: str | None, predicate: str) -> list[str]:
-        """All distinct values; none where there is nothing."""
-        name = expand(predicate)
-        first = self.columns.get(name, {}).get(subject or "")
-        if first is None:
-            return []
-        return list(dict.fromkeys([first, *self.more.get(name, {}).get(subject or "", ())]))
+    def values(self, subject: str | None, *predicates: str) -> list[Value]:
+        """All distinct values along a path of predicates; none where there is nothing."""
+        found: list[Any] = [subject]
+        for name in map(expand, predicates):
+            first, more = self.columns.get(name, {}), self.more.get(name, {})
+            known = [each for each in map(str, found) if each in first]
+            found = [value for each in known for value in (first[each], *more.get(each, ()))]
+        return found if len(found) < 2 else list(dict.fromkeys(found))
 
-    def value(self, subject: str | None, *predicates: str) -> str | None:
+    def value(self, subject: str | None, *predicates: str) -> Value | None:
         """The first value along a path of predicates, None where there is none."""
+        value: Any = subject
         for predicate in predicates:
-            subject = self.columns.get(expand(predicate), {}).get(subject or "")
-        return subject
+            value = self.columns.get(expand(predicate), {}).get(value or "")
+        return cast("Value | None", value)
+
+
+#: Triples as plain texts.
+Graph = Columns[str]
 
 
 def number(text: str | None, kind: type[int] | type[float] = float) -> float | None:

@@ -1,8 +1,9 @@
 """Shapes: the SHACL of ``data/shapes.ttl``, run over pyoxigraph's terms and told in plain words.
 
 pySHACL takes a millisecond for each node and a kilobyte for each triple, and a plan may have
-tens of thousands of points. The constraints that the shapes use are compiled to functions once;
-tests hold the findings against pySHACL's.
+tens of thousands of points; Oxigraph's store, which SPARQL could ask, forgets how numbers are
+typed. Here each constraint that the shapes use is a function; tests hold the findings against
+pySHACL's.
 """
 
 from __future__ import annotations
@@ -10,23 +11,24 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
 import pyoxigraph as ox
 
 from geofield.errors import FormatError
-from geofield.formats.rdf.graph import label
-from geofield.formats.rdf.namespaces import SH, SHAPES, TYPE, XSD, compact, expand, resource
+from geofield.formats.rdf.graph import Columns, label, number
+from geofield.formats.rdf.namespaces import SH, SHAPES, XSD, compact, resource
 from geofield.formats.rdf.parse import Problem
 
-Node = dict[str, list[Any]]
-#: The values of a path that break a constraint; None for one that is missing.
-Test = Callable[[list[Any]], list[Any]]
-#: Predicates one behind another; nothing means the node itself.
-PropertyPath = tuple[str, ...]
-#: Message, constraint and test.
-Rule = tuple[str, str, Test]
+#: Values are terms; subjects stand as in N-Triples, so that blank nodes are none of the IRIs.
+Terms = Columns[Any]
+#: Constraints of all values together; the others are of each.
+_OF_ALL = ("minCount", "maxCount", "hasValue")
+#: Whether values (or one) keep a constraint.
+Test = Callable[[Any], object]
+#: Predicates one behind another, the constraints of what they lead to, and these in words.
+Property = tuple[tuple[str, ...], dict[str, Test], str]
 #: Texts that are of a datatype.
 _LEXICAL = {
     XSD + "double": r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN",
@@ -41,119 +43,86 @@ _NUMBERS = [XSD + name for name in ("double", "integer", "int", "decimal", "floa
 
 def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
     """Everything in a graph that breaks a shape of its class or a class above it."""
-    nodes = _nodes(quads)
-    for subject, node in nodes.items():
-        types = _with_parents(node.get(TYPE, ()), nodes)
-        for path, rules in _rules_of(tuple(types)):
-            values = list(dict.fromkeys([subject] if not path else _values(node, path, nodes)))
-            for message, constraint, test in rules:
-                for value in test(values):
-                    yield _problem(subject, path, constraint, value, message)
+    graph = _terms(quads)
+    members = _members(graph)
+    for cls, properties in _properties().items():
+        subjects = members.get(cls, {})
+        for subject in subjects:
+            if not subject.startswith("<"):
+                hint = "Name it, or it cannot be merged with other data."
+                yield Problem("It has no IRI.", subject, hint=hint, rule="nodeKind")
+        for path, tests, message in properties:
+            some = path[0] in graph.columns
+            told = [(s, graph.values(s, *path) if some else []) for s in subjects]
+            for name, holds in tests.items():
+                if name in _OF_ALL:
+                    broken = [(s, None) for s, values in told if not holds(values)]
+                else:
+                    broken = [(s, v) for s, values in told for v in values if not holds(v)]
+                for subject, value in broken:
+                    yield _problem(subject, path, name, value, message)
 
 
-def _nodes(quads: Iterable[ox.Quad]) -> dict[Any, Node]:
-    """What is said of each subject, by predicate."""
-    nodes: dict[Any, Node] = {}
-    # A graph is a set: what a file says a thousand times counts once.
-    for subject, predicate, value, _ in dict.fromkeys(quads):
-        nodes.setdefault(subject, {}).setdefault(predicate.value, []).append(value)
-    return nodes
+def _terms(quads: Iterable[Any]) -> Terms:
+    graph = Terms()
+    graph.add((str(s), p.value, o) for s, p, o, _ in quads)
+    return graph
 
 
-def _with_parents(types: Iterable[Any], nodes: dict[Any, Node]) -> list[str]:
-    """Classes, and those above them where the file has classes of its own."""
-    found = list(types)
-    for each in found:
-        above = nodes.get(each, {}).get(expand("rdfs:subClassOf"), ())
-        found += [parent for parent in above if parent not in found]
-    return [each.value for each in found if isinstance(each, ox.NamedNode)]
-
-
-def _values(node: Node, path: PropertyPath, nodes: dict[Any, Node]) -> list[Any]:
-    values = node.get(path[0], [])
-    for predicate in path[1:]:
-        values = [v for each in values for v in nodes.get(each, {}).get(predicate, [])]
-    return values
-
-
-@lru_cache(maxsize=256)
-def _rules_of(types: tuple[str, ...]) -> list[tuple[PropertyPath, list[Rule]]]:
-    """What is asked of a node of some classes, path by path: values are looked up once."""
-    by_path: dict[PropertyPath, list[Rule]] = {}
-    for each in types:
-        for path, rule in _rules().get(each, ()):
-            by_path.setdefault(path, []).append(rule)
-    return list(by_path.items())
+def _members(graph: Terms) -> dict[str, dict[str, None]]:
+    """The subjects by class; also by the classes above it, where the file has some of its own."""
+    members: defaultdict[str, dict[str, None]] = defaultdict(dict)
+    for subject, cls in graph.pairs("rdf:type"):
+        members[str(cls)][subject] = None
+    for cls, subjects in list(members.items()):
+        above = [cls]
+        for each in above:
+            parents = map(str, graph.values(each, "rdfs:subClassOf"))
+            above += [parent for parent in parents if parent not in above]
+        for each in above[1:]:
+            members[each] |= subjects
+    return members
 
 
 @cache
-def _rules() -> dict[str, list[tuple[PropertyPath, Rule]]]:
-    """Path and rule of everything that is asked, by the class it is for."""
-    graph = _nodes(ox.parse(resource(SHAPES), ox.RdfFormat.TURTLE))
-    rules: defaultdict[str, list[tuple[PropertyPath, Rule]]] = defaultdict(list)
-    words = "Name it, or it cannot be merged with other data."
-    is_named: tuple[PropertyPath, Rule] = ((), (words, "nodeKind", _each(_is_iri)))
-    for shape in graph.values():
-        for cls in shape.get(SH + "targetClass", ()):
-            for prop in shape[SH + "property"]:
-                rules[cls.value].extend(_compiled(graph, graph[prop]))
-            rules[cls.value] += [is_named] * (SH + "nodeKind" in shape)
-    return rules
+def _properties() -> dict[str, list[Property]]:
+    """What the shapes ask of the members of each class."""
+    graph = _terms(ox.parse(resource(SHAPES), ox.RdfFormat.TURTLE))
+    asked: defaultdict[str, list[Property]] = defaultdict(list)
+    for shape, cls in graph.pairs("sh:targetClass"):
+        for prop in map(str, graph.values(shape, "sh:property")):
+            told = {p.removeprefix(SH): c[prop] for p, c in graph.columns.items() if prop in c}
+            first, message, flags = (told.pop(name, None) for name in ("path", "message", "flags"))
+            path = tuple(term.value for term in (_items(graph, first) or [first]))
+            tests = {name: _test(graph, name, told[name], flags) for name in told}
+            asked[str(cls)].append((path, tests, message.value))
+    return asked
 
 
-def _compiled(graph: dict[Any, Node], shape: Node) -> Iterator[tuple[PropertyPath, Rule]]:
-    (first,) = shape[SH + "path"]
-    path = tuple(term.value for term in (_items(graph, first) or [first]))
-    message = shape[SH + "message"][0].value
-    for predicate, (value, *_) in shape.items():
-        name = predicate.removeprefix(SH)
-        if name not in ("path", "message", "flags"):
-            yield path, (message, name, _test(graph, name, value, shape))
+def _items(graph: Terms, head: Any) -> list[Any]:
+    first = graph.value(str(head), "rdf:first")
+    return [] if first is None else [first, *_items(graph, graph.value(str(head), "rdf:rest"))]
 
 
-def _items(graph: dict[Any, Node], head: Any) -> list[Any]:
-    items = []
-    while expand("rdf:first") in graph.get(head, {}):
-        items += graph[head][expand("rdf:first")]
-        (head,) = graph[head][expand("rdf:rest")]
-    return items
-
-
-def _test(graph: dict[Any, Node], name: str, value: Any, shape: Node) -> Test:
-    """One constraint as a function from values to those that break it."""
-    if name == "minCount":
-        return lambda values: [] if len(values) >= int(value.value) else [None]
-    if name == "maxCount":
-        return lambda values: [] if len(values) <= int(value.value) else [None]
-    if name == "hasValue":
-        return lambda values: [] if value in values else [None]
-    if name == "or":
-        kinds = [graph[each][SH + "datatype"][0].value for each in _items(graph, value)]
-        return _each(lambda term: _is_of(term, kinds))
-    if name == "nodeKind":
-        return _each(_is_iri)
-    if name == "datatype":
-        return _each(lambda term: _is_of(term, (value.value,)))
-    if name in ("minInclusive", "maxInclusive"):
-        sign, bound = (1.0 if name == "minInclusive" else -1.0), float(value.value)
-        return _each(
-            lambda term: _is_of(term, _NUMBERS) and sign * float(term.value) >= sign * bound
-        )
-    if name == "in":
-        allowed = set(_items(graph, value))
-        return _each(lambda term: term in allowed)
-    if name == "pattern":
-        pattern = re.compile(value.value, re.IGNORECASE if SH + "flags" in shape else 0)
-        return _each(lambda term: pattern.search(term.value) is not None)
-    raise FormatError(f"The shapes use sh:{name}, which is not known here.")
-
-
-def _each(test: Callable[[Any], bool]) -> Test:
-    return lambda values: [value for value in values if not test(value)]
-
-
-def _is_iri(term: Any) -> bool:
-    return isinstance(term, ox.NamedNode)
+def _test(graph: Terms, name: str, value: Any, flags: Any) -> Test:
+    """One constraint as a function of values."""
+    items, bound = _items(graph, value), number(value.value) or 0.0
+    kinds = [kind.value for each in items for kind in graph.values(str(each), "sh:datatype")]
+    tests: dict[str, Test] = {
+        "minCount": lambda values: len(values) >= bound,
+        "maxCount": lambda values: len(values) <= bound,
+        "hasValue": lambda values: value in values,
+        "nodeKind": lambda term: isinstance(term, ox.NamedNode),
+        "datatype": lambda term: _is_of(term, (value.value,)),
+        "or": lambda term: _is_of(term, kinds),
+        "in": set(items).__contains__,
+        "minInclusive": lambda term: _is_of(term, _NUMBERS) and float(term.value) >= bound,
+        "maxInclusive": lambda term: _is_of(term, _NUMBERS) and float(term.value) <= bound,
+        "pattern": lambda term: re.search(value.value, term.value, re.I if flags else 0),
+    }
+    if name not in tests:
+        raise FormatError(f"The shapes use sh:{name}, which is not known here.")
+    return tests[name]
 
 
 def _is_of(term: Any, kinds: Sequence[str]) -> bool:
@@ -162,11 +131,8 @@ def _is_of(term: Any, kinds: Sequence[str]) -> bool:
     return kind in kinds and re.fullmatch(_LEXICAL.get(kind, "(?s:.*)"), term.value) is not None
 
 
-def _problem(subject: Any, path: PropertyPath, name: str, value: Any, rule: str) -> Problem:
+def _problem(subject: str, path: tuple[str, ...], name: str, value: Any, rule: str) -> Problem:
     """What is wrong, in plain words; the rule that it breaks as the hint."""
-    shown = f"<{subject.value}>" if isinstance(subject, ox.NamedNode) else f"_:{subject.value}"
-    if not path:
-        return Problem("It has no IRI.", shown, hint=rule, rule="nodeKind")
     term = compact(path[0]) if len(path) == 1 else "its default geometry"
     what = f"{label(term).lower()} ({term})" if label(term) else term
     found = "" if value is None else value.value[:80]
@@ -181,7 +147,7 @@ def _problem(subject: Any, path: PropertyPath, name: str, value: Any, rule: str)
         "hasValue": f"Its {what} is not the one expected.",
     }
     message = words.get(name, f"Its {what} is {_typed(value)}.")
-    return Problem(message, shown, hint=rule, rule=f"{name} {term}")
+    return Problem(message, subject, hint=rule, rule=f"{name} {term}")
 
 
 def _typed(value: Any) -> str:
