@@ -15,8 +15,8 @@ from geofield.errors import FormatError
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.rdf.geosparql import geometry_of
 from geofield.formats.rdf.graph import Graph, number, ontology
-from geofield.formats.rdf.layers import LayerMap, classes, layer_maps
-from geofield.formats.rdf.namespaces import GML, STUDY_POINT, compact
+from geofield.formats.rdf.layers import classes, layer_maps
+from geofield.formats.rdf.namespaces import compact
 from geofield.formats.rdf.parse import Problem
 from geofield.formats.rdf.scope import tracks_of
 
@@ -51,34 +51,25 @@ def check_graph(graph: Graph) -> Iterator[Problem]:
 
 def _double_numbers(graph: Graph) -> Iterator[Problem]:
     """Numbers that must be unique: in the survey, in the plan, on the track."""
-    seen: dict[Any, str] = {}
-    keys: list[tuple[str, str, Any]] = []
-    for layer in layer_maps():
-        title = layer.layer.column(layer.layer.key[-1]).title.lower()
-        names = {column.name: name for column, name in layer.properties()}
-        numbers = [names[key] for key in layer.layer.key if key in names]
-        for iri in graph.of_type(*classes(layer)) if layer.layer.name != "field" else ():
-            keys.append((iri, title, _key(graph, layer, numbers, iri)))
-    for iri in graph.of_type(GML + "point"):
-        number = graph.value(iri, STUDY_POINT + "no")
-        keys.append((iri, "point", number and (GML, number)))
-    for iri, title, key in keys:
-        if key and seen.setdefault(key, iri) != iri:
-            message = f"Has the same {title} number {key[-1]} as <{seen[key]}>."
-            yield Problem(message, f"<{iri}>", None, "Give each its own number.", "unique-number")
+    for layer in layer_maps()[1:]:
+        of = layer.layer
+        title = of.column(of.key[-1]).title.lower()
+        iris = graph.of_type(*layer.known_as)
+        numbers = [graph.told(iris, layer.names(key)) for key in of.key if layer.names(key)]
+        seen: dict[Any, str] = {}
+        for iri, *key in zip(iris, _owners(graph, of.name, iris), *numbers, strict=True):
+            if None not in key[1:] and seen.setdefault(tuple(key), iri) != iri:
+                message = f"Has the same {title} number {key[-1]} as <{seen[tuple(key)]}>."
+                hint = "Give each its own number."
+                yield Problem(message, f"<{iri}>", None, hint, "unique-number")
 
 
-def _key(graph: Graph, layer: LayerMap, terms: list[str], iri: str) -> tuple[Any, ...] | None:
-    """What must be unique: layer and owner, then the layer's own key numbers, of these terms."""
-    owners = ["gf:onTrack", "gf:inPlan", "gf:inSurvey", "gf:inField"]
-    owner = next(filter(None, (graph.value(iri, name) for name in owners)), None)
-    if layer.layer.name == "track_points":
-        # Points are numbered through the whole plan, not per track.
-        owner = graph.value(tracks_of(graph, [iri])[0], "gf:inPlan")
-    elif layer.layer.name == "route":
-        owner = graph.value(iri, "gf:inPlan")
-    numbers = [graph.value(iri, term) for term in terms]
-    return None if None in numbers else (layer.layer.name, owner, *numbers)
+def _owners(graph: Graph, layer: str, iris: list[str]) -> list[str | None]:
+    """In what each row's number must be unique; points are numbered through the whole plan."""
+    if layer == "track_points":
+        return graph.told(tracks_of(graph, iris), ["gf:inPlan"])
+    on = ["gf:onTrack"] if layer != "route" else []
+    return graph.told(iris, [*on, "gf:inPlan", "gf:inSurvey", "gf:inField"])
 
 
 def _dangling(graph: Graph) -> Iterator[Problem]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import chain
@@ -104,6 +104,14 @@ class Columns(Generic[Value]):
         for predicate in predicates:
             value = self.columns.get(expand(predicate), {}).get(value or "")
         return cast("Value | None", value)
+
+    def told(self, subjects: Sequence[str | None], names: Iterable[str]) -> list[Value | None]:
+        """Of each subject the first value of any of some properties."""
+        found: list[Value | None] = [None] * len(subjects)
+        for column in filter(None, map(self.column, names)):
+            known = [column.get(subject or "") for subject in subjects]
+            found = [new if old is None else old for old, new in zip(found, known, strict=True)]
+        return found
 
 
 #: Triples as plain texts.

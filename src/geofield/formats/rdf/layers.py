@@ -7,12 +7,13 @@ RDF, by the default rules; tests then ask for its words in ``data/ontology.ttl``
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
 from geofield import schema
-from geofield.formats.rdf.namespaces import expand
+from geofield.formats.rdf.namespaces import STUDY_PREFIXES, expand
 
 #: Columns whose property is not simply their own name in camel case.
 _COLUMN_TERMS = {
@@ -62,6 +63,19 @@ class LayerMap:
     belongs: tuple[tuple[str, str], ...] = (("gf:inPlan", "plan"),)
     #: Classes of other vocabularies that rows have as well.
     also: tuple[str, ...] = ()
+    #: The source study's class, and its properties of columns.
+    study_cls: str = ""
+    study: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def known_as(self) -> list[str]:
+        """The classes by which rows are known, whoever wrote them."""
+        return [*classes(self), *filter(None, [self.study_cls])]
+
+    def names(self, column: str) -> list[str]:
+        """The properties that tell a column that is not a link, whoever wrote them."""
+        own = [name for each, name in self.properties() if each.name == column]
+        return [*own, *filter(None, [self.study.get(column)])]
 
     def properties(self) -> list[tuple[schema.Column, str]]:
         """The columns that are properties, with prefixed names, in the layer's order."""
@@ -76,6 +90,7 @@ class LayerMap:
 _IN_FIELD, _OF_PICTURE = ("gf:inField", "field"), ("prov:wasDerivedFrom", "imagery")
 _ON_TRACK = Link("track_no", "gf:onTrack", "tracks")
 _ON_SEGMENT = Link("segment_no", "gf:onSegment", "segments")
+_IN_PICTURE = {"x_px": "svg:cx", "y_px": "svg:cy"}
 
 #: By layer what differs from the default.
 _MAPS: dict[str, dict[str, Any]] = {
@@ -88,6 +103,11 @@ _MAPS: dict[str, dict[str, Any]] = {
         "product": "obstacles", "in_plan": False, "label": "Obstacle {obstacle_no}",
         "belongs": (_IN_FIELD, ("gf:inSurvey", "survey"), _OF_PICTURE),
         "also": ("sosa:FeatureOfInterest",),
+        "study_cls": STUDY_PREFIXES["po"] + "tree",
+        "study": {
+            "obstacle_no": "obstacle:no", "lat": "wgs84:lat", "lon": "wgs84:long",
+            **_IN_PICTURE, "radius_px": "svg:r",
+        },
     },
     "tracks": {
         "label": "Track {track_no}",
@@ -97,7 +117,13 @@ _MAPS: dict[str, dict[str, Any]] = {
     "gaps": {
         "links": (_ON_TRACK,), "belongs": (), "terms": {"obstacle_no": "gf:causingObstacleNo"},
     },
-    "track_points": {"links": (_ON_TRACK, _ON_SEGMENT), "belongs": ()},
+    "track_points": {
+        "links": (_ON_TRACK, _ON_SEGMENT), "belongs": (), "study_cls": "gml:point",
+        "study": {
+            "point_no": "trajectory:no", "track_no": "trajectory:track",
+            "lat": "gml:lat", "lon": "gml:long", **_IN_PICTURE,
+        },
+    },
     "headland_tracks": {"path": "headland-track/{pass_no}/segment/{segment_no}"},
     "route": {
         "cls": "gf:RouteStep", "path": "route/{sequence}", "links": (_ON_TRACK, _ON_SEGMENT),

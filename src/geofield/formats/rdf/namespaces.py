@@ -30,21 +30,13 @@ def resource(name: str) -> str:
 CONTEXT_TERMS: Final[dict[str, Any]] = json.loads(resource(CONTEXT))["@context"]
 #: Prefixes of every product, by name.
 PREFIXES: Final = {name: iri for name, iri in CONTEXT_TERMS.items() if isinstance(iri, str)}
-# The source study's vocabulary (METHOD.md, section 5).
-STUDY_OBSTACLE: Final = "http://www.DLC.org/Obstacle#"
-STUDY_TRAJECTORY: Final = "http://www.DLC.org/Trajectory#"
-STUDY_POINT: Final = "http://www.DLC.org/trajectory#"
-STUDY_TREE: Final = "http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#"
-SVG_CIRCLE: Final = "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd/circle#"
-GML: Final = "http://www.opengis.net/gml/"
-DCMI_IMAGE: Final = "http://purl.org/dc/dcmitype/Image"
-
+#: The source study's vocabulary (METHOD.md, section 5).
 STUDY_PREFIXES: Final[dict[str, str]] = {
-    "po": STUDY_TREE,
-    "svg": SVG_CIRCLE,
-    "gml": GML,
-    "obstacle": STUDY_OBSTACLE,
-    "trajectory": STUDY_POINT,
+    "po": "http://purl.obolibrary.org/obo/PO_0000003/hasNarrowSynonym#",
+    "svg": "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd/circle#",
+    "gml": "http://www.opengis.net/gml/",
+    "obstacle": "http://www.DLC.org/Obstacle#",
+    "trajectory": "http://www.DLC.org/trajectory#",
 }
 _TURTLE_PREFIX: Final = re.compile(r"^@prefix (\w+): <(.*)> \.$", re.MULTILINE)
 #: Also those that the ontology, the shapes and the queries need.
@@ -69,7 +61,9 @@ EPSG: Final = "http://www.opengis.net/def/crs/EPSG/0/"
 def expand(curie: str) -> str:
     """The full IRI of a prefixed name such as ``gf:Track``; a full IRI as it is."""
     prefix, _, name = curie.partition(":")
-    return curie if name.startswith("//") else SCHEMA_PREFIXES[prefix] + name
+    if name.startswith("//"):
+        return curie
+    return (SCHEMA_PREFIXES.get(prefix) or STUDY_PREFIXES[prefix]) + name
 
 
 @cache

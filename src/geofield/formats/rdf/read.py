@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,17 +24,15 @@ from geofield.formats.rdf.graph import Graph, number
 from geofield.formats.rdf.layers import (
     YES_NO,
     LayerMap,
-    classes,
     layer_map,
     layer_maps,
     value_iri,
 )
-from geofield.formats.rdf.namespaces import GML, STUDY_OBSTACLE, STUDY_TREE, SVG_CIRCLE, expand
+from geofield.formats.rdf.namespaces import expand
 from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
 from geofield.formats.rdf.parse import SYNTAXES, parse
 from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
-from geofield.formats.rdf.study import STUDY_TERMS
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import circle_polygons
 
@@ -42,8 +40,6 @@ if TYPE_CHECKING:
     import geopandas as gpd
 
 _DEFAULT = "geo:hasDefaultGeometry"
-#: A further class by which rows of a layer are known.
-_STUDY_CLASSES = {"obstacles": [STUDY_TREE + "tree"], "track_points": [GML + "point"]}
 
 
 def read(path: Path, *, plan: str | None = None) -> Dataset:
@@ -91,8 +87,7 @@ def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = N
     grid = read_grid(graph, scope)
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in layer_maps():
-        further = _STUDY_CLASSES.get(layer.layer.name, ())
-        subjects = scope.rows(graph, layer, graph.of_type(*classes(layer), *further))
+        subjects = scope.rows(graph, layer, graph.of_type(*layer.known_as))
         if subjects or not layer.layer.optional:
             pixel_m = None if grid is None else grid.ground_resolution_m
             tables[layer.layer.name] = _Rows(graph, scope, layer, subjects).table(crs, pixel_m)
@@ -142,7 +137,7 @@ def _metric_crs(graph: Graph) -> CRS:
     for text in literals:
         point = shapely.get_coordinates(geometries_of([text], ["the literal"], LONLAT)[0])[0]
         return metric_crs(float(point[0]), float(point[1]))
-    for lon, lat in (("wgs84:long", "wgs84:lat"), (GML + "long", GML + "lat")):
+    for lon, lat in (("wgs84:long", "wgs84:lat"), ("gml:long", "gml:lat")):
         for x, y in zip(graph.everywhere(lon), graph.everywhere(lat), strict=False):
             return metric_crs(float(x), float(y))
     return LONLAT
@@ -165,36 +160,28 @@ class _Rows:
         if not self.subjects:
             return schema.empty(of, crs)
         data: dict[str, Any] = {}
-        study = STUDY_TERMS.get(of.name, {})
-        for column, name in self.layer.properties():
-            names = [name, study.get(column.name)]
-            data[column.name] = self.typed(column, self.told(self.subjects, names))
+        for column, _ in self.layer.properties():
+            told = self.told(self.subjects, self.layer.names(column.name))
+            data[column.name] = self.typed(column, told)
         for link in self.layer.links:
             target = layer_map(link.target)
-            numbers = {column.name: name for column, name in target.properties()}
-            names = [numbers[target.layer.key[-1]], study.get(link.column)]
+            names = [*target.names(target.layer.key[-1]), *self.layer.names(link.column)]
             data[link.column] = self.typed(
                 of.column(link.column), self.linked(link.predicate, names)
             )
         geometry = self.promoted(self.geometry(data, crs, pixel_m))
         return schema.conform(of, schema.table(of, data, geometry, crs))
 
-    def told(self, subjects: Sequence[str | None], names: Iterable[str | None]) -> list[str | None]:
+    def told(self, subjects: Sequence[str | None], names: Sequence[str]) -> list[str | None]:
         """Of each subject the first value of any of some properties."""
-        found: list[str | None] = [None] * len(subjects)
-        survey, plan = self.scope.survey, self.scope.plan
-        for name in filter(None, names):
-            column = self.graph.column(name)
-            if not column:
-                continue
-            known = [column.get(subject or "") for subject in subjects]
-            found = [new if old is None else old for old, new in zip(found, known, strict=True)]
-            if self.is_field and found == [None]:
-                others = (survey, plan) if "heading" in name else (survey,)
-                found = [next((column[iri] for iri in others if iri in column), None)]
+        found = self.graph.told(subjects, names)
+        if self.is_field and found == [None]:
+            plan = [self.scope.plan] if "heading" in names[0] else []
+            others = self.graph.told([self.scope.survey, *plan], names)
+            found = [next((each for each in others if each is not None), None)]
         return found
 
-    def linked(self, predicate: str, names: list[str | None]) -> list[str | None]:
+    def linked(self, predicate: str, names: list[str]) -> list[str | None]:
         """The number of the thing a link points to, or the number told directly."""
         link = self.graph.column(predicate)
         targets: list[str | None] = list(map(link.get, self.subjects))
@@ -302,7 +289,7 @@ def _footprint_radius(data: dict[str, Any], rows: Any, pixel_m: float | None) ->
     if np.isnan(radius).any():
         raise FormatError(
             "An obstacle has neither a geometry nor a radius in metres, and nothing tells "
-            f"how large a pixel of <{SVG_CIRCLE}r> is.",
-            hint=f"Add gf:radiusInMetres to it (<{STUDY_OBSTACLE}no> names it).",
+            f"how large a pixel of <{expand('svg:r')}> is.",
+            hint=f"Add gf:radiusInMetres to it (<{expand('obstacle:no')}> names it).",
         )
     return radius + np.nan_to_num(np.asarray(data["buffer_m"], float)[rows])

@@ -25,37 +25,11 @@ from geofield import schema
 from geofield.formats.rdf.describe import Description
 from geofield.formats.rdf.features import POINT_DECIMALS, column_terms, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map
-from geofield.formats.rdf.namespaces import (
-    DCMI_IMAGE,
-    GML,
-    STUDY_OBSTACLE,
-    STUDY_POINT,
-    STUDY_TRAJECTORY,
-    STUDY_TREE,
-    SVG_CIRCLE,
-    expand,
-    node,
-)
+from geofield.formats.rdf.namespaces import expand, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
-_PIXEL = {"x_px": SVG_CIRCLE + "cx", "y_px": SVG_CIRCLE + "cy"}
-#: By layer the study's property of columns.
-STUDY_TERMS: dict[str, dict[str, str]] = {
-    "obstacles": {
-        "obstacle_no": STUDY_OBSTACLE + "no",
-        "lat": expand("wgs84:lat"),
-        "lon": expand("wgs84:long"),
-        **_PIXEL,
-        "radius_px": SVG_CIRCLE + "r",
-    },
-    "track_points": {
-        "point_no": STUDY_POINT + "no",
-        "track_no": STUDY_POINT + "track",
-        "lat": GML + "lat",
-        "lon": GML + "long",
-        **_PIXEL,
-    },
-}
+_TRAJECTORY = "http://www.DLC.org/Trajectory#"
+_IMAGE = "http://purl.org/dc/dcmitype/Image"
 
 
 class StudyDescription(Description):
@@ -81,7 +55,7 @@ class StudyDescription(Description):
             frame = self.table(layer)
             iris, types = row_iris(layer, frame, self.names), self.types(layer, frame)
             avoided = [iri for iri, own in zip(iris, types, strict=True) if node(layer.cls) in own]
-            yield _members(STUDY_OBSTACLE, Texts(avoided))
+            yield _members("obstacle:", Texts(avoided))
         if name != schema.TRACK_POINTS.name:
             yield from super().layer(layer)
 
@@ -90,7 +64,7 @@ class StudyDescription(Description):
         types = super().types(layer, frame)
         if layer.layer.name != schema.OBSTACLES.name:
             return types
-        tree, obstacle = node(STUDY_TREE + "tree"), node(layer.cls)
+        tree, obstacle = node(layer.study_cls), node(layer.cls)
         return [
             (tree, *own) if own[0] == obstacle and kind == "tree" else own
             for own, kind in zip(types, frame["kind"], strict=True)
@@ -101,9 +75,9 @@ class StudyDescription(Description):
         columns = super().columns(layer, frame)
         if layer.layer.name != schema.OBSTACLES.name:
             return columns
-        study = _study_columns(layer.layer, frame)
+        study = _study_columns(layer, frame)
         taken = {predicate for predicate, _ in study}
-        image: Column = (node("dc:type"), node(DCMI_IMAGE))
+        image: Column = (node("dc:type"), node(_IMAGE))
         return [image, *study, *(each for each in columns if each[0] not in taken)]
 
     def detections(self, frame: Any) -> Iterator[Group]:
@@ -111,30 +85,32 @@ class StudyDescription(Description):
         return iter(())
 
     def _points(self, frame: Any) -> Iterator[Group]:
-        iris = row_iris(layer_map(schema.TRACK_POINTS.name), frame, self.names)
+        layer = layer_map(schema.TRACK_POINTS.name)
+        iris = row_iris(layer, frame, self.names)
         rounded = frame.assign(
             **{name: frame[name].astype(float).round(POINT_DECIMALS) for name in ("lat", "lon")}
         )
         places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
         columns: list[Column] = [
-            (node("rdf:type"), node(GML + "point")),
-            *_study_columns(schema.TRACK_POINTS, rounded),
-            (node(GML + "pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
+            (node("rdf:type"), node(layer.study_cls)),
+            *_study_columns(layer, rounded),
+            (node("gml:pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
             (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
         ]
-        yield _members(STUDY_TRAJECTORY, iris)
+        yield _members(_TRAJECTORY, iris)
         yield (Nodes(iris, columns),)
 
 
 def _members(root: str, members: Texts) -> Group:
     """The study's root description holds its nodes."""
-    return (Nodes(Texts([root]), [(node("rdfs:member"), [tuple(terms(members, 0))])]),)
+    return (Nodes(Texts([expand(root)]), [(node("rdfs:member"), [tuple(terms(members, 0))])]),)
 
 
-def _study_columns(layer: schema.Layer, frame: Any) -> list[Column]:
+def _study_columns(layer: LayerMap, frame: Any) -> list[Column]:
     result: list[Column] = []
-    for name, predicate in STUDY_TERMS[layer.name].items():
-        values: Any = column_terms(layer.name, layer.column(name), predicate, frame[name])
-        is_int = layer.column(name).type == "int"
-        result.append((node(predicate), Texts(values, "xsd:int" if is_int else "xsd:double")))
+    for name, predicate in layer.study.items():
+        column = layer.layer.column(name)
+        values: Any = column_terms(layer.layer.name, column, predicate, frame[name])
+        kind = "xsd:int" if column.type == "int" else "xsd:double"
+        result.append((node(predicate), Texts(values, kind)))
     return result

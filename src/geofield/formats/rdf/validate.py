@@ -10,8 +10,8 @@ from pathlib import Path
 from geofield.errors import FormatError
 from geofield.formats.rdf.checks import check_graph
 from geofield.formats.rdf.graph import Graph
-from geofield.formats.rdf.layers import classes, layer_maps
-from geofield.formats.rdf.namespaces import GF, GML, STUDY_TREE
+from geofield.formats.rdf.layers import layer_maps
+from geofield.formats.rdf.namespaces import GF
 from geofield.formats.rdf.parse import Problem, parse
 from geofield.formats.rdf.shapes import shape_problems
 from geofield.formats.validation import Finding
@@ -37,10 +37,10 @@ def validate(path: Path) -> list[Problem]:
         place = int(line[1]) if line else None
         return [Problem(message, path.name, place, error.hint or "", "syntax")]
     graph = Graph.of(quads)
-    known = [iri for layer in layer_maps() for iri in classes(layer)]
+    known = [iri for layer in layer_maps() for iri in layer.known_as]
     if not quads and _GEOFIELD in path.read_bytes()[:20_000]:
         return []  # one of a plan's three files: it has no obstacles, or no tracks
-    if not graph.of_type(*known, STUDY_TREE + "tree", GML + "point"):
+    if not graph.of_type(*known):
         return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
     return _located({*shape_problems(quads), *check_graph(graph)}, path)
 
