@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import shapely
 from pyproj import CRS
 
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, reproject
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.rdf.geosparql import geometry_of
 from geofield.formats.rdf.graph import Graph, number, ontology
 from geofield.formats.rdf.layers import classes, layer_maps
-from geofield.formats.rdf.namespaces import compact
+from geofield.formats.rdf.namespaces import compact, expand
 from geofield.formats.rdf.parse import Problem
 from geofield.formats.rdf.scope import tracks_of
 
@@ -26,12 +27,6 @@ _FAR_DEG = 0.1
 _NEAR_DEG = 0.001
 #: A geometry in the metric CRS may differ from the same in CRS84 by this.
 _SAME_PLACE_M = 1.0
-#: Links and the class of what they point to, where the ontology does not name one class as range.
-_LINKS = {
-    "gf:causedBy": "gf:Obstacle",
-    "geo:hasGeometry": "geo:Geometry",
-    "geo:hasDefaultGeometry": "geo:Geometry",
-}
 _AXES = "In CRS84 the longitude comes first."
 
 #: West, south, east and north; east may lie beyond 180.
@@ -78,7 +73,9 @@ def _dangling(graph: Graph) -> Iterator[Problem]:
     present["gf:Field"] = set(graph.of_type("gf:Field"))
     present["geo:Geometry"] = set(graph.column("geo:asWKT"))
     ranges = {name: compact(cls) for name, cls in ontology().pairs("rdfs:range")}
-    for name, cls in (ranges | _LINKS).items():
+    # The ontology names two classes; any obstacle is one of the first here.
+    ranges[expand("gf:causedBy")] = "gf:Obstacle"
+    for name, cls in ranges.items():
         # Things of a class that the file has none of may be in another file.
         if not present.get(cls) and cls != "geo:Geometry":
             continue
@@ -111,11 +108,9 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
 
 
 def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
-    if not crs.is_geographic:
-        # Every vertex: near a pole the corners of a box lie anywhere around what is in it.
-        project = transformer(crs, LONLAT)
-        shape = shapely.transform(shape, lambda xy: np.column_stack(project.transform(*xy.T)))
-    (shape,) = unwrapped(np.array([shape]))
+    # Every vertex: near a pole the corners of a box lie anywhere around what is in it.
+    lonlat = shape if crs.is_geographic else reproject(shape, crs, LONLAT)
+    (shape,) = unwrapped(np.array([lonlat]))
     west, south, east, north = shapely.bounds(shape).tolist()
     box = (west, south, east, north)
     return box if all(map(math.isfinite, box)) else None
@@ -152,16 +147,15 @@ def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
     homes = [box for box in map(place, graph.of_type("gf:Field")) if box is not None]
     if len(homes) != 1:
         return
-    for layer in layer_maps():
-        for iri in graph.of_type(*classes(layer)):
-            box = place(iri)
-            if box is None or _near(homes[0], box[0], box[1], _FAR_DEG):
-                continue
-            if _near(homes[0], box[1], box[0], _FAR_DEG):
-                message = "Has latitude and longitude swapped."
-                yield Problem(message, f"<{iri}>", None, _AXES, "swapped-axes")
-            else:
-                yield Problem("Lies far outside its field.", f"<{iri}>", rule="far-outside")
+    for iri in graph.of_type(*chain.from_iterable(map(classes, layer_maps()))):
+        box = place(iri)
+        if box is None or _near(homes[0], box[0], box[1], _FAR_DEG):
+            continue
+        if _near(homes[0], box[1], box[0], _FAR_DEG):
+            message = "Has latitude and longitude swapped."
+            yield Problem(message, f"<{iri}>", None, _AXES, "swapped-axes")
+        else:
+            yield Problem("Lies far outside its field.", f"<{iri}>", rule="far-outside")
 
 
 def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -76,14 +75,16 @@ class Columns(Generic[Value]):
         """Whether anything is said of a subject."""
         return any(subject in column for column in self.columns.values())
 
+    def types(self) -> dict[str, dict[str, None]]:
+        """The subjects of each class, by its full name."""
+        if not self.by_type:
+            for iri, each in self.pairs(TYPE):
+                self.by_type.setdefault(str(each), {})[iri] = None
+        return self.by_type
+
     def of_type(self, *types: str) -> list[str]:
         """The subjects of any of some classes, in the order of the file."""
-        if not self.by_type:
-            by_type: defaultdict[str, list[str]] = defaultdict(list)
-            for iri, each in self.pairs(TYPE):
-                by_type[str(each)].append(iri)
-            self.by_type.update((each, dict.fromkeys(iris)) for each, iris in by_type.items())
-        found = [self.by_type[name] for name in map(expand, types) if name in self.by_type]
+        found = [self.types()[name] for name in map(expand, types) if name in self.types()]
         if len(found) < 2:
             return list(*found)
         every = set().union(*found)

@@ -12,6 +12,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from itertools import chain
 from typing import Any
 
 import pyoxigraph as ox
@@ -44,9 +45,8 @@ _NUMBERS = [XSD + name for name in ("double", "integer", "int", "decimal", "floa
 def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
     """Everything in a graph that breaks a shape of its class or a class above it."""
     graph = _terms(quads)
-    members = _members(graph)
     for cls, properties in _properties().items():
-        subjects = members.get(cls, {})
+        subjects = _members(graph, cls)
         for subject in subjects:
             if not subject.startswith("<"):
                 hint = "Name it, or it cannot be merged with other data."
@@ -69,19 +69,13 @@ def _terms(quads: Iterable[Any]) -> Terms:
     return graph
 
 
-def _members(graph: Terms) -> dict[str, dict[str, None]]:
-    """The subjects by class; also by the classes above it, where the file has some of its own."""
-    members: defaultdict[str, dict[str, None]] = defaultdict(dict)
-    for subject, cls in graph.pairs("rdf:type"):
-        members[str(cls)][subject] = None
-    for cls, subjects in list(members.items()):
-        above = [cls]
-        for each in above:
-            parents = map(str, graph.values(each, "rdfs:subClassOf"))
-            above += [parent for parent in parents if parent not in above]
-        for each in above[1:]:
-            members[each] |= subjects
-    return members
+def _members(graph: Terms, cls: str) -> list[str]:
+    """The subjects of a class, and of those below it where the file has classes of its own."""
+    below = [cls]
+    for each in below:
+        own = (name for name, above in graph.pairs("rdfs:subClassOf") if str(above) == each)
+        below += [name for name in own if name not in below]
+    return list(dict.fromkeys(chain.from_iterable(graph.types().get(each, ()) for each in below)))
 
 
 @cache
