@@ -319,6 +319,8 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
         (["obstacles", PLAN, PICTURE, "-o", "field.gpkg"], "The picture comes first"),
         (["field", PICTURE, "--lat", "35,07", "--lon", "33.5", "-o", "a.gpkg"], "write degrees"),
         (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", ""], "it is empty"),
+        (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", "-"], "give a name"),
+        (["tracks", PLAN, "--spacing", "4", "-o", "-"], "standard input and output are not used"),
     ],
 )
 def test_wrong_words_are_told_with_the_right_ones(

@@ -364,7 +364,7 @@ def test_fields_deleted_or_split_in_the_overview_are_told(folder: Path) -> None:
     _sql(folder / "farm" / "farm.gpkg", "DELETE FROM field WHERE field_id = 'a'")
     # Its tracks are nobody's: its neighbours had them as drawn.
     said = " ".join(_batch(folder).split())
-    assert "1 fields are deleted there (a)" in said
+    assert "1 field is deleted there (a)" in said
     assert "as edited" not in said
 
     def split(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:

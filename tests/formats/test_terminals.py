@@ -272,7 +272,7 @@ def test_water_buildings_roads_headings_and_pivots_of_other_programs(tmp_path, t
         "1 of type water",
         "1 of type building",
         "1 of type road",
-        "1 polygons left out: treatment zone",
+        "1 polygon left out: treatment zone",
         "an A+ line",
         "a pivot of 30.0 m",
     ):

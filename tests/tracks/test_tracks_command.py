@@ -465,7 +465,7 @@ def test_obstacles_that_are_not_avoided_are_told(tmp_path: Path, several: int) -
     for name, places, crs, told in (
         ("elsewhere", [here], 32632, "none of its 1 obstacles stands at a field"),
         ("empty", [], CRS, "holds no shape: NOTHING of it is avoided"),
-        ("half", [here, None], CRS, "1 rows have no shape and are not avoided: row 2"),
+        ("half", [here, None], CRS, "1 row has no shape and is not avoided: row 2"),
         ("right", [here], CRS, ""),
     ):
         trees = standing(tmp_path / f"{name}.gpkg", places, crs, radius_m=[3.0] * len(places))

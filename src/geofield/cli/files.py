@@ -24,6 +24,8 @@ class NamedPath(click.Path):
         """The path."""
         if value == "":
             self.fail("it is empty: give a name.", param, ctx)
+        if value == "-" and not self.exists:
+            self.fail("standard input and output are not used here: give a name.", param, ctx)
         path = super().convert(value, param, ctx)
         if isinstance(path, Path) and path.suffix.lower() == ".gpkg" and path.is_symlink():
             return path.resolve()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import progress_bar, say_note
 from geofield.cli.standing import tell_unreached
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -135,7 +136,7 @@ def _figures(farm: Farm, target: Path, wanted: Wanted) -> Told:
         found = {plan.field.field_id: figures_of(plan, target) for plan in farm}
         rows = [found[one] for one in status["field_id"] if one in found]
     else:
-        say_note(f"{len(farm)} fields are planned, in {target}.")
+        say_note(f"{counted(len(farm), 'field is', 'fields are')} planned, in {target}.")
     return rows, failed
 
 
@@ -215,12 +216,15 @@ def line_of(row: dict[str, Any]) -> str:
     from geofield.model.map_words import heading_in_words
 
     text = (
-        f"{row['name']}: {row['track_count']} tracks, {row['segment_count']} segments, "
+        f"{row['name']}: {counted(row['track_count'], 'track')}, "
+        f"{counted(row['segment_count'], 'segment')}, "
         f"{row['length_m']:.0f} m, heading {heading_in_words(row['heading_deg'])} degrees, "
         f"{row['coverage_percent']:.1f} % covered"
     )
     if "turn_count" in row:
-        text += f", {row['turn_count']} turns ({row['turns_that_do_not_fit']} do not fit)"
+        text += (
+            f", {counted(row['turn_count'], 'turn')} ({row['turns_that_do_not_fit']} do not fit)"
+        )
         if row["unworked_at_turns_m"] >= 0.5:
             text += f", {row['unworked_at_turns_m']:.0f} m of track left unworked at them"
     if row["direction_why"]:

@@ -12,6 +12,7 @@ from geofield.cli.files import OLD_FILE, claim_plan, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated, say_removed
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.settings import Settings
@@ -83,7 +84,7 @@ def obstacles(
         return
     counts = table["status"].value_counts().sort_index()
     parts = ", ".join(f"{count} {status}" for status, count in counts.items()) or "none found"
-    say(f"{len(table)} obstacles ({parts}) in {output}")
+    say(f"{counted(len(table), 'obstacle')} ({parts}) in {output}")
     for change in plan.changes:
         say(f"Changes: {change}")
     say_removed(before, plan, output)

@@ -20,6 +20,7 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.model import Tracks
@@ -165,7 +166,7 @@ def _say_tracks(tracks: Tracks) -> None:
 
     segments = tracks.segments
     say(
-        f"Tracks     {len(tracks.lines)} in {len(segments)} segments, "
+        f"Tracks     {len(tracks.lines)} in {counted(len(segments), 'segment')}, "
         f"{segments['length_m'].sum() / 1000:.2f} km, "
         f"heading {heading_in_words(tracks.heading_deg)} degrees"
     )

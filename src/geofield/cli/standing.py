@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.cli.console import say, say_note
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.farm.places import Places
@@ -48,13 +49,15 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
     if lost:
         rows = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
         say_note(
-            f"{job.obstacles.name}: {len(lost)} rows have no shape and are not avoided: row "
+            f"{job.obstacles.name}: {counted(len(lost), 'row has', 'rows have')} no shape and "
+            f"{'is' if len(lost) == 1 else 'are'} not avoided: row "
             f"{rows}. Draw or delete them."
         )
     unsized = unsized_points(standing) if several else 0
     if unsized:
         say_note(
-            f"{job.obstacles.name}: {unsized} points have no radius_m; they are circles of "
+            f"{job.obstacles.name}: {counted(unsized, 'point has', 'points have')} no radius_m; "
+            f"{'it is a circle' if unsized == 1 else 'they are circles'} of "
             f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger."
         )
 

@@ -9,6 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import PATH
+from geofield.wording import counted
 
 
 @click.command(
@@ -45,7 +46,7 @@ def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> 
         echo_json({name: [asdict(each) for each in found] for name, found in reports.items()})
     else:
         for name, found in reports.items():
-            say(f"{name}: {'no fault found' if not found else f'{len(found)} findings'}")
+            say(f"{name}: {'no fault found' if not found else counted(len(found), 'finding')}")
             for each in found:
                 say(f"  {each.level}: {each.where}: {each.message}")
     if failed:

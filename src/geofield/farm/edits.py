@@ -33,6 +33,7 @@ from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.plan import Plan
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -112,7 +113,8 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     gone = sorted(written.keys() - set(fields[FIELD_ID]))
     if gone:
         tell(
-            f"{overview.name}: {len(gone)} fields are deleted there ({', '.join(gone[:5])}), and a "
+            f"{overview.name}: {counted(len(gone), 'field is', 'fields are')} deleted there "
+            f"({', '.join(gone[:5])}), and a "
             "farm holds every place. Take their rows out of the places file, then --fresh."
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)

@@ -23,6 +23,7 @@ from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.strangers import check_vector
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -188,7 +189,8 @@ def read_foreign(
             foreign.append(RawLayer(each.name, frame))
         else:
             own.setdefault(layer.name, []).append(_own(layer, frame, path))
-            notes.append(f"{each.name}: {len(frame)} rows are geofield's own layer {layer.name}")
+            are = counted(len(frame), "row is", "rows are")
+            notes.append(f"{each.name}: {are} geofield's own layer {layer.name}")
     tables = {
         name: parts[0]
         if len(parts) == 1

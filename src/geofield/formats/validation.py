@@ -33,6 +33,7 @@ from geofield.model.field import refuse_no_areas
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
 from geofield.model.resized import widened
 from geofield.model.searched import unsearched
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -203,7 +204,8 @@ def _check_rows(layer: schema.Layer, table: gpd.GeoDataFrame) -> Iterator[Findin
         yield Finding(
             "warning",
             layer.name,
-            f"{int(missing.sum())} rows have no {', '.join(layer.key)}: drawn by a person?",
+            f"{counted(int(missing.sum()), 'row has', 'rows have')} no "
+            f"{', '.join(layer.key)}: drawn by a person?",
         )
     double = keys[~missing].duplicated()
     if double.any():

@@ -23,6 +23,7 @@ from geofield.model.obstacles import (
     shapes_of,
 )
 from geofield.tracks.outline import in_degrees
+from geofield.wording import counted
 
 _POINTS = (shapely.GeometryType.POINT.value, shapely.GeometryType.MULTIPOINT.value)
 _LINES = (
@@ -60,13 +61,18 @@ def obstacle_shapes(
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     missing = shapely.is_missing(geometry) | shapely.is_empty(geometry)
     if missing.any():
-        _warn(f"{int(missing.sum())} obstacles have no geometry and were left out.")
+        _warn(
+            f"{counted(int(missing.sum()), 'obstacle has', 'obstacles have')} no geometry and "
+            f"{'was' if missing.sum() == 1 else 'were'} left out."
+        )
     frame, geometry = frame[~missing], shapely.force_2d(geometry[~missing])
     if not np.isfinite(shapely.get_coordinates(geometry)).all():
         raise TrackError("An obstacle has coordinates that are not finite numbers.")
     broken = ~shapely.is_valid(geometry)
     if broken.any():
-        _warn(f"{int(broken.sum())} obstacles were not valid and have been repaired.")
+        few = "1 obstacle was not valid and has"
+        many = f"{int(broken.sum())} obstacles were not valid and have"
+        _warn(f"{few if broken.sum() == 1 else many} been repaired.")
         geometry[broken] = shapely.make_valid(geometry[broken], method="structure")
     frame = frame.set_geometry(gpd.GeoSeries(geometry, index=frame.index, crs=crs))
     kind = shapely.get_type_id(geometry)

@@ -9,6 +9,7 @@ from typing import Any
 
 from geofield.formats.validation import Finding
 from geofield.strangers import database
+from geofield.wording import counted
 
 _APPLICATION_ID = 0x47504B47  # "GPKG"
 _REQUIRED = ("gpkg_spatial_ref_sys", "gpkg_contents", "gpkg_geometry_columns")
@@ -69,4 +70,4 @@ def _check_rows(connection: sqlite3.Connection, table: str, column: str) -> Iter
         f'SELECT count(*) FROM "{table_sql}" WHERE "{column_sql}" IS NULL'  # noqa: S608
     ).fetchone()
     if empty:
-        yield Finding("warning", table, f"{empty} rows have no geometry")
+        yield Finding("warning", table, f"{counted(empty, 'row has', 'rows have')} no geometry")

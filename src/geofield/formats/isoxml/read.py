@@ -21,6 +21,7 @@ from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
 from geofield.formats.isoxml.guidance import guidance_lines, position
 from geofield.formats.xml import read_xml
 from geofield.model import Dataset
+from geofield.wording import counted
 
 #: What no vehicle may enter; a boundary's own holes stay holes.
 _STANDING = {
@@ -129,7 +130,7 @@ def _told(field: ET.Element) -> Iterable[str]:
             yield f"{count} of type {_STANDING[PolygonType(code)]} taken as obstacles"
         elif code not in (*_STANDING, PolygonType.BOUNDARY):
             names = {each.value: each.name.lower().replace("_", " ") for each in PolygonType}
-            yield f"{count} polygons left out: {names.get(code, f'type {code}')}"
+            yield f"{counted(count, 'polygon')} left out: {names.get(code, f'type {code}')}"
     zones = len(field.findall("TZN"))
     if zones:
         yield f"{zones} treatment zones left out"
