@@ -189,6 +189,8 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
         )
     if of is schema.OBSTACLES:
         frame = _parts_apart(frame)
+    if of is schema.HEADLAND_TRACKS:
+        frame = _passes_by_offset(frame)
     return schema.conform(of, frame, extras=True)
 
 
@@ -198,6 +200,7 @@ def tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> 
         schema.OBSTACLES.name: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
         schema.TRACKS.name: ("track_no",),
         schema.SEGMENTS.name: ("track_no", "segment_no"),
+        schema.HEADLAND_TRACKS.name: ("pass_no", "segment_no"),
     }
     lost = [name for name in words.get(of.name, ()) if name not in frame.columns]
     if of is schema.SEGMENTS and not lost and frame["track_no"].notna().any():
@@ -217,6 +220,16 @@ def _as_spelled(of: schema.Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     known = {name.lower(): name for name in of.column_names if name not in frame.columns}
     names = {name: known[str(name).lower()] for name in frame if str(name).lower() in known}
     return frame.rename(columns=names) if names else frame
+
+
+def _passes_by_offset(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Headland tracks whose pass is not told, numbered by how far from the border they run."""
+    if "pass_no" in frame.columns or "offset_m" not in frame.columns:
+        return frame
+    frame = frame.assign(pass_no=frame["offset_m"].rank(method="dense").astype("Int64"))
+    if "segment_no" in frame.columns:
+        return frame
+    return frame.assign(segment_no=frame.groupby("pass_no").cumcount() + 1)
 
 
 def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
