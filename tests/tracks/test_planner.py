@@ -662,7 +662,7 @@ def test_an_offset_outside_the_field_is_refused(offset_m):
 @pytest.mark.parametrize("name", ["spacing_m", "width_m", "offset_m", "step_m", "min_segment_m"])
 def test_words_for_lengths_are_refused_by_name(name):
     lengths: Any = {"spacing_m": 6.0, name: "6"}
-    with pytest.raises(TrackError, match=f"{name} is 6; it must be"):
+    with pytest.raises(TrackError, match=f"{name} is '6'; it must be"):
         plan_tracks(box(0, 0, 200, 120), crs=CRS, **lengths)
 
 
