@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
 
+from geofield.field import extract_field
 from geofield.field.alternatives import other_outlines
 from geofield.field.doubt import doubtful
 from geofield.field.likely import Likely
-from geofield.field.search import Candidate, search_field
+from geofield.field.search import Candidate, WindowSearch, search_field
 from geofield.simulate import SimulationSettings, simulate_field
 
 
@@ -84,3 +88,29 @@ def test_imagined_outlines_hold_the_point_and_change_nothing_that_is_found_later
     assert [each.polygon for each in later] == [
         each.polygon for each in unasked.candidates((), beside)
     ]
+
+
+@pytest.mark.filterwarnings("ignore::geofield.errors.FieldWarning")
+def test_other_ground_is_asked_for_where_the_outline_is_doubtful_and_is_offered(monkeypatch):
+    plain = simulate_field(11, SimulationSettings(width_px=256, height_px=256))
+    hazy = np.rint(0.02 * plain.scene.bands + 120).astype(np.uint8)
+    doubtful_scene = replace(plain.scene, bands=hazy)
+    at: Any = {"lat": plain.lat, "lon": plain.lon}
+    asked: list[list[Candidate]] = []
+    ask = WindowSearch.imagined
+
+    def recorded(search: WindowSearch) -> list[Candidate]:
+        asked.append(ask(search))
+        return asked[-1]
+
+    monkeypatch.setattr(WindowSearch, "imagined", recorded)
+    assert len(extract_field(plain.scene, **at).alternatives) == 1
+    assert not asked, "it is rather certain"
+    offered = extract_field(doubtful_scene, **at).alternatives
+    assert len(asked) == 1
+    extract_field(doubtful_scene, **at, include=[(plain.lon + 1e-5, plain.lat)])
+    assert len(asked) == 1, "who gives further points is not asked"
+    monkeypatch.setattr(WindowSearch, "imagined", lambda search: [])
+    unasked = extract_field(doubtful_scene, **at).alternatives
+    assert offered[0] == unasked[0], "the outline taken is the same"
+    assert {one.polygon for one in offered} - {one.polygon for one in unasked}
