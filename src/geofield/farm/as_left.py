@@ -45,8 +45,8 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     Raises
     ------
     FormatError
-        When it is gone, or in another CRS than the overview was written in, or when outlines or
-        obstacles lack a column: lines are known by their shapes.
+        When it is gone, or in another CRS than the overview was written in, or when outlines lack
+        a column: what stands in fields is known by its shape.
     """
     import pyogrio
 
@@ -62,10 +62,9 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     if absent and of is not schema.FIELD:
         words = f"{absent} row(s) of layer {of.name!r} have no geometry, and count as deleted"
         tell(f"{overview.name}: {words}.")
-    if of in (schema.TRACKS, schema.SEGMENTS):
-        tell_lost_columns(of, table, overview)
+    tell_lost_columns(of, table, overview)
     for name in of.column_names:
-        if name not in table and of in (schema.FIELD, schema.OBSTACLES):
+        if name not in table and of is schema.FIELD:
             raise FormatError(
                 f"{overview.name}: the column {name!r} of layer {of.name!r} is gone.",
                 hint="Undo that in QGIS, or put the edited fields back one by one.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -72,6 +72,12 @@ def hashed(parts: Mapping[str, list[bytes]]) -> dict[str, str]:
         one: hashlib.sha256(b"\0".join(sorted(rows))).hexdigest()[:16]
         for one, rows in parts.items()
     }
+
+
+def with_rest(digests: Mapping[str, str], some: Collection[str]) -> dict[str, str]:
+    """Digests of fields, and with those of `some` one of all: rows of them stand elsewhere."""
+    every = hashed({"": [json.dumps(digests, sort_keys=True).encode()]})[""]
+    return {**digests, **{one: f"{digests.get(one, '')}+{every}" for one in some}}
 
 
 def own_names(of: schema.Layer, table: gpd.GeoDataFrame) -> list[str]:

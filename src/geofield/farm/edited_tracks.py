@@ -6,7 +6,7 @@ like what is edited in the plan of one field.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.farm.as_written import hashed, own_names, text_of
+from geofield.farm.dissolved import KEYS
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.model.lost_numbers import known_by_shape
 from geofield.plan import Plan
@@ -31,7 +32,7 @@ Tables = Mapping[schema.Layer, "gpd.GeoDataFrame"]
 Names = Mapping[str, Mapping[str, str]]
 
 #: The layers that a person may edit, and what tells their rows apart.
-EDITED = {schema.TRACKS: ("track_no",), schema.SEGMENTS: ("track_no", "segment_no")}
+EDITED = {of: KEYS[of] for of in (schema.TRACKS, schema.SEGMENTS)}
 
 
 def track_digests(tables: Tables) -> dict[str, str]:
@@ -56,19 +57,22 @@ def track_digests(tables: Tables) -> dict[str, str]:
     return hashed(parts)
 
 
-def tracks_of(farm: Farm, ids: Collection[str], crs: CRS, names: Names) -> Tables:
-    """Tracks and segments of some of a farm's fields, with columns called as in the overview.
+def layers_of(
+    farm: Farm, layers: Iterable[schema.Layer], ids: Collection[str], crs: CRS, names: Names
+) -> Tables:
+    """Layers of some of a farm's fields, with columns called as in the overview.
 
     Parameters
     ----------
     farm : Farm
+    layers : iterable of Layer
     ids : collection of str
     crs : CRS
         Of the overview.
     names : mapping
     """
     tables = {}
-    for of in EDITED:
+    for of in layers:
         table = farm.layer(of.name)
         there = {name: called for called, name in names.get(of.name, {}).items()}
         some = table[table[FIELD_ID].isin(list(ids))]

@@ -22,7 +22,8 @@ from geofield import schema
 from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import record_in, table_in, tell
-from geofield.farm.as_written import digests_of, own_digests, own_names
+from geofield.farm.as_written import digests_of, own_digests, own_names, with_rest
+from geofield.farm.dissolved import undissolved
 from geofield.farm.edited_in_place import BEGUN
 from geofield.farm.edited_plan import Edits, edited_plan, planned
 from geofield.farm.folder import REVIEWED, Record
@@ -32,6 +33,7 @@ from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
+from geofield.formats.gpkg_read import parts_apart
 from geofield.plan import Plan
 from geofield.wording import counted
 
@@ -107,9 +109,9 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         table_in(overview, of, noted.crs) for of in (schema.FIELD, schema.OBSTACLES)
     )
     _refuse_strange(overview, fields, written)
-    obstacles = obstacles_with_owners(obstacles, fields, written)
+    names = record.get(OWN, {}).get("columns", {})
+    obstacles, now, told = _obstacles(farm, obstacles, fields, record, names)
     tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}
-    now = digests_of(fields, obstacles)
     gone = sorted(written.keys() - set(fields[FIELD_ID]))
     if gone:
         tell(
@@ -118,15 +120,11 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
             "farm holds every place. Take their rows out of the places file, then --fresh."
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)
-    tracks = _tracks(overview, fields, record)
-    digests = edited_tracks.track_digests(tracks) if tracks else {}
-    # A field of which no track is left is no word on any one of them.
-    driven = {one: told for one, told in digests.items() if told != record[TRACKS].get(one)}
-    names = record.get(OWN, {}).get("columns", {})
+    tracks, driven = _tracks(farm, overview, fields, record, names)
     for one in edited_tracks.only_lost_numbers(farm, driven, tracks, names) if driven else ():
         del driven[one]
     marks = {
-        one: f"{written[one]} {now[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
+        one: f"{written[one]} {told[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
         for one in fields[FIELD_ID]
         if one in taken  # perhaps to take back what was said
         or now[one] != written[one]
@@ -140,34 +138,79 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
     return Edits(marks, fields, standing, names, tracks, driven)
 
 
-def _tracks(
-    overview: Path, fields: gpd.GeoDataFrame, record: Mapping[str, Any]
-) -> edited_tracks.Tables:
-    """Tracks and segments of an overview; none where it does not remember how they were.
+def _obstacles(
+    farm: Farm,
+    left: gpd.GeoDataFrame,
+    fields: gpd.GeoDataFrame,
+    record: Mapping[str, Any],
+    names: edited_tracks.Names,
+) -> tuple[gpd.GeoDataFrame, dict[str, str], dict[str, str]]:
+    """Obstacles of an overview with the fields that they are of, and the digests of these.
 
-    A layer that was deleted or emptied is no word on any one track, nor is a field of which no
-    row is left.
+    The second ones are those of the rows as they were left, whatever the farm holds by now.
+    """
+    written, of = record[DIGESTS], schema.OBSTACLES
+    obstacles = obstacles_with_owners(left, fields, written)
+    now = digests_of(fields, obstacles)
+    edited = [one for one in fields[FIELD_ID] if now[one] != written[one]]
+    if not edited or not record[DETAILS]:
+        return obstacles, now, now
+    were = edited_tracks.layers_of(farm, [of], edited, fields.crs, names)[of]
+    left, merged = undissolved(of, left, were, fields)
+    obstacles = obstacles_with_owners(parts_apart(left), fields, written)
+    return obstacles, digests_of(fields, obstacles), with_rest(now, merged)
+
+
+def _tracks(
+    farm: Farm,
+    overview: Path,
+    fields: gpd.GeoDataFrame,
+    record: Mapping[str, Any],
+    names: edited_tracks.Names,
+) -> tuple[edited_tracks.Tables, dict[str, str]]:
+    """Tracks and segments of an overview, and digests of the fields where they were changed.
+
+    None where it does not remember how they were. A layer that was deleted or emptied is no word
+    on any one track, nor is a field of which no row is left.
     """
     written = record.get(TRACKS)
     if not written:
-        return {}
+        return {}, {}
     there = edited_tracks.layers_in(overview)
-    tables = {
-        of: lines_with_owners(table_in(overview, of, fields.crs), fields, written)
-        for of in edited_tracks.EDITED
-        if of in there
-    }
-    for of in edited_tracks.EDITED:
-        left = set(tables[of][FIELD_ID]) if of in there else set()
-        bare = sorted(set(fields[FIELD_ID]) & set(written) - left)
-        if bare:
-            more = f" and {len(bare) - 5} more" if len(bare) > 5 else ""
+    left = {of: table_in(overview, of, fields.crs) for of in edited_tracks.EDITED if of in there}
+    whole = len(left) == len(edited_tracks.EDITED) and all(len(table) for table in left.values())
+    tables = {of: lines_with_owners(table, fields, written) for of, table in left.items()}
+    digests = edited_tracks.track_digests(tables) if whole else {}
+    bare = _bare(tables, fields, written)
+    edited = [one for one in written if whole and digests.get(one) != written[one]]
+    driven: dict[str, str] = {}
+    if edited:
+        were = edited_tracks.layers_of(farm, edited_tracks.EDITED, edited, fields.crs, names)
+        found = {of: undissolved(of, table, were[of], fields) for of, table in left.items()}
+        tables = {of: lines_with_owners(table, fields, written) for of, (table, _) in found.items()}
+        told = with_rest(digests, set().union(*(merged for _, merged in found.values())))
+        now = edited_tracks.track_digests(tables)
+        driven = {one: told.get(one, "") for one in now if now[one] != written.get(one)}
+        bare = _bare(tables, fields, written)
+    for of, some in bare.items():
+        if some:
+            more = f" and {len(some) - 5} more" if len(some) > 5 else ""
             tell(
-                f"{overview.name}: no {of.name} are left of field {', '.join(bare[:5])}{more}. No "
+                f"{overview.name}: no {of.name} are left of field {', '.join(some[:5])}{more}. No "
                 "field is left without any: they come back."
             )
-    whole = len(tables) == len(edited_tracks.EDITED)
-    return tables if whole and all(len(table) for table in tables.values()) else {}
+    return (tables, driven) if whole else ({}, {})
+
+
+def _bare(
+    tables: edited_tracks.Tables, fields: gpd.GeoDataFrame, written: Collection[str]
+) -> dict[schema.Layer, list[str]]:
+    """By layer the fields of which no row is left."""
+    known = set(fields[FIELD_ID]) & set(written)
+    return {
+        of: sorted(known - set(tables[of][FIELD_ID] if of in tables else ()))
+        for of in edited_tracks.EDITED
+    }
 
 
 def _own_before(
@@ -229,7 +272,8 @@ def _refuse_double(
     double = [one for one in there if there[one] != record[DIGESTS][one]]
     if TRACKS in record:
         names = record.get(OWN, {}).get("columns", {})
-        driven = edited_tracks.track_digests(edited_tracks.tracks_of(farm, edited, ours.crs, names))
+        were = edited_tracks.layers_of(farm, edited_tracks.EDITED, edited, ours.crs, names)
+        driven = edited_tracks.track_digests(were)
         double += [one for one in edited if driven.get(one) != record[TRACKS].get(one)]
     if double:
         raise FormatError(

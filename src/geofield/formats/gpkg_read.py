@@ -188,7 +188,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             stacklevel=3,
         )
     if of is schema.OBSTACLES:
-        frame = _parts_apart(frame)
+        frame = parts_apart(frame)
     if of is schema.HEADLAND_TRACKS:
         frame = _passes_by_offset(frame)
     return schema.conform(of, frame, extras=True)
@@ -232,7 +232,7 @@ def _passes_by_offset(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     return frame.assign(segment_no=frame.groupby("pass_no").cumcount() + 1)
 
 
-def _parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+def parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     """Obstacles of several parts as several obstacles; the further parts have the number still.
 
     What they are of is known by it: a size in the row is that of the whole, and none to draw
