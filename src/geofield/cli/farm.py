@@ -110,6 +110,8 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
     if place is not None:
         # Edits in the overview first: it is written anew below.
         overview = place / OVERVIEW if alone else plan_file
+        if not alone:
+            _refuse_other_edits(place, plan_file)
         but = read_plan(plan_file).field.field_id if alone else None
         ids, waiting = put_edits(place, overview, but=but, anyway=not alone)
         if waiting:
@@ -125,3 +127,18 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
         say(f"Field      {field_id} of {folder} is now as you left it")
     if not ids:
         say(f"{plan_file} has no edits.")
+
+
+def _refuse_other_edits(folder: Path, overview: Path) -> None:
+    """Refuse the overview of another place while the farm's own has edits: it is written anew."""
+    from geofield.errors import FormatError
+    from geofield.farm.edits import is_edited
+    from geofield.farm.overview import OVERVIEW
+
+    own = folder / OVERVIEW
+    if own.is_file() and not own.samefile(overview) and is_edited(folder, own):
+        raise FormatError(
+            f"{own} has edits that the farm does not hold yet.",
+            hint=f"Take them in first: geofield farm put {own} {folder}; or move that file out of "
+            "the farm.",
+        )

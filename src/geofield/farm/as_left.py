@@ -17,6 +17,15 @@ from geofield.formats.gpkg_read import in_own_terms, record_of, tell_lost_column
 if TYPE_CHECKING:
     import geopandas as gpd
 
+#: Where the overview keeps the digests, in its evidence.
+DIGESTS = "fields_as_written"
+#: And whether it has obstacles at all: those of large farms are left out.
+DETAILS = "has_obstacles"
+#: What stands in columns of a person's own: by layer their names in the file, with those in the
+#: farm, and a digest per field.
+OWN = "own_as_written"
+#: And of the tracks of each field.
+TRACKS = "tracks_as_written"
 #: What to do where nobody can tell edits any more.
 _ANEW = "the next `geofield batch` writes one to edit anew."
 

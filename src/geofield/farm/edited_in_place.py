@@ -12,6 +12,7 @@ from geofield.errors import FieldWarning, FormatError, GeofieldError
 from geofield.farm.folder import REVIEWED, STATUS, committed, read_part
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID
+from geofield.farm.put_settings import settings_put, settings_said
 from geofield.farm.reviewed import file_of, reviewed_files
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
@@ -26,7 +27,7 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
     """Fields whose plan in `reviewed/` was edited there since the farm took it in.
 
     Only those that the farm has a plan of, and `only` some where that is given; a file that is
-    newer, and says the same, is none.
+    newer, or came later, and says the same, is none.
 
     Warns
     -----
@@ -38,7 +39,7 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
         names &= {file_of(one) for one in only}
     if store.folder is None or not names:
         return
-    farm = read_farm(store.place)
+    farm, put = read_farm(store.place), settings_put(store)
     for chunk in committed(store):
         taken_in_ns = written_ns(store.folder / file_in(STATUS, chunk))
         status = read_part(store, STATUS, chunk, [FIELD_ID])
@@ -46,9 +47,10 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
             if file_of(one) not in names or one not in farm:
                 continue
             file = store.folder / file_of(one)
-            if written_ns(file) <= taken_in_ns:
+            # One that was edited elsewhere may come with the time of then.
+            if max(written_ns(file), file.stat().st_ctime_ns) <= taken_in_ns:
                 continue
-            if _differs(file, farm[one]):
+            if _differs(file, farm[one], put.get(one, {})):
                 yield one
 
 
@@ -61,22 +63,25 @@ def _begun(store: Store) -> frozenset[str]:
     return frozenset(map(file_of, ids) if Path(overview).is_file() else ())
 
 
-def _differs(file: Path, before: Plan) -> bool:
+def _differs(file: Path, before: Plan, put: dict[str, Any]) -> bool:
     """Whether a reviewed plan was edited since the farm took it in; no, where it cannot be read."""
     field_id = before.field.field_id
     try:
         plan = read_plan(file)
         if plan.field.field_id != field_id:
             raise FormatError(f"It is named {plan.field.field_id!r}, and not {field_id!r}.")
-        return _is_edited(plan, before)
+        return _is_edited(plan, before, put)
     except GeofieldError as error:
         words = f"{file_of(field_id)} is not taken in: {error}"
         warnings.warn(words, FieldWarning, stacklevel=3)
         return False
 
 
-def _is_edited(plan: Plan, before: Plan) -> bool:
-    """Whether a reviewed plan says something else than the one that the farm made of it."""
+def _is_edited(plan: Plan, before: Plan, put: dict[str, Any]) -> bool:
+    """Whether a reviewed plan says something else than the one that the farm made of it.
+
+    `put` are the settings that it was put with.
+    """
     known, said = plan.evidence.track_edits, before.evidence.track_edits
     return (
         not _same_ground(plan, before)
@@ -84,6 +89,7 @@ def _is_edited(plan: Plan, before: Plan) -> bool:
         or _own_of(plan) != _own_of(before)
         or plan.track_edits != known
         or known != said
+        or bool(settings_said(plan, put))
     )
 
 

@@ -21,9 +21,10 @@ import pandas as pd
 from geofield import schema
 from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
-from geofield.farm.as_left import record_in, table_in, tell
+from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS, record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names, with_rest
 from geofield.farm.dissolved import undissolved
+from geofield.farm.doubles import changed_elsewhere, refuse_double, tell_double
 from geofield.farm.edited_in_place import BEGUN
 from geofield.farm.edited_plan import Edits, edited_plan, planned
 from geofield.farm.folder import REVIEWED, Record
@@ -42,15 +43,6 @@ if TYPE_CHECKING:
 
     from geofield.farm.value import Farm
 
-#: Where the overview keeps the digests, in its evidence.
-DIGESTS = "fields_as_written"
-#: And whether it has obstacles at all: those of large farms are left out.
-DETAILS = "has_obstacles"
-#: What stands in columns of a person's own: by layer their names in the file, with those in the
-#: farm, and a digest per field.
-OWN = "own_as_written"
-#: And of the tracks of each field.
-TRACKS = "tracks_as_written"
 #: The edits that the farm holds already, while the overview is older than it.
 TAKEN = f"{REVIEWED}/.taken.json"
 #: Ground that an outline gained, square metres, that is worth a word.
@@ -93,14 +85,13 @@ def remember_own(overview: Path, written: Mapping[str, gpd.GeoDataFrame]) -> Non
         )
 
 
-def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool) -> Edits:
+def _edits(farm: Farm, overview: Path, taken: Mapping[str, str]) -> Edits:
     """What was edited in the overview, but for the edits that were `taken` before.
 
     Raises
     ------
     FormatError
-        When an edit cannot be understood, or, unless it is to hold `anyway`, its field was changed
-        elsewhere since the overview was written; says which field and why.
+        When an edit cannot be understood; says which field and why.
     """
     noted = record_in(overview)
     record = {DIGESTS: {}, DETAILS: False, **noted.provenance.evidence}
@@ -132,8 +123,6 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str], *, anyway: bool
         or (own_before is not None and own.get(one) != own_before.get(one))
     }
     marks = {one: mark for one, mark in marks.items() if taken.get(one) != mark}
-    if not anyway:
-        _refuse_double(farm, overview, marks, record, fields)
     standing = obstacles if record[DETAILS] else None
     return Edits(marks, fields, standing, names, tracks, driven)
 
@@ -251,39 +240,6 @@ def _refuse_strange(overview: Path, fields: gpd.GeoDataFrame, known: Mapping[str
         )
 
 
-def _refuse_double(
-    farm: Farm,
-    overview: Path,
-    edited: Collection[str],
-    record: Mapping[str, Any],
-    fields: gpd.GeoDataFrame,
-) -> None:
-    """Refuse edits of fields that were changed elsewhere since the overview was written."""
-    if not edited:
-        return
-    ours = farm.layer(schema.FIELD.name)
-    if ours.crs != fields.crs:
-        return
-    theirs = farm.layer(schema.OBSTACLES.name).to_crs(ours.crs)
-    theirs = theirs if record[DETAILS] else theirs.iloc[:0]
-    there = digests_of(
-        ours[ours[FIELD_ID].isin(list(edited))], theirs[theirs[FIELD_ID].isin(list(edited))]
-    )
-    double = [one for one in there if there[one] != record[DIGESTS][one]]
-    if TRACKS in record:
-        names = record.get(OWN, {}).get("columns", {})
-        were = edited_tracks.layers_of(farm, edited_tracks.EDITED, edited, ours.crs, names)
-        driven = edited_tracks.track_digests(were)
-        double += [one for one in edited if driven.get(one) != record[TRACKS].get(one)]
-    if double:
-        raise FormatError(
-            f"Field {double[0]} was edited in {overview.name}, and changed in the farm since that "
-            "was written.",
-            hint=f"To have the one of {overview.name}: geofield farm put {overview} "
-            f"{overview.parent}; to have the other, move {overview.name} out of the farm.",
-        )
-
-
 def is_overview(path: Path) -> bool:
     """Whether a file is the overview of a farm."""
     try:
@@ -314,13 +270,20 @@ def is_edited(folder: Path, overview: Path) -> bool:
 
     if not overview.is_file():
         return False
-    taken = json.loads(Store.of(folder).get(TAKEN) or b"{}")
+    taken = _taken(Store.of(folder), overview)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FormatWarning)
         try:
-            return bool(_edits(read_farm(folder), overview, taken, anyway=True).marks)
+            return bool(_edits(read_farm(folder), overview, taken).marks)
         except FormatError:
             return True
+
+
+def _taken(store: Store, overview: Path) -> dict[str, str]:
+    """The edits of a farm's own overview that it holds already; none of another one."""
+    own = store.folder is not None and overview.parent.samefile(store.folder)
+    taken: dict[str, str] = json.loads((store.get(TAKEN) if own else None) or b"{}")
+    return taken
 
 
 def put_edits(
@@ -334,9 +297,9 @@ def put_edits(
 ) -> tuple[list[str], list[str]]:
     """Take the edits of an overview into the farm, or `only` those of some fields.
 
-    Fields that were changed elsewhere, too, are refused unless the edits are to hold `anyway`;
-    `but` is a field of which another plan is about to be put back; `around` are the obstacles of
-    a file of their own, for outlines that were moved.
+    Fields that were changed elsewhere, too, are refused unless the edits are to hold `anyway`,
+    which is told; `but` is a field of which another plan is about to be put back; `around` are the
+    obstacles of a file of their own, for outlines that were moved.
 
     Returns
     -------
@@ -348,15 +311,20 @@ def put_edits(
     Raises
     ------
     FormatError
-        When an edit cannot be understood; the farm is as it was then.
+        When an edit cannot be understood, or its field was changed elsewhere; the farm is as it was
+        then.
     """
     from geofield.farm.value import read_farm
 
     if not overview.is_file():
         return [], []
     store, farm = Store.of(folder), read_farm(folder)
-    taken = json.loads(store.get(TAKEN) or b"{}")
-    edits = _edits(farm, overview, taken, anyway=anyway)
+    taken = _taken(store, overview)
+    edits = _edits(farm, overview, taken)
+    # Edited fields without a plan until now cannot have been changed.
+    elsewhere = changed_elsewhere(farm, overview, edits) if only is None else []
+    if elsewhere and not anyway:
+        refuse_double(overview, elsewhere)
     if but in edits.marks:
         raise FormatError(
             f"Field {but} is edited in {overview.name}, too.",
@@ -385,5 +353,6 @@ def put_edits(
         store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
         store.remove(BEGUN)
 
+    tell_double(store, overview, elsewhere)
     put_plans(put, store, begin, note)
     return list(plans), waiting

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
+from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS
 from geofield.farm.as_written import digests_of
 from geofield.farm.edited_tracks import EDITED, track_digests
-from geofield.farm.edits import DETAILS, DIGESTS, OWN, TRACKS, remember_own
+from geofield.farm.edits import remember_own
 from geofield.farm.layers import FIELD_ID
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined

@@ -18,6 +18,7 @@ from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part,
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
+from geofield.farm.put_settings import note_settings, settings_put, settings_said
 from geofield.farm.reviewed import SUFFIX, file_of, reviewed_files
 from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
@@ -102,6 +103,7 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
             save_plan(plan, file, overwrite=True)
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
+    note_settings(store, [plan])
     _replace(store, [plan])
     if not mine:
         note_put(read_farm(folder)[field_id], plan_file, store)
@@ -143,12 +145,16 @@ def take_in_place(store: Store, field_id: str) -> None:
     edited = Path(store.place) / file_of(field_id)
     before = read_farm(store.place)[field_id]
     plan = with_given(_with_its_outline(read_plan(edited), before), before)
-    plan = run_tracks(plan, settings=before.settings or plan.settings or Settings())
+    settings = before.settings or plan.settings or Settings()
+    said = settings_said(plan, settings_put(store).get(field_id, {}))
+    tracks = settings.tracks.model_copy(update=said)
+    plan = run_tracks(plan, settings=settings.model_copy(update={"tracks": tracks}))
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         copy_whole(edited, file)
         save_plan(plan, file, overwrite=True)
         _put(store, field_id, file)
+    note_settings(store, [plan])
     _replace(store, [plan])
 
 
@@ -209,6 +215,7 @@ def put_plans(
         for plan in plans:
             save_plan(plan, file, overwrite=True)
             _put(store, plan.field.field_id, file)
+    note_settings(store, plans)
     note()
     _replace(store, plans)
 
