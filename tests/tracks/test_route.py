@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
@@ -225,10 +227,9 @@ def test_fields_with_nothing_to_drive() -> None:
     assert len(planned.route) == 0
 
 
-def looked_along(stands: Any) -> int:
-    """How many lines are made to find ways around what stands in a field."""
-    field = shapely.box(500000, 5600000, 500200, 5600100)
-    planned = plan_tracks(field, stands, crs=CRS, spacing_m=6.0, direction=90)
+@contextmanager
+def counting() -> Iterator[list[int]]:
+    """How many lines are made each time that some are."""
     made: list[int] = []
 
     def counted(places: Any, **how: Any) -> Any:
@@ -237,6 +238,14 @@ def looked_along(stands: Any) -> int:
         return lines
 
     with patch.object(shapely, "linestrings", counted):
+        yield made
+
+
+def looked_along(stands: Any) -> int:
+    """How many lines are made to find ways around what stands in a field."""
+    field = shapely.box(500000, 5600000, 500200, 5600100)
+    planned = plan_tracks(field, stands, crs=CRS, spacing_m=6.0, direction=90)
+    with counting() as made:
         plan_route(planned)
     return sum(made)
 
@@ -254,6 +263,20 @@ def test_a_row_of_trees_is_one_thing_to_go_around() -> None:
     trees = gpd.GeoDataFrame({"radius_m": [2.0] * len(row)}, geometry=row, crs=CRS)
     # 73 000 where each tree is a shape of its own, and 14 times as long.
     assert looked_along(trees) < 40_000
+
+
+def test_trees_in_a_row_that_do_not_touch_are_passed_by_the_first_and_the_last() -> None:
+    trees = np.column_stack((13.0 + 3.0 * np.arange(60), np.full(60, 50.0), np.full(60, 1.2)))
+    shapes = ObstacleShapes(trees, np.arange(60), np.empty(0, dtype=object), np.empty(0, int))
+    passage = Passage(shapely.box(0, 0, 203, 100), shapes)
+    with counting() as made:
+        way = passage.shortest(np.array([5.0, 50.0]), np.array([198.0, 50.0]))
+    assert way is not None
+    length = np.hypot(*np.diff(way, axis=0).T).sum()
+    taut = 59 * 3.0 + 2.0 * (np.sqrt(8.0**2 - 1.2**2) + 1.2 * np.arcsin(1.2 / 8.0))
+    assert taut <= length < taut * 1.001
+    # 10 000 where all trees on the straight line come in at once.
+    assert sum(made) < 300
 
 
 def test_a_way_out_of_a_ring_of_trees_is_none_and_one_within_is_found() -> None:

@@ -1,11 +1,11 @@
 """Where the machine may pass: checks of curves, and shortest ways around what stands between.
 
-Shortest ways are exact: the way around a few shapes alone is never longer than the way around
-all, so that once it is free of every shape it is the shortest. Shapes come in only
-when the way found so far runs into them (the visibility graph of Lozano-Perez and Wesley 1979,
-grown lazily). A way turns at a corner only where it grazes the shape there, and no way of a length
-reaches a corner from which both ends are farther together: few lines between corners are looked
-along.
+Shortest ways are exact: the way around a few shapes alone is never longer than the way around all,
+so that once it is free of every shape it is the shortest. Shapes come in only when the way found so
+far runs into them (the visibility graph of Lozano-Perez and Wesley 1979, grown lazily), one for
+each of its lines at a time. A way turns at a corner only where it grazes the shape there, and no
+way of a length reaches a corner from which both ends are farther together: few lines between
+corners are looked along.
 """
 
 from __future__ import annotations
@@ -49,14 +49,46 @@ class _Corners:
         """Some of them."""
         return _Corners(self.places[kept], self.into[kept], self.out[kept])
 
-    def graze(self) -> NDArray[np.bool_]:
-        """Whether the line from each corner (row) to each has the shapes there on one side."""
+    def graze(self, others: _Corners) -> NDArray[np.bool_]:
+        """Whether the line from each corner (row) to each of others has its shape on one side."""
         (x, y), (into_x, into_y), (out_x, out_y) = self.places.T, self.into.T, self.out.T
-        dx, dy = x - x[:, None], y - y[:, None]
-        into = into_x[:, None] * dy - into_y[:, None] * dx
-        into *= out_x[:, None] * dy - out_y[:, None] * dx
-        here = into <= _GRAZES * (dx * dx + dy * dy)
-        return np.asarray(here & here.T)
+        dx, dy = others.places[:, 0] - x[:, None], others.places[:, 1] - y[:, None]
+        sides = into_x[:, None] * dy - into_y[:, None] * dx
+        sides *= out_x[:, None] * dy - out_y[:, None] * dx
+        return np.asarray(sides <= _GRAZES * (dx * dx + dy * dy))
+
+
+@dataclass(frozen=True, slots=True)
+class _Graph:
+    """Corners, first the ends of a way, and the lines between them that are free of some shapes.
+
+    Corners that no way of the length asked for reaches are left out.
+    """
+
+    corners: _Corners
+    #: Indices of the corners that each line joins.
+    a: NDArray[np.int64]
+    b: NDArray[np.int64]
+    around: list[int]
+    is_whole: bool = True
+
+    @property
+    def lines(self) -> NDArray[np.object_]:
+        return _lines(self.corners.places[self.a], self.corners.places[self.b])
+
+    def way(self) -> tuple[FloatArray | None, float]:
+        """Shortest way from the first corner to the second, and its length."""
+        places = self.corners.places
+        # Coincident corners must not make an edge of no length: that would be no edge.
+        length = np.maximum(np.hypot(*(places[self.a] - places[self.b]).T), 1e-9)
+        graph = csr_matrix((length, (self.a, self.b)), shape=(len(places),) * 2)
+        distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+        if not np.isfinite(distance[1]):
+            return None, np.inf
+        path = [1]
+        while path[-1] != 0:
+            path.append(int(before[path[-1]]))
+        return places[path[::-1]], float(distance[1])
 
 
 class Passage:
@@ -135,54 +167,78 @@ class Passage:
 
         It is told by its corners (n, 2), both ends among them.
         """
-        ends = np.stack((start, goal))
-        around: list[int] = []
+        ends, around = np.stack((start, goal)), list[int]()
         reach = 2.0 * float(np.hypot(*(goal - start))) + _FIRST_REACH_M
         while True:
-            corners = self._corners_at(ends, around)
-            far = np.hypot(*(corners.places - start).T) + np.hypot(*(corners.places - goal).T)
-            way, length = self._way_along(corners.at(far <= reach), around)
-            if length > reach < far.max():
-                reach *= 2.0
-                continue
-            met = [] if way is None else self._met_by(way, around)
-            if not met:
+            way, length, graph = self._within(ends, around, reach)
+            if length <= reach or graph.is_whole:
                 return way
-            around = sorted({*around, *met})
+            around, reach = graph.around, 2.0 * reach
 
-    def _corners_at(self, ends: FloatArray, around: list[int]) -> _Corners:
-        """The ends of a way, at which there is nothing to graze, and the corners of shapes."""
-        found = [_Corners(ends, *np.zeros((2, 2, 2))), *(self._corners[each] for each in around)]
-        return _joined(found)
+    def _within(
+        self, ends: FloatArray, around: list[int], reach: float
+    ) -> tuple[FloatArray | None, float, _Graph]:
+        """The shortest way, its length and its graph; of less than all corners if it is longer."""
+        none = np.zeros((2, 2))  # at the ends there is nothing to graze
+        graph = _Graph(_Corners(ends, none, none), np.array([0]), np.array([1]), [])
+        more = around
+        while True:
+            graph = self._grown(graph, more, reach)
+            way, length = graph.way()
+            if way is None or (length > reach and not graph.is_whole):
+                return way, length, graph
+            more = self._met_by(way, graph.around)
+            if not more:
+                return way, length, graph
 
-    def _way_along(self, corners: _Corners, around: list[int]) -> tuple[FloatArray | None, float]:
-        """Shortest way from the first corner to the second around some shapes, and its length."""
-        kept = corners.graze()
-        # Its ends may lie in the narrow strip between a shape and its corners.
-        kept[:2] = True
-        a, b = np.nonzero(np.triu(kept, 1))
-        lines = _lines(corners.places[a], corners.places[b])
-        seen = np.ones(len(lines), dtype=bool)
-        seen[self._meet(lines, around)[0]] = False
+    def _grown(self, graph: _Graph, more: list[int], reach: float) -> _Graph:
+        """A graph with the corners of more shapes, its lines free of these, too."""
+        around, ends = [*graph.around, *more], graph.corners.places[:2]
+        found = _joined([self._corners[each] for each in more])
+        far = np.hypot(*(found.places[:, None] - ends).T).sum(axis=0)
+        found = found.at(far <= reach)
+        first, corners = len(graph.corners.places), _joined([graph.corners, found])
+        grazing = found.graze(corners)
+        grazing[:, first:] &= grazing[:, first:].T
+        grazing[:, :first] &= graph.corners.graze(found).T
+        # The ends may lie in the narrow strip between a shape and its corners.
+        grazing[:, :2] = True
+        row, b = np.nonzero(np.tril(grazing, first - 1))
+        new = _Graph(corners, row + first, b, around)
+        kept, free = self._are_free(graph.lines, more), self._are_free(new.lines, around)
+        return _Graph(
+            corners,
+            np.concatenate((graph.a[kept], new.a[free])),
+            np.concatenate((graph.b[kept], new.b[free])),
+            around,
+            graph.is_whole and len(found.places) == len(far),
+        )
+
+    def _are_free(self, lines: NDArray[np.object_], around: list[int]) -> NDArray[np.bool_]:
+        """Which lines run into none of some shapes."""
+        free = np.ones(len(lines), dtype=bool)
+        if around:
+            free[self._meet(lines, around)[0]] = False
         if _SHELL in around:
-            seen[~shapely.covers(self.open_shell, lines)] = False
-        # Coincident corners must not make an edge of no length: that would be no edge.
-        length = np.maximum(shapely.length(lines[seen]), 1e-9)
-        graph = csr_matrix((length, (a[seen], b[seen])), shape=(len(corners.places),) * 2)
-        distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
-        if not np.isfinite(distance[1]):
-            return None, np.inf
-        path = [1]
-        while path[-1] != 0:
-            path.append(int(before[path[-1]]))
-        return corners.places[path[::-1]], float(distance[1])
+            free &= shapely.covers(self.open_shell, lines)
+        return free
 
     def _met_by(self, way: FloatArray, around: list[int]) -> list[int]:
+        """What a way runs into: of shapes on one of its lines, the one that it runs in the longest.
+
+        Around that the others are passed, as a rule: a row of trees by its first and its last one.
+        """
         lines = _lines(way[:-1], way[1:])
-        met = set(np.unique(self._meet(lines)[1]).tolist())
-        if not shapely.covers(self.open_shell, lines).all():
+        line, shape = self._meet(lines)
+        new = ~np.isin(shape, around)
+        line, shape = line[new], shape[new]
+        within_m = shapely.length(shapely.intersection(self._blocks[shape], lines[line]))
+        order = np.lexsort((-within_m, line))
+        first = np.unique(line[order], return_index=True)[1]
+        met = set(shape[order[first]].tolist())
+        if _SHELL not in around and not shapely.covers(self.open_shell, lines).all():
             met.add(_SHELL)
-        return sorted(met.difference(around))
+        return sorted(met)
 
 
 def _lines(begin: FloatArray, end: FloatArray) -> NDArray[np.object_]:
