@@ -181,15 +181,16 @@ class Passage:
         """The shortest way, its length and its graph; of less than all corners if it is longer."""
         none = np.zeros((2, 2))  # at the ends there is nothing to graze
         graph = _Graph(_Corners(ends, none, none), np.array([0]), np.array([1]), [])
-        more = around
-        while True:
+        way: FloatArray | None = ends
+        length = float(np.hypot(*(ends[1] - ends[0])))
+        more = around or self._met_by(ends, around)
+        while more:
             graph = self._grown(graph, more, reach)
             way, length = graph.way()
             if way is None or (length > reach and not graph.is_whole):
-                return way, length, graph
+                break
             more = self._met_by(way, graph.around)
-            if not more:
-                return way, length, graph
+        return way, length, graph
 
     def _grown(self, graph: _Graph, more: list[int], reach: float) -> _Graph:
         """A graph with the corners of more shapes, its lines free of these, too."""
