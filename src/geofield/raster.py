@@ -49,20 +49,29 @@ class Window:
 
 
 def windows(
-    shape: tuple[int, int], core_px: int, overlap_px: int, align_px: int, factor: float = 1.0
+    shape: tuple[int, int],
+    core_px: int,
+    overlap_px: int,
+    align_px: int,
+    factor: float = 1.0,
+    within: tuple[float, ...] | None = None,
 ) -> Iterator[Window]:
-    """Yield windows whose cores cover a picture, row by row.
+    """Yield windows whose cores cover a picture, or what of it is `within` bounds, row by row.
 
     Core, overlap and alignment are in working pixels, each ``factor`` pixels of the picture
     wide: a window starts at a whole multiple of ``align_px``, so that what is computed in
-    blocks of that size comes out as in the whole picture.
+    blocks of that size comes out as in the whole picture. Bounds (left, upper, right, lower) are
+    in pixels of the picture.
     """
     rows, cols = shape
+    left, upper, right, lower = (0, 0, cols, rows) if within is None else within
+    left, upper = (_start(v / factor, align_px, factor) for v in (left, upper))
+    right, lower = min(int(np.ceil(right)), cols), min(int(np.ceil(lower)), rows)
     step = core_px * factor
-    for j in range(max(int(np.ceil(rows / step)), 1)):
-        for i in range(max(int(np.ceil(cols / step)), 1)):
-            x0, x1 = i * step, min((i + 1) * step, cols)
-            y0, y1 = j * step, min((j + 1) * step, rows)
+    for j in range(max(int(np.ceil((lower - upper) / step)), 1)):
+        for i in range(max(int(np.ceil((right - left) / step)), 1)):
+            x0, x1 = left + i * step, min(left + (i + 1) * step, right)
+            y0, y1 = upper + j * step, min(upper + (j + 1) * step, lower)
             c0, r0 = (_start(v / factor - overlap_px, align_px, factor) for v in (x0, y0))
             c1 = min(int(np.ceil(x1 + overlap_px * factor)), cols)
             r1 = min(int(np.ceil(y1 + overlap_px * factor)), rows)

@@ -47,6 +47,8 @@ FloatArray = NDArray[np.float64]
 
 CORE_PX = 1728
 """Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
+_BESIDE_PX = 96
+"""So far around what is in reach crowns are looked for, too, working pixels."""
 _BELOW, _ABOVE = 0.6, 1.4
 """A crown measured this far outside the range of radii is still the tree asked for."""
 MIN_RADIUS_PX = 1.6
@@ -192,7 +194,9 @@ def _look(
     The reach and how far it is are in pixels of the picture, candidates are in working pixels.
     Told, too, is how many pixels of the area have data, and how many lie in gaps of the data.
     """
-    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor))
+    # Stronger crowns a little farther away may be the same ones as those within reach.
+    wide = None if reach is None else reach.buffer(_BESIDE_PX * factor).bounds
+    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor, wide))
     if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns, seen_px, gaps_px = Circles(), 0, 0
