@@ -1,7 +1,5 @@
 """A picture gives the same obstacles whichever way its file runs."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import rasterio
@@ -10,29 +8,10 @@ from affine import Affine
 import geofield as gf
 from geofield.imagery import SceneReader
 from geofield.imagery.gdal import to_rasterio
-from geofield.obstacles.upright import Turn
+from geofield.model.upright import Turn
+from turned_pictures import TURNS, turned
 
 UTM = "EPSG:32633"
-TURNS = {
-    "south-up": lambda a, t, w, h: (a[..., ::-1, :], t @ Affine(1, 0, 0, 0, -1, h)),
-    "west": lambda a, t, w, h: (a[..., ::-1], t @ Affine(-1, 0, w, 0, 1, 0)),
-    "half": lambda a, t, w, h: (a[..., ::-1, ::-1], t @ Affine(-1, 0, w, 0, -1, h)),
-    "quarter": lambda a, t, w, h: (
-        a.swapaxes(-1, -2)[..., ::-1],
-        t @ Affine(0, 1, 0, 1, 0, 0) @ Affine(-1, 0, h, 0, 1, 0),
-    ),
-    "exchanged": lambda a, t, w, h: (a.swapaxes(-1, -2), t @ Affine(0, 1, 0, 1, 0, 0)),
-}
-
-
-def turned(scene, turn):
-    """The same picture in a file that runs another way."""
-    grid = scene.grid
-    size = grid.width_px, grid.height_px
-    bands, transform = TURNS[turn](scene.bands, grid.transform, *size)
-    valid, _ = TURNS[turn](scene.valid, grid.transform, *size)
-    other = gf.Grid(bands.shape[2], bands.shape[1], transform, grid.crs)
-    return dataclasses.replace(scene, grid=other, bands=bands.copy(), valid=valid.copy())
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +20,13 @@ def oblong(simulated):
     return simulated.scene.crop(3, 5, 371, 290)
 
 
-def assert_same(found, expected):
-    assert len(expected) >= 8
+def assert_same(found, expected, least=8):
+    assert len(expected) >= least
     assert found.obstacle_no.tolist() == expected.obstacle_no.tolist()
     assert found.kind.tolist() == expected.kind.tolist()
     for column in ("radius_m", "confidence", "lat", "lon"):
-        assert found[column].to_numpy() == pytest.approx(expected[column].to_numpy(), abs=1e-7)
+        values, right = (table[column].to_numpy(dtype=float) for table in (found, expected))
+        np.testing.assert_allclose(values, right, rtol=0, atol=1e-7)
     assert found.geometry.hausdorff_distance(expected.geometry).max() < 1e-6
 
 
@@ -58,6 +38,18 @@ def test_obstacles_lie_where_they_lie(simulated, oblong, turn):
     assert_same(found, expected)
     x, y = picture.grid.from_lonlat(found.lon.to_numpy(), found.lat.to_numpy())
     assert found[["x_px", "y_px"]].to_numpy() == pytest.approx(np.column_stack([x, y]), abs=1e-5)
+
+
+@pytest.mark.parametrize("strategy", ["max_of_all", "study_listing", "consensus"])
+def test_the_study_sees_them_upright_too(simulated, oblong, strategy):
+    options = {"strategy": strategy, "edge_method": None, "min_share": 0.02}
+    if strategy == "consensus":
+        options |= {"edge_method": "sobel", "threshold_range": (0.0, 0.2, 0.01)}
+    expected = gf.detect_obstacles(oblong, simulated.field, **options)
+    for turn in TURNS:
+        found = gf.detect_obstacles(turned(oblong, turn), simulated.field, **options)
+        assert found.attrs == expected.attrs
+        assert_same(found, expected, least=5)
 
 
 @pytest.mark.parametrize("turn", ["south-up", "quarter"])
@@ -95,3 +87,13 @@ def test_a_picture_is_brought_to_within_an_eighth_of_a_turn_of_north(degrees):
     here = np.array([[3.0, 4.0]])
     x, y = upright.to_native(*here.T)
     assert np.column_stack(grid.from_native(x, y)) == pytest.approx(turn.points_back(here))
+
+
+def test_north_is_that_of_the_ground_not_of_the_crs():
+    """South African Lo grids count to the west and to the south."""
+    crs, metric = "EPSG:2053", gf.Grid(9, 9, Affine(0.5, 0, 5e5, 0, -0.5, 7e6), "EPSG:32735")
+    x, y = metric.to_crs([0.0, 9.0, 0.0], [0.0, 0.0, 9.0], crs)
+    steps = [x[1] - x[0], x[2] - x[0], x[0] * 9, y[1] - y[0], y[2] - y[0], y[0] * 9]
+    grid = gf.Grid(9, 9, Affine(*(step / 9 for step in steps)), crs)
+    assert grid.transform.a < 0 < grid.transform.e
+    assert not Turn.upright(grid)

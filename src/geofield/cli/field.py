@@ -246,8 +246,11 @@ def _study(
     as_json: bool,
 ) -> None:
     """Print and draw the study's numbered regions."""
+    from geofield.model.upright import upright
     from geofield.study.threshold import study_pictures
 
+    # Numbers are those of `extract_field`, which sees every picture so.
+    scene = upright(scene)
     study = study_pictures(scene.grey, scene.valid)
     here = study.region_at(*scene.pixel_of(lat=lat, lon=lon))
     square_m = scene.grid.ground_resolution_m**2

@@ -33,6 +33,7 @@ from geofield.methods import method as method_of
 from geofield.model import Alternative, Field, FieldQuality, Scene
 from geofield.model.scene import OPEN_IT
 from geofield.model.segmentation import Segmentation
+from geofield.model.upright import upright
 from geofield.raster import gaps_filled
 
 Holes = Literal["fill", "keep"]
@@ -117,6 +118,7 @@ def extract_field(
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
     _check_places(scene, (lon, lat), include, exclude)
+    scene = upright(scene)
     if method == "auto":
         scene = _with_data(scene)
     picture = diffused(scene) if smooth == "diffusion" else scene
@@ -202,7 +204,7 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
         The point in the field, degrees, WGS 84.
     """
     refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
-    search, shown = FieldSearch((lon, lat)), _with_data(scene)
+    search, shown = FieldSearch((lon, lat)), _with_data(upright(scene))
     search.refuse_another(shown, (lon, lat))
     search.view(shown)
     return search

@@ -17,6 +17,7 @@ from geofield.learned import network
 from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
 from geofield.model.field import Field
+from geofield.model.upright import Turn
 from geofield.obstacles.crowns import (
     CELL_PX,
     NETWORK,
@@ -38,7 +39,7 @@ from geofield.obstacles.picture import (
     working_factor,
 )
 from geofield.obstacles.standing import StandingMap
-from geofield.obstacles.upright import Turn
+from geofield.obstacles.upright import turned
 from geofield.raster import Window, windows
 
 Progress = Callable[[int, int, str], None]
@@ -113,7 +114,7 @@ def detect_by_default(
     if polarity not in ("dark", "bright", "both"):
         raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark, bright or both.")
     turn = Turn.upright(picture.grid)
-    picture = turn.picture(picture)
+    picture = turned(picture, turn)
     resolution = picture.grid.ground_resolution_m
     factor = working_factor(resolution)
     tone = tone_of(picture)

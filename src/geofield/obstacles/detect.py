@@ -16,6 +16,7 @@ from geofield.model.circles import Circles, checked_range
 from geofield.model.field import MAKE_ONE, Field
 from geofield.model.obstacles import from_circles_px, from_polygons
 from geofield.model.scene import OPEN_IT, Scene
+from geofield.model.upright import Turn
 from geofield.obstacles.costs import thresholds
 from geofield.obstacles.default import Found, Polarity, Progress, detect_by_default
 from geofield.obstacles.picture import Picture, search_region
@@ -113,9 +114,8 @@ def detect_obstacles(
     Returns
     -------
     GeoDataFrame
-        The layer ``obstacles`` in the metric CRS, ordered by row and column of the centre, for
-        ``auto`` those of the picture with north above;
-        ``attrs["detection"]`` says how they were found.
+        The layer ``obstacles`` in the metric CRS, ordered by row and column of the centre in the
+        picture with north above; ``attrs["detection"]`` says how they were found.
 
     Raises
     ------
@@ -157,6 +157,8 @@ def detect_obstacles(
         detection |= {"threshold": detected, "possible_from": min(limits)} | found.detection
     else:
         whole = scene if isinstance(scene, Scene) else scene.read()
+        turn = Turn.upright(whole.grid)
+        whole = turn.scene(whole)
         resolution = whole.grid.ground_resolution_m
         circles, share, told = method(STUDY_STRATEGIES, strategy)(
             whole,
@@ -174,7 +176,8 @@ def detect_obstacles(
         )
         order = np.lexsort((circles.x_px, circles.y_px))
         share = None if share is None else share[order]
-        table = _of_circles(circles.take(order), share, scene.grid, crs, buffer_m)
+        circles = turn.circles_back(circles.take(order))
+        table = _of_circles(circles, share, scene.grid, crs, buffer_m)
         detection |= told
     table.attrs["detection"] = detection
     return table
