@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from affine import Affine
+from pydantic import ValidationError
 
 import geofield as gf
 from geofield.errors import GeofieldError
@@ -18,6 +19,19 @@ from geofield.simulate import SimulatedField, SimulationSettings
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
 POINT: dict[str, Any] = {"lat": 35.075373, "lon": 33.531142}
 UTM = "EPSG:32636"
+
+
+def at(made: SimulatedField) -> dict[str, Any]:
+    return {"lat": made.lat, "lon": made.lon}
+
+
+def study(made: SimulatedField, **options: Any) -> object:
+    return gf.detect_obstacles(made.scene, made.field, **{"strategy": "single"} | options)
+
+
+def tracks(made: SimulatedField) -> gf.Tracks:
+    return gf.plan_tracks(made.field, spacing_m=30)
+
 
 CALLS: dict[str, Callable[[SimulatedField, Any], object]] = {
     "size_m": lambda made, v: gf.read_scene(SAMPLE, **POINT, size_m=v),
@@ -35,9 +49,31 @@ CALLS: dict[str, Callable[[SimulatedField, Any], object]] = {
     "seed": lambda made, v: gf.simulate_field(v),
     "height_px": lambda made, v: SimulationSettings(height_px=v),
     "transform": lambda made, v: gf.Grid(3, 3, v, UTM),
+    "tolerance_px": lambda made, v: gf.extract_field(made.scene, **at(made), tolerance_px=v),
+    "min_hole_m2": lambda made, v: gf.extract_field(made.scene, **at(made), min_hole_m2=v),
+    "regions": lambda made, v: gf.extract_field(
+        made.scene, **at(made), method="study", regions=[v]
+    ),
+    "sensitivity": lambda made, v: study(made, sensitivity=v),
+    "min_share": lambda made, v: study(made, min_share=v),
+    "threshold": lambda made, v: study(made, threshold=v),
+    "skip": lambda made, v: gf.plan_route(tracks(made), pattern="skip", skip=v),
+    "margin_m": lambda made, v: gf.plan_route(tracks(made), pattern="skip", margin_m=v),
+    "turning_radius_m": lambda made, v: gf.plan_route(
+        tracks(made), pattern="skip", turning_radius_m=v
+    ),
+    "column": lambda made, v: made.scene.crop(v, 0, 9, 9),
+    "count": lambda made, v: list(gf.simulate_fields(v, seed=1)),
+    "bootstrap": lambda made, v: gf.evaluate(made.obstacles, made.obstacles, bootstrap=v),
+    "radius_m": lambda made, v: SimulationSettings(radius_m=(v, 9)),
 }  # fmt: skip
 #: Arguments for which None is a choice.
-OPTIONAL = {"size_m", "size_px", "resolution_m", "min_confidence"}
+OPTIONAL = {"size_m", "size_px", "resolution_m", "min_confidence", "threshold", "turning_radius_m"}
+#: Arguments that are counted.
+WHOLE = {
+    "size_px", "zoom", "width_px", "height_px", "seed", "regions", "skip", "column", "count",
+    "bootstrap",
+}  # fmt: skip
 
 
 CASES = [
@@ -57,6 +93,54 @@ def test_its_name_and_what_is_wanted_are_told(
     assert error.value.message.startswith(f"{name} is {value!r}; it must be ")
     if value == "20" and name not in ("transform", "spacing_m"):
         assert error.value.hint == f"Write {name}=20."
+
+
+@pytest.mark.parametrize("name", sorted(CALLS.keys() - {"transform"}))
+@pytest.mark.parametrize(
+    "value", [True, np.True_, np.array(True), float("nan"), np.float32("nan"), float("inf"), 3j]
+)
+def test_what_only_counts_as_a_number_is_none(
+    simulated: SimulatedField, name: str, value: Any
+) -> None:
+    """A spacing of True was one metre, and a tolerance without end never came back."""
+    with pytest.raises(GeofieldError) as error:
+        CALLS[name](simulated, value)
+    assert error.value.message.startswith(f"{name} is {value!r}; it must be a ")
+
+
+@pytest.mark.parametrize("name", sorted(WHOLE))
+def test_what_is_counted_has_no_fraction(simulated: SimulatedField, name: str) -> None:
+    """Half a zoom was another scale, and half a pixel another place."""
+    with pytest.raises(GeofieldError, match=rf"{name} is 2\.5; it must be a whole number"):
+        CALLS[name](simulated, 2.5)
+
+
+def test_whole_numbers_are_that_as_floats_too(simulated: SimulatedField) -> None:
+    grid = gf.Grid(np.float64(3.0), 4.0, simulated.scene.grid.transform, UTM)  # type: ignore[arg-type]
+    assert (grid, grid.shape) == (gf.Grid(3, 4, grid.transform, UTM), (4, 3))
+    assert isinstance(grid.width_px, int)
+    read = gf.read_scene(SAMPLE, **POINT, size_px=np.float32(40))  # type: ignore[arg-type]
+    assert read.crop(np.int64(3), 2.0, 9, 9).grid.shape == (9, 9)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [True, np.True_, float("nan"), "x"])
+def test_numbers_in_pairs_too(simulated: SimulatedField, value: Any) -> None:
+    made = simulated
+    calls: list[Callable[[], object]] = [
+        lambda: gf.read_scene(SAMPLE, scaling=(value, 200)),
+        lambda: gf.detect_obstacles(made.scene, made.field, radius_m=(value, 9)),
+        lambda: study(made, strategy="t_range", threshold_range=(value, 0.2, 0.1)),
+        lambda: study(made, grey_check=value),
+        lambda: gf.plan_tracks(made.field, spacing_m=20, direction=value),
+        lambda: gf.Grid(3, 3, (value, 0, 5e5, 0, -1, 39e5), UTM),  # type: ignore[arg-type]
+        lambda: gf.Settings.model_validate({"obstacles": {"radius_m": [value, 9]}}),
+        lambda: gf.Settings.model_validate({"tracks": {"through_lonlat": [value, 9]}}),
+        lambda: gf.Settings.model_validate({"field": {"include": [[value, 9]]}}),
+        lambda: gf.Settings.model_validate({"tracks": {"spacing_m": value}}),
+    ]
+    for call in calls:
+        with pytest.raises((GeofieldError, ValidationError)):
+            call()
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

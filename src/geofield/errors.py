@@ -6,7 +6,7 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, isinf, isnan
 from numbers import Real
 from typing import Any, get_args
 
@@ -61,19 +61,40 @@ def refuse_other(
 
 
 def refuse_no_number(
-    error: type[GeofieldError], wanted: str = "", *, none_too: bool = False, **values: object
+    error: type[GeofieldError],
+    wanted: str = "",
+    *,
+    none_too: bool = False,
+    whole: bool = False,
+    **values: Any,
 ) -> None:
-    """Refuse arguments, by their names, that are no numbers, as text is none.
+    """Refuse arguments, by their names, that are no finite numbers: text, truth, NaN.
 
-    `wanted` says what they are, behind "a number"; `none_too` lets None pass.
+    `wanted` says what they are, behind "a number"; `none_too` lets None pass, `whole` no fraction.
     """
     for name, value in values.items():
-        known = isinstance(value, Real) and not isinstance(value, bool)
-        if not (known or getattr(value, "ndim", None) == 0 or (none_too and value is None)):
+        endless = is_number(value) and isinf(value)
+        known = is_number(value) and not endless and not (whole and value % 1)
+        if not (known or (none_too and value is None)):
+            kind = "a whole number" if whole else "a finite number" if endless else "a number"
             raise error(
-                f"{name} is {value!r}; it must be a number{wanted and f', {wanted}'}.",
+                f"{name} is {value!r}; it must be {kind}{wanted and f', {wanted}'}.",
                 hint=f"Write {name}={value}." if _is_written(value) else None,
             )
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value, of Python or an array's, is a number, which True and NaN are not."""
+    if not isinstance(value, Real):
+        kind = getattr(getattr(value, "dtype", None), "kind", None)
+        if getattr(value, "ndim", None) != 0 or kind not in ("i", "u", "f"):
+            return False
+    return not is_truth(value) and not isnan(value)
+
+
+def is_truth(value: object) -> bool:
+    """Whether a value is true or false, of Python or an array's."""
+    return isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", None) == "b"
 
 
 def _is_written(value: object) -> bool:

@@ -7,7 +7,7 @@ top-left *corner* of the top-left pixel, whose centre is therefore (0.5, 0.5).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from geofield.crs import (
     side_of_cross_m,
     transformer,
 )
-from geofield.errors import CRSError, GridError, refuse_no_number
+from geofield.errors import CRSError, GridError, is_truth, refuse_no_number
 
 #: Radius of the Web Mercator sphere, metres (METHOD.md, section 1).
 EARTH_RADIUS_M = 6378137.0
@@ -71,11 +71,17 @@ class Grid:
         def __init__(self, width_px: int, height_px: int, transform: Affine, crs: Any) -> None: ...
 
     def __post_init__(self) -> None:
-        refuse_no_number(GridError, "pixels", width_px=self.width_px, height_px=self.height_px)
+        sides: dict[str, Any] = {"width_px": self.width_px, "height_px": self.height_px}
+        refuse_no_number(GridError, "pixels", whole=True, **sides)
+        for name, side in sides.items():
+            object.__setattr__(self, name, int(side))
         object.__setattr__(self, "crs", parse_crs(self.crs))
         try:
-            object.__setattr__(self, "transform", Affine(*tuple(self.transform)[:6]))
-        except TypeError:
+            numbers = tuple(self.transform)[:6]
+            if any(map(is_truth, numbers)):
+                raise TypeError("True is no number of a transform")
+            object.__setattr__(self, "transform", Affine(*numbers))
+        except (TypeError, ValueError):
             raise GridError(
                 f"transform is {self.transform!r}; it must be an Affine, or its six numbers."
             ) from None
@@ -110,8 +116,8 @@ class Grid:
             Size of the picture.
         """
         refuse_no_number(GridError, "degrees", lat=lat, lon=lon)
-        refuse_no_number(GridError, f"0 to {MAX_ZOOM}", zoom=zoom)
-        refuse_no_number(GridError, "pixels", width_px=width_px, height_px=height_px)
+        refuse_no_number(GridError, f"0 to {MAX_ZOOM}", whole=True, zoom=zoom)
+        refuse_no_number(GridError, "pixels", whole=True, width_px=width_px, height_px=height_px)
         if not 0 <= zoom <= MAX_ZOOM:
             raise GridError(f"Zoom {zoom} does not exist.", hint=f"Use 0 to {MAX_ZOOM}.")
         if not abs(lat) <= WEB_MERCATOR_MAX_LAT:
@@ -135,12 +141,14 @@ class Grid:
 
     def crop(self, column: int, row: int, width_px: int, height_px: int) -> Grid:
         """The part that starts at a column and row (equation 4); it may reach outside."""
+        refuse_no_number(GridError, "pixels", column=column, row=row)
         return Grid(width_px, height_px, self.transform @ Affine.translation(column, row), self.crs)
 
     def resized(self, width_px: int, height_px: int) -> Grid:
         """The same ground cut into another number of pixels."""
+        resized = Grid(width_px, height_px, self.transform, self.crs)
         scale = Affine.scale(self.width_px / width_px, self.height_px / height_px)
-        return Grid(width_px, height_px, self.transform @ scale, self.crs)
+        return replace(resized, transform=self.transform @ scale)
 
     # -- pixel <-> ground ------------------------------------------------------------
 

@@ -13,7 +13,13 @@ import shapely
 from pyproj import CRS
 
 from geofield.crs import ground_areas_m2, ground_scale, is_metric
-from geofield.errors import CRSError, ObstacleError, ObstacleWarning, refuse_other
+from geofield.errors import (
+    CRSError,
+    ObstacleError,
+    ObstacleWarning,
+    refuse_no_number,
+    refuse_other,
+)
 from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
 from geofield.evaluation.scores import Counts, Score, score
@@ -96,6 +102,7 @@ def evaluate(
     CRSError
         When a table has no CRS, or the detected obstacles are not in metres.
     """
+    refuse_no_number(ObstacleError, "0 or more", whole=True, bootstrap=bootstrap, seed=seed)
     found = detected if isinstance(detected, Mapping) else {"": detected}
     true = truth if isinstance(truth, Mapping) else {"": truth}
     missing = sorted(set(found) ^ set(true))

@@ -17,6 +17,7 @@ from geofield.errors import (
     FieldWarning,
     ImageryError,
     SettingsError,
+    refuse_no_number,
     refuse_other,
 )
 from geofield.field.diffusion import diffused
@@ -115,6 +116,8 @@ def extract_field(
     """
     refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
     _check(method, regions, (*include, *exclude), holes, smooth)
+    refuse_no_number(SettingsError, "square metres", min_hole_m2=min_hole_m2)
+    refuse_no_number(SettingsError, "pixels", tolerance_px=tolerance_px)
     if min_hole_m2 < 0 or tolerance_px < 0:
         raise SettingsError("Hole size and outline tolerance must not be below zero.")
     _check_places(scene, (lon, lat), include, exclude)
@@ -218,6 +221,8 @@ def _check(
         raise SettingsError(
             f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(FIELD)}."
         )
+    for number in regions:
+        refuse_no_number(SettingsError, "of a region that is listed", whole=True, regions=number)
     if regions and method != "study":
         raise SettingsError(
             f"Numbered regions belong to method study, not {method}.", hint="Use method study."

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, is_number
 
 Limits = tuple[float, float] | None
 #: The percentiles that become 0 and 255: sun glint and dead pixels lie outside.
@@ -79,7 +79,7 @@ def to_uint8(bands: NDArray[Any], limits: Limits) -> NDArray[np.uint8]:
     if limits is None:
         return np.asarray(bands, np.uint8)
     low, high = limits
-    if not (np.isfinite(low) and np.isfinite(high) and high > low):
+    if not (is_number(low) and is_number(high) and np.isfinite([low, high]).all() and high > low):
         raise ImageryError(
             f"A picture cannot be scaled from {low} .. {high} to 0 .. 255.",
             hint="Give two finite values, the smaller one first.",

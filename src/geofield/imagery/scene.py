@@ -86,9 +86,10 @@ def read_scene(
     if size_m is not None and size_px is not None:
         raise ImageryError("The size is given twice.", hint="Give size_m or size_px, not both.")
     refuse_no_number(ImageryError, "degrees", none_too=True, lat=lat, lon=lon)
-    metres = {"size_m": size_m, "resolution_m": resolution_m, "least_m": least_m}
+    metres: dict[str, Any] = {"size_m": size_m, "resolution_m": resolution_m, "least_m": least_m}
     refuse_no_number(ImageryError, "metres on the ground", none_too=True, **metres)
-    refuse_no_number(ImageryError, "pixels", none_too=True, size_px=size_px)
+    refuse_no_number(ImageryError, "pixels", none_too=True, whole=True, size_px=size_px)
+    size_px = None if size_px is None else int(size_px)
     known: dict[str, Any] = {"bands": bands, "crs": crs, "scaling": scaling, "source": source}
     reader = open_reader(str(path), lat=lat, lon=lon, allow=allow, **known)
     if lat is None or lon is None:

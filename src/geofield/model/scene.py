@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +176,14 @@ class Scene:
 
     def crop(self, column: int, row: int, width_px: int, height_px: int) -> Scene:
         """The part of `width_px` by `height_px` from `column`, `row` on, cut at the edge."""
+        asked: dict[str, Any] = {
+            "column": column,
+            "row": row,
+            "width_px": width_px,
+            "height_px": height_px,
+        }
+        refuse_no_number(ImageryError, "pixels", whole=True, **asked)
+        column, row, width_px, height_px = map(int, asked.values())
         c0, r0 = max(column, 0), max(row, 0)
         c1 = min(column + width_px, self.grid.width_px)
         r1 = min(row + height_px, self.grid.height_px)

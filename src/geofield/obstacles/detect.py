@@ -129,8 +129,12 @@ def detect_obstacles(
     refuse_no_number(ObstacleError, "metres", buffer_m=buffer_m)
     refuse_no_number(ObstacleError, "above zero", cost_missed=cost_missed)
     refuse_no_number(ObstacleError, "0 to 1", none_too=True, min_confidence=min_confidence)
+    refuse_no_number(ObstacleError, "0 to 1", sensitivity=sensitivity, min_share=min_share)
+    refuse_no_number(ObstacleError, none_too=True, threshold=threshold)
     if not (np.isfinite(buffer_m) and buffer_m >= 0):
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
+    if not 0 <= min_share <= 1:
+        raise ObstacleError(f"The share of settings {min_share:g} is outside 0 to 1.")
     if strategy not in STRATEGIES:
         raise ObstacleError(
             f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."

@@ -15,6 +15,7 @@ from pydantic import (
 )
 
 from geofield import wording
+from geofield.errors import is_truth
 
 NonNegative = Annotated[float, Field(ge=0)]
 
@@ -56,9 +57,16 @@ class Section(BaseModel):
     def _no_truth(cls, value: Any, info: ValidationInfo) -> Any:
         """Who writes `headland_m = true` does not mean 1 m."""
         kind = cls.model_fields[str(info.field_name)].annotation
-        if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
+        if bool not in (kind, *get_args(kind)) and _holds_truth(value):
             raise ValueError("input should be a value, not true or false")
         return value
+
+
+def _holds_truth(value: Any) -> bool:
+    """Whether a value, or one in a list of them, is true or false."""
+    if isinstance(value, list | tuple):
+        return any(map(_holds_truth, value))
+    return is_truth(value)
 
 
 def nearest(given: str, names: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -71,7 +71,7 @@ def simulate_field(seed: int, settings: SimulationSettings | None = None) -> Sim
     SettingsError
         When the seed is below zero.
     """
-    refuse_no_number(SettingsError, "0 or more", seed=seed)
+    refuse_no_number(SettingsError, "0 or more", whole=True, seed=seed)
     if seed < 0:
         raise SettingsError(f"The seed {seed} is below zero.")
     settings = settings or SimulationSettings()
@@ -120,13 +120,15 @@ def simulate_fields(
         0 for never.
     """
     settings = settings or SimulationSettings()
-    for index in range(count):
+    every: dict[str, Any] = {"equal_brightness_every": equal_brightness_every}
+    refuse_no_number(SettingsError, "of fields", whole=True, count=count, seed=seed, **every)
+    for index in range(int(count)):
         one = settings
         if obstacle_counts:
             one = replace(one, obstacles=int(obstacle_counts[index % len(obstacle_counts)]))
         if equal_brightness_every and (index + 1) % equal_brightness_every == 0:
             one = replace(one, equal_brightness=True)
-        yield simulate_field(seed * 100_003 + index, one)
+        yield simulate_field(int(seed) * 100_003 + index, one)
 
 
 def _grid(settings: SimulationSettings) -> Grid:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from geofield.errors import SettingsError, refuse_no_number
 
@@ -49,12 +49,15 @@ class SimulationSettings:
     lon: float = 33.531142
 
     def __post_init__(self) -> None:
-        refuse_no_number(SettingsError, "pixels", width_px=self.width_px, height_px=self.height_px)
+        sides: dict[str, Any] = {"width_px": self.width_px, "height_px": self.height_px}
+        refuse_no_number(SettingsError, "pixels", whole=True, **sides)
         refuse_no_number(SettingsError, "metres", resolution_m=self.resolution_m)
         refuse_no_number(SettingsError, "degrees", lat=self.lat, lon=self.lon)
-        refuse_no_number(SettingsError, none_too=True, obstacles=self.obstacles)
+        refuse_no_number(SettingsError, none_too=True, whole=True, obstacles=self.obstacles)
         if min(self.width_px, self.height_px) < 64:
             raise SettingsError("A simulated picture has at least 64 x 64 px.")
+        refuse_no_number(SettingsError, "metres", radius_m=self.radius_m[0])
+        refuse_no_number(SettingsError, "metres", radius_m=self.radius_m[1])
         if not 0 < self.radius_m[0] <= self.radius_m[1] < math.inf:
             raise SettingsError(f"The radius range {self.radius_m} is empty or endless.")
         if not 0 < self.resolution_m < math.inf:

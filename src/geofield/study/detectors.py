@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, is_number
 from geofield.model.circles import Circles, inside
 from geofield.model.scene import Scene
 from geofield.raster import gaps_filled
@@ -172,7 +172,7 @@ def _grey_limit(
         return GREY_LIMIT
     if check == "relative":
         return relative_grey_limit(grey, region)
-    if isinstance(check, int | float):
+    if is_number(check):
         return float(check)
     raise ObstacleError(
         f"Unknown grey check {check!r}.", hint="Choose absolute, relative or a grey level."

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, is_truth
 from geofield.model.circles import Circles, inside
 from geofield.study.accumulator import Polarity
 from geofield.study.checks import first_of_duplicates
@@ -221,7 +221,12 @@ def thresholds(span: ThresholdRange) -> NDArray[np.float64]:
     ObstacleError
         For a step that is not above zero, or a stop below the start.
     """
-    start, stop, step = (float(value) for value in span)
+    try:
+        start, stop, step = (float("nan") if is_truth(value) else float(value) for value in span)
+    except (TypeError, ValueError):
+        raise ObstacleError(
+            f"The thresholds {span!r} are no range.", hint="Give start, stop and step."
+        ) from None
     if not step > 0 or stop < start or not np.isfinite([start, stop, step]).all():
         raise ObstacleError(
             f"The thresholds {start:g} to {stop:g} in steps of {step:g} are no range."

@@ -18,7 +18,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import grid_north_deg, ground_scale
-from geofield.errors import TrackError
+from geofield.errors import TrackError, is_truth
 from geofield.methods import LONGEST_EDGE, method
 from geofield.tracks.dominant import dominant_edge
 from geofield.tracks.fewest import fewest_direction
@@ -117,6 +117,8 @@ def find_baseline(
             direction = float(direction)
         except ValueError:
             raise _unknown(direction) from None
+    if is_truth(direction):
+        raise _unknown(direction)
     if isinstance(direction, int | float | np.integer | np.floating):
         return _from_heading(float(direction), north)
     return _from_ab(direction, north, polygon)

@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale
-from geofield.errors import CRSMismatchError, TrackError, TrackWarning
+from geofield.errors import CRSMismatchError, TrackError, TrackWarning, is_number
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.frame import along_frame
@@ -258,7 +258,7 @@ def clip_shapes(
 
 def _check_lengths(*, none_too: bool = False, **lengths_m: float) -> None:
     for name, value in lengths_m.items():
-        known = isinstance(value, (int, float, np.number)) and np.isfinite(value)
+        known = is_number(value) and np.isfinite(value)
         if not known or value < 0.0 or (value == 0.0 and not none_too):
             least = "0 or more" if none_too else "more than 0"
             raise TrackError(f"{name} is {value!r}; it must be a number, {least} metres.")

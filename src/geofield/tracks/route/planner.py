@@ -15,7 +15,7 @@ from shapely import Polygon
 from shapely.ops import substring
 
 from geofield import schema
-from geofield.errors import TrackError, TrackWarning, refuse_other
+from geofield.errors import TrackError, TrackWarning, refuse_no_number, refuse_other
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
@@ -156,14 +156,17 @@ def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
         )
     if curve not in ("dubins", "reeds_shepp"):
         raise TrackError(f"Unknown curve {curve!r}.", hint="Choose dubins or reeds_shepp.")
+    refuse_no_number(TrackError, "0 or more tracks", whole=True, skip=skip)
+    refuse_no_number(TrackError, "0 or more metres", margin_m=margin_m)
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
-    if not np.isfinite(margin_m) or margin_m < 0.0:
+    if margin_m < 0.0:
         raise TrackError(f"margin_m is {margin_m}; it must be 0 or more metres.")
 
 
 def _check_radius(radius_m: float, bounds: tuple[float, ...], margin_m: float) -> None:
-    if not np.isfinite(radius_m) or radius_m <= 0.0:
+    refuse_no_number(TrackError, "more than 0 metres", turning_radius_m=radius_m)
+    if radius_m <= 0.0:
         raise TrackError(f"turning_radius_m is {radius_m}; it must be more than 0 metres.")
     size = float(np.hypot(bounds[2] - bounds[0], bounds[3] - bounds[1])) + 2.0 * margin_m
     if 2.0 * radius_m > size:
