@@ -25,6 +25,7 @@ from geofield.model.review import reconcile
 from geofield.model.track_edits import TrackEdits
 from geofield.plan import Plan
 from geofield.settings import Settings, TrackSettings, as_before, option_named
+from geofield.wording import counted
 
 #: Methods of outlines that a person gave as they are, or chose.
 _GIVEN = ("boundary", "chosen")
@@ -210,17 +211,17 @@ def _work_on(plan: Plan) -> Iterator[str]:
         _, written = reconcile(plan.obstacles, plan.evidence.written)
         reviewed = sum(row.kept for row in written.rows) + len(written.removed)
         if reviewed:
-            yield f"{reviewed} reviewed obstacles"
+            yield counted(reviewed, "reviewed obstacle")
         columns.update(schema.own_columns(schema.OBSTACLES, plan.obstacles))
     if _drawn(plan) or plan.field.method in _GIVEN:
         yield "an outline drawn by hand"
     tracks = plan.track_edits
     edited = [*tracks.edits, *tracks.apart]
     if edited:
-        yield f"{len(edited)} edited tracks"
+        yield counted(len(edited), "edited track")
     said = len(points_said(plan.settings))
     if said:
-        yield f"{said} points said of its outline"
+        yield f"{counted(said, 'point')} said of its outline"
     if plan.field.name != plan.field.field_id:
         yield "a name"
     if columns or tracks.beside:

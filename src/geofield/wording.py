@@ -40,6 +40,15 @@ def counted(number: int, one: str, many: str | None = None) -> str:
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
+def none_of(number: int, one: str) -> str:
+    """That something holds for none of so many.
+
+    >>> none_of(1, "place"), none_of(3, "place")
+    ('No place', 'None of the 3 places')
+    """
+    return f"No {one}" if number == 1 else f"None of the {counted(number, one)}"
+
+
 def learn(names: dict[str, str]) -> None:
     """Tell what options are called in Python: those of the settings know their own names."""
     _NAMES.update(names)

@@ -339,7 +339,7 @@ def test_a_run_for_another_field_does_not_forget_them(folder: Path, made: Simula
         "field", folder / "picture.tif", "--overwrite", "--lat", south, "--lon", west, "-o", file
     )
     assert done.returncode == 1
-    assert "holds 1 edited tracks, a name, columns of your own" in done.stderr
+    assert "holds 1 edited track, a name, columns of your own" in done.stderr
     assert "--fresh" in done.stderr
     assert file.read_bytes() == written
 

@@ -189,7 +189,7 @@ def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> No
     said = " ".join(said.split())
     assert "--buffer changes nothing without IMAGERY" in said
     assert "--strategy changes nothing without IMAGERY" in said
-    assert "none of its 2 obstacles stands at a field that was planned" in said
+    assert "none of the 2 obstacles in it stands at a field that was planned" in said
     assert "2 points have no radius_m; they are circles of 2 m" in said
     trees.assign(radius_m="6.5 m").to_file(tmp_path / "text.gpkg")
     said = batch(places, "--obstacles", tmp_path / "text.gpkg", "--out", tmp_path / "no", code=1)

@@ -245,7 +245,7 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
 
     _parcels(folder, moved)
     said = " ".join(_batch(folder, "--fresh", code=1).split())
-    assert "1 reviewed fields have no plan: b." in said
+    assert "1 reviewed field has no plan: b." in said
     status = gf.read_farm(folder / "farm").status.set_index("field_id")
     assert status["status"].to_dict() == {"a": "done", "b": "failed", "c": "done", "d": "done"}
     assert "reviewed as 'b' is of a field elsewhere" in status["error"]["b"]
@@ -257,7 +257,7 @@ def test_a_reviewed_plan_lands_on_no_other_field(folder: Path) -> None:
     assert f"d: {words}" in said
     _parcels(folder, lambda table: table.assign(id=["a", "b", "C", "d"]))
     said = " ".join(_batch(folder, "--fresh", code=1).split())
-    assert "1 reviewed plans are of no id in parcels.gpkg, and wait for one: reviewed/c" in said
+    assert "1 reviewed plan is of no id in parcels.gpkg, and waits for one: reviewed/c" in said
 
 
 def test_any_id_can_be_reviewed(folder: Path) -> None:

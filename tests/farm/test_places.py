@@ -108,7 +108,7 @@ def test_parcels_keep_their_columns_and_their_zone(tmp_path: Path) -> None:
     places = read_places(parcels(tmp_path))
     assert places.parcels
     assert [place.field_id for place in places] == ["1", "2.1", "2.2"]
-    assert "1 parcels have several parts" in places.notes[1]
+    assert "1 parcel has several parts" in places.notes[1]
     plans = {plan.field.field_id: plan for plan in gf.plan_fields(places, spacing_m=4)}
     assert set(plans) == {"1", "2.1", "2.2"}
     one = plans["1"]

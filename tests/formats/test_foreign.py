@@ -76,7 +76,7 @@ def test_swapped_latitudes_are_noticed(tmp_path):
 def test_inner_polygons_are_obstacles_and_points_get_a_radius(tmp_path):
     pond = shapely.box(500_050, 5_500_020, 500_070, 5_500_040)
     path = write(tmp_path / "farm.gpkg", [BOX, pond, shapely.Point(500_100, 5_500_050)])
-    with pytest.warns(FormatWarning, match="1 obstacle points have no radius"):
+    with pytest.warns(FormatWarning, match="1 obstacle point has no radius; it is a circle"):
         obstacles = read_dataset(path).table("obstacles")
     assert list(obstacles["status"]) == ["added", "added"]
     by_kind = obstacles.set_index("kind")
@@ -130,7 +130,7 @@ def test_self_crossing_outlines_are_told(tmp_path):
     bow = shapely.Polygon([(500_000, 5_500_000), (500_100, 5_500_050), (500_100, 5_500_000),
                            (500_040, 5_500_060), (500_000, 5_500_060)])  # fmt: skip
     path = write(tmp_path / "farm.gpkg", [bow])
-    with pytest.warns(FormatWarning, match="cross themselves"), pytest.raises(FormatError):
+    with pytest.warns(FormatWarning, match="1 polygon crosses itself"), pytest.raises(FormatError):
         read_dataset(path)
 
 

@@ -463,7 +463,7 @@ def test_obstacles_that_are_not_avoided_are_told(tmp_path: Path, several: int) -
     outlines(several).to_file(tmp_path / "parcels.gpkg")
     here = shapely.Point(500050, 5600030)
     for name, places, crs, told in (
-        ("elsewhere", [here], 32632, "none of its 1 obstacles stands at a field"),
+        ("elsewhere", [here], 32632, "no obstacle in it stands at a field"),
         ("empty", [], CRS, "holds no shape: NOTHING of it is avoided"),
         ("half", [here, None], CRS, "1 row has no shape and is not avoided: row 2"),
         ("right", [here], CRS, ""),

@@ -17,6 +17,7 @@ from geofield.cli.options import acknowledge_option, stage_options, tell_idle
 from geofield.cli.place_options import place_options, places_of
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -159,7 +160,8 @@ def batch(
     unused = without_place(store, found.ids.to_pylist()) if count.done > count.before else []
     if unused:
         say_note(
-            f"{len(unused)} reviewed plans are of no id in {places.name}, and wait for one: "
+            f"{counted(len(unused), 'reviewed plan is', 'reviewed plans are')} of no id in "
+            f"{places.name}, and {'waits' if len(unused) == 1 else 'wait'} for one: "
             f"{', '.join(unused[:5])}."
         )
     reviewed = reviewed_rows(store)
@@ -182,7 +184,8 @@ def batch(
     without = [row["field_id"] for row in reviewed if row["status"] in ("failed", "lost")]
     if without:
         raise GeofieldError(
-            f"{len(without)} reviewed fields have no plan: {', '.join(without[:_TOLD])}.",
+            f"{counted(len(without), 'reviewed field has', 'reviewed fields have')} no plan: "
+            f"{', '.join(without[:_TOLD])}.",
             hint="The reasons are in failed.csv; what you said of them waits in reviewed/.",
         )
 

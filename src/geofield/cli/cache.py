@@ -12,6 +12,7 @@ from geofield.cli.console import echo_json, say
 from geofield.cli.files import FOLDER
 from geofield.cli.options import settings_option
 from geofield.settings import Settings
+from geofield.wording import counted
 
 _folder = click.option("--cache-dir", type=FOLDER, help="Folder of the tile caches.")
 
@@ -92,7 +93,9 @@ def clear(source: str | None, cache_dir: Path | None, yes: bool, settings: Setti
     names = [each.source for each in cache_infos(folder)]
     if source is None and names and not yes:
         click.confirm(
-            f"Delete the tiles of {len(names)} sources in {folder}?", abort=True, err=True
+            f"Delete the tiles of {counted(len(names), 'source')} in {folder}?",
+            abort=True,
+            err=True,
         )
     gone = clear_cache(folder, source)
     if source is not None and not gone:

@@ -21,6 +21,7 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated, say_removed
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.model import Field, Scene
@@ -272,7 +273,7 @@ def _study(
         for row in rows:
             mark = "  <- the point" if row["at_point"] else ""
             click.echo(f"{row['region']:6d} {row['pixels']:9d} {row['area_ha']:9.3f}{mark}")
-        say(f"{len(study.counts)} regions, {len(rows)} of them of at least 100 m2")
+        say(f"{counted(len(study.counts), 'region')}, {len(rows)} of them of at least 100 m2")
     if folder is not None:
         from geofield.study.pictures import draw_study
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.cli.console import say, say_note
-from geofield.wording import counted
+from geofield.wording import counted, none_of
 
 if TYPE_CHECKING:
     from geofield.farm.places import Places
@@ -73,6 +73,7 @@ def tell_unreached(job: Job, outlines_lonlat: Iterable[Shapes]) -> None:
         say_note(f"{job.obstacles.name} holds no shape: NOTHING of it is avoided.")
     elif not any_reached(standing, outlines_lonlat):
         say_note(
-            f"{job.obstacles.name}: none of its {len(standing)} obstacles stands at a field that "
-            f"was planned, NOTHING of it is avoided. Is its CRS {standing.crs.name}, as it says?"
+            f"{job.obstacles.name}: {none_of(len(standing), 'obstacle').lower()} in it stands at a "
+            "field that was planned, NOTHING of it is avoided. Is its CRS "
+            f"{standing.crs.name}, as it says?"
         )

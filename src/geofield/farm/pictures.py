@@ -15,6 +15,7 @@ from geofield.farm.store import Store
 from geofield.grid import Grid
 from geofield.settings import Settings
 from geofield.windows import grid_of
+from geofield.wording import none_of
 
 
 def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
@@ -39,7 +40,7 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
     if swapped.any() and _inside(grid, lon[swapped], lat[swapped]).any():
         hint = "With latitude and longitude swapped they are inside: exchange the columns."
     raise ImageryError(
-        f"None of the {len(places)} places of {Path(places.path).name} lies in {path.name}.",
+        f"{none_of(len(places), 'place')} of {Path(places.path).name} lies in {path.name}.",
         hint=hint,
     )
 

@@ -24,7 +24,7 @@ from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import nearest
+from geofield.wording import counted, nearest
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -227,8 +227,9 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
             f"{raw.name} holds no points and no polygons.", hint="Give a point or a parcel a row."
         )
     if parts.any():
+        of_parts = len(np.unique(rows[parts > 0]))
         notes.append(
-            f"{len(np.unique(rows[parts > 0]))} parcels have several parts: each is a field."
+            f"{counted(of_parts, 'parcel has', 'parcels have')} several parts: each is a field."
         )
     every = pa.concat_arrays(outlines)
     _refuse_degrees(raw, source, np.concatenate(xs), np.concatenate(ys))

@@ -20,6 +20,7 @@ from geofield.farm.folder import RECORD, STATUS, committed, file_of, read_part
 from geofield.farm.layers import GEOMETRY, LAYERS, PLAN
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import extent, extent_box
+from geofield.wording import counted
 
 COLLECTION = "collection.json"
 ITEMS = "stac"
@@ -132,8 +133,9 @@ def _collection(by_file: Mapping[str, dict[str, Any]], name: str) -> dict[str, A
         "stac_version": _VERSION,
         "id": name,
         "title": name,
-        "description": f"{count} fields with outlines, obstacles and tracks, planned by geofield "
-        f"{__version__}. " + (f"Imagery: {'; '.join(attributions)}." if attributions else ""),
+        "description": f"{counted(count, 'field')} with outlines, obstacles and tracks, "
+        f"planned by geofield {__version__}. "
+        + (f"Imagery: {'; '.join(attributions)}." if attributions else ""),
         # What is derived follows the terms of the pictures it is derived from.
         "license": _licence(licences),
         "geofield:imagery_licences": licences,

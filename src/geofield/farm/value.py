@@ -25,6 +25,7 @@ from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.model.card import card, field_drawn, words
 from geofield.plan import Plan
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -248,12 +249,14 @@ class Farm:
         return Path(folder)
 
     def __repr__(self) -> str:
-        return words(f"Farm of {len(self)} fields", self._figures())
+        return words(f"Farm of {counted(len(self), 'field')}", self._figures())
 
     def _repr_html_(self) -> str:
         shapes = self.fields.geometry.iloc[:_SHOWN]
         return card(
-            f"Farm of {len(self)} fields", self._figures(), [field_drawn(s) for s in shapes]
+            f"Farm of {counted(len(self), 'field')}",
+            self._figures(),
+            [field_drawn(s) for s in shapes],
         )
 
     def _figures(self) -> dict[str, str]:

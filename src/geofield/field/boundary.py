@@ -13,6 +13,7 @@ from geofield.crossings import in_words, mended
 from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transformer
 from geofield.errors import CRSError, FieldError
 from geofield.model import Field, FieldQuality
+from geofield.wording import counted, none_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -58,7 +59,7 @@ def field_from_boundary(
     points = int((rows.geometry.geom_type == "Point").sum())
     rows = _outlines(rows)
     if rows.empty:
-        found = f", but {points} points" if points else ""
+        found = f", but {counted(points, 'point')}" if points else ""
         join = "Join the points in their order (QGIS: Points to path), then close the"
         raise FieldError(
             f"The boundary file holds no polygon and no closed line{found}.",
@@ -132,7 +133,7 @@ def _around(rows: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> gpd.Geo
     there = transformer(LONLAT, own).transform(lat, lon) if abs(lon) <= 90 else (np.inf, np.inf)
     if rows.geometry.intersects(shapely.Point(there)).any():
         raise FieldError(
-            f"None of the {len(rows)} polygons in the boundary file {what}, but one does with "
+            f"{none_of(len(rows), 'polygon')} in the boundary file {what}, but one does with "
             "latitude and longitude swapped.",
             hint=f"{_EXCHANGE[:-1]}, or in --lat and --lon where the point is wrong.",
         )
@@ -151,7 +152,7 @@ def _only(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
 def _none_of(rows: gpd.GeoDataFrame, what: str) -> FieldError:
     return FieldError(
-        f"None of the {len(rows)} polygons in the boundary file {what}.",
+        f"{none_of(len(rows), 'polygon')} in the boundary file {what}.",
         hint="Check the point and the file's CRS, or name a parcel with --boundary-name.",
     )
 

@@ -283,8 +283,9 @@ def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFr
     fits = frame.geom_type.str.removeprefix("Multi") == wanted
     if not fits.all():
         warnings.warn(
-            f"{path.name}: {int((~fits).sum())} geometries of {of.name!r} are no {wanted} and are "
-            "left out.",
+            f"{path.name}: "
+            f"{counted(int((~fits).sum()), 'geometry', 'geometries')} of {of.name!r} that "
+            f"{'is' if (~fits).sum() == 1 else 'are'} no {wanted}: left out.",
             FormatWarning,
             stacklevel=4,
         )

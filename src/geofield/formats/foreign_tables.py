@@ -18,6 +18,7 @@ from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
 from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -117,10 +118,11 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     is_point = shapely.get_type_id(geometry) == shapely.GeometryType.POINT.value
     radius[~(np.isfinite(radius) & (radius > 0))] = np.nan
     unsized = is_point & np.isnan(radius)
-    if unsized.any():
+    if few := int(unsized.sum()):
         warnings.warn(
-            f"{path.name}: {int(unsized.sum())} obstacle points have no radius; they are circles "
-            f"of {POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
+            f"{path.name}: {counted(few, 'obstacle point has', 'obstacle points have')} no radius; "
+            f"{'it is a circle' if few == 1 else 'they are circles'} of "
+            f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
             FormatWarning,
             stacklevel=2,
         )
@@ -128,8 +130,9 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     wrong = (margin < 0) | np.isinf(margin)
     if wrong.any():
         warnings.warn(
-            f"{path.name}: {int(wrong.sum())} safety margins are negative or infinite; they count "
-            "as 0 m. Correct them.",
+            f"{path.name}: "
+            f"{counted(int(wrong.sum()), 'safety margin is', 'safety margins are')} negative or "
+            f"infinite; {'it counts' if wrong.sum() == 1 else 'they count'} as 0 m. Correct them.",
             FormatWarning,
             stacklevel=2,
         )
@@ -143,12 +146,12 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     lon, lat = transformer(crs, LONLAT).transform(x, y)
     numbers = numbers_like(frame, NUMBER_COLUMNS)
     numbers[pd.Series(numbers).duplicated()] = np.nan
-    counted = numbered(possible_numbers(frame.assign(obstacle_no=numbers)))
+    known = numbered(possible_numbers(frame.assign(obstacle_no=numbers)))
     data: dict[str, Any] = {
         name: numbers_like(frame, (name,)) for name in ("confidence", "x_px", "y_px", "radius_px")
     }
     data |= {
-        "obstacle_no": list(counted["obstacle_no"]),
+        "obstacle_no": list(known["obstacle_no"]),
         "kind": _one_of(frame, path, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
         "status": _one_of(frame, path, "status", schema.STATUSES, np.full(count, "added")),
         "radius_m": radius,

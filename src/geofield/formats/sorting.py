@@ -24,6 +24,7 @@ from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -231,7 +232,12 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
     if not bad.any():
         return frame
     shapes = [mended(shape) for shape in frame.geometry[bad]]
-    words = f"{path.name}: {int(bad.sum())} polygons cross themselves and were repaired"
+    words = f"{path.name}: "
+    words += counted(
+        int(bad.sum()),
+        "polygon crosses itself and was repaired",
+        "polygons cross themselves and were repaired",
+    )
     if not slivers:
         found = [largest_part(shape) for shape in shapes]
         shapes, left_m2 = [shape for shape, _ in found], [left for _, left in found]

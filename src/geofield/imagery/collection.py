@@ -241,10 +241,14 @@ def _reference(
 def _outside(readers: list[SceneReader], lon: float, lat: float, name: str) -> str:
     corners = [corner for each in readers for corner in each.grid.corners_lonlat()]
     lons, lats = [c[0] for c in corners], [c[1] for c in corners]
+    one = len(readers) == 1
+    all_of, covers = (
+        ("the picture", "covers a part") if one else (f"all {len(readers)} pictures", "cover parts")
+    )
     message = (
-        f"The point lat {lat}, lon {lon} lies outside all {len(readers)} pictures of "
-        f"{name or 'the collection'}, which cover parts of lat {min(lats):.6f} to {max(lats):.6f}, "
-        f"lon {min(lons):.6f} to {max(lons):.6f}."
+        f"The point lat {lat}, lon {lon} lies outside {all_of} of {name or 'the collection'}, "
+        f"which {covers} of lat {min(lats):.6f} to {max(lats):.6f}, lon {min(lons):.6f} to "
+        f"{max(lons):.6f}."
     )
     if abs(lon) <= 90 and any(
         each.grid.contains_px(*each.grid.from_lonlat(lat, lon)) for each in readers

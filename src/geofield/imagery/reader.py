@@ -34,6 +34,7 @@ from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import Limits, scaled_bands
 from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource, Scene, outside
+from geofield.wording import counted
 
 #: Read at a coarser resolution rather than hold more pixels than this on a side.
 MAX_SIDE_PX = 4096
@@ -111,7 +112,7 @@ class SceneReader:
             if dataset.count == 0:
                 inner, told, hint = dataset.subdatasets, "", "Give a raster file."
                 if inner:
-                    told = f", but {len(inner)} others"
+                    told = f", but {counted(len(inner), 'other')}"
                     hint = f"Take one out of it: gdal_translate {inner[0]!r} picture.tif"
                 raise ImageryError(
                     f"The file {display_name(path)} holds no picture itself{told}.", hint=hint

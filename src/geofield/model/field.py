@@ -26,6 +26,7 @@ from geofield.errors import CRSError, FieldError, FormatError
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, words
 from geofield.model.place import place_id
+from geofield.wording import counted
 
 #: The next step where something else stands for a field.
 MAKE_ONE = "Of a polygon in a metric CRS make one: gf.Field(polygon, crs)."
@@ -240,7 +241,7 @@ class Field:
         if not 1 <= number <= len(self.alternatives):
             raise FieldError(
                 f"There is no outline {number} to choose: this field has "
-                f"{len(self.alternatives)} alternatives.",
+                f"{counted(len(self.alternatives), 'alternative')}.",
                 hint="Show them with `geofield field --alternatives`.",
             )
         polygon = self.alternatives[number - 1].polygon

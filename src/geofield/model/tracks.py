@@ -23,6 +23,7 @@ from geofield.model.rows import Rows, rows_of, tables_when_asked
 from geofield.model.track_edits import TrackEdits, changed_twice, edits_in
 from geofield.model.track_statistics import ObstacleLoss, TrackStatistics, worked
 from geofield.model.tracks_written import TracksWritten, track_numbers
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -130,7 +131,7 @@ class Tracks:
         drawn = [tracks_drawn(self.segments.geometry)]
         if self.outline is not None:
             drawn.insert(0, field_drawn(self.outline))
-        return card(f"{len(self.lines)} tracks", self._facts(), drawn)
+        return card(counted(len(self.lines), "track"), self._facts(), drawn)
 
     def _facts(self) -> dict[str, str]:
         facts = {

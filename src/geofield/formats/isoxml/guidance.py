@@ -23,6 +23,7 @@ from geofield.formats.isoxml.codes import (
     LineType,
     PointType,
 )
+from geofield.wording import counted
 
 #: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
 _ARC_STEP_DEG = 1.0
@@ -55,7 +56,9 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
             rows.append({"name": line.get("B") or "", "geometry": shape})
     if rows and repeated:
         names = ", ".join(row["name"] for row in repeated[:3])
-        notes.append(f"{len(repeated)} lines to be repeated left out, others being there: {names}")
+        notes.append(
+            f"{counted(len(repeated), 'line')} to be repeated left out, others being there: {names}"
+        )
     return rows or repeated, notes
 
 

@@ -25,6 +25,7 @@ from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
 from geofield.tracks.route.turns import Curve, Turn, plan_turns, straight_ways
 from geofield.tracks.shapes import IntArray
+from geofield.wording import counted
 
 _SPARE_SHARE = 0.45
 """Of a segment, at most this much may be left out at either end to pass an obstacle."""
@@ -125,8 +126,9 @@ def plan_route(
     cut_off = sum(turn.kind == "none" for turn in turns)
     if cut_off:
         note = (
-            f"Obstacles or the border cut the field into parts: {cut_off} ways between segments do "
-            "not exist, and the route leaves them out."
+            f"Obstacles or the border cut the field into parts: {counted(cut_off, 'way')} between "
+            f"segments {'does' if cut_off == 1 else 'do'} not exist, and the route leaves "
+            f"{'it' if cut_off == 1 else 'them'} out."
         )
         warnings.warn(note, TrackWarning, stacklevel=2)
         notes = (*notes, note)
