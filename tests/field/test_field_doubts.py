@@ -5,14 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from affine import Affine
 
 from geofield.crs import parse_crs
 from geofield.errors import FieldWarning, GeofieldError
 from geofield.field import extract_field
 from geofield.field.evidence import block_mean
+from geofield.field.plausible import look
+from geofield.field.quality import judge
 from geofield.grid import Grid
 from geofield.model import Scene
+from geofield.model.segmentation import Segmentation
 from geofield.simulate import SimulationSettings, simulate_field
 
 ROLES = ("red", "green", "blue", "nir")
@@ -131,3 +135,21 @@ def test_a_border_from_coarse_pixels_is_told_as_such():
         said.append("; ".join(quality.reasons))
     assert "coarse" not in said[0]
     assert "coarse (4.8 m per pixel)" in said[1]
+
+
+@pytest.mark.parametrize("certainty", [0.705, 0.715])
+def test_what_is_not_trusted_says_why(certainty):
+    """Between where doubt is told and where trust begins the warning gave no reason."""
+    truth = simulate_field(2, SimulationSettings(width_px=320, height_px=320))
+    scene = truth.scene
+    outline = shapely.transform(truth.field.polygon, scene.grid.from_metric_array)
+    mask = truth.field.mask(scene.grid, holes=False)
+    found = Segmentation(mask, (), (("certainty", certainty),))
+    seed = scene.pixel_of(lat=truth.lat, lon=truth.lon)
+    whole = shapely.box(0, 0, 320, 320)
+    quality = judge(scene, look(scene), mask, outline, found, seed, whole)
+    assert not quality.trusted
+    assert len(quality.reasons) == 1
+    assert quality.reasons[0].startswith("where it ends is not certain (certainty 7")
+    sure = replace(found, figures=(("certainty", 0.9),))
+    assert judge(scene, look(scene), mask, outline, sure, seed, whole).reasons == ()

@@ -17,7 +17,14 @@ from pyproj import Geod, Transformer
 from shapely import Polygon, affinity
 
 from geofield import schema
-from geofield.errors import CRSError, CRSMismatchError, ObstacleError, TrackError, TrackWarning
+from geofield.errors import (
+    CRSError,
+    CRSMismatchError,
+    FieldError,
+    ObstacleError,
+    TrackError,
+    TrackWarning,
+)
 from geofield.grid import Grid
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
@@ -719,3 +726,17 @@ def test_a_ring_may_begin_anywhere_and_run_either_way(direction: str) -> None:
         )
         assert all(len(each) == len(one) for each in others)
         assert all(each.geom_equals_exact(one, 1e-4).all() for each in others)
+
+
+def test_fields_as_tables_of_other_programs_have_them():
+    """Many programs write all outlines as shapes of several parts, one in each."""
+    shape = shapely.box(X, Y, X + 200, Y + 100)
+    parts: Any = shapely.MultiPolygon([shape])
+    one = Field(parts, CRS)
+    assert one == Field(shape, CRS)
+    parts = shapely.MultiPolygon([shape, shapely.box(X, Y + 200, X + 9, Y + 209)])
+    with pytest.raises(FieldError, match="Of 2 parts each is a field"):
+        Field(parts, CRS)
+    table: Any = gpd.GeoDataFrame(geometry=[shape], crs=CRS)
+    with pytest.raises(TrackError, match="a shapely polygon, not GeoDataFrame"):
+        plan_tracks(table, spacing_m=10)

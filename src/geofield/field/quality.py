@@ -78,6 +78,8 @@ def judge(
         # Alone it is no warning where a person has chosen the region: see `TRUSTED`.
         score -= 1.0 - TRUSTED
     score = max(0.0, score)
+    if score < TRUSTED and not reasons:
+        reasons.append(f"where it ends is not certain (certainty {score:.0%})")
     figures = (
         ("edge_share", touching),
         ("covered_share", covered),

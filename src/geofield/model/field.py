@@ -164,8 +164,15 @@ class Field:
                 f"A field is measured in metres; {authority_name(crs)} is not a metric CRS.",
                 hint="Reproject to the UTM zone: GeoSeries.to_crs(series.estimate_utm_crs()).",
             )
+        given: Any = self.polygon
+        parts = list(given.geoms) if isinstance(given, MultiPolygon) else []
+        if len(parts) == 1:  # as tables of many programs have it
+            object.__setattr__(self, "polygon", parts[0])
         if not isinstance(self.polygon, Polygon) or self.polygon.is_empty:
-            raise FieldError("A field is one polygon that is not empty.")
+            raise FieldError(
+                "A field is one polygon that is not empty.",
+                hint=f"Of {len(parts)} parts each is a field." if parts else None,
+            )
         if not self.polygon.is_valid:
             raise FieldError(
                 f"The field's outline is not valid: {shapely.is_valid_reason(self.polygon)}.",

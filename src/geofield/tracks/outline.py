@@ -35,6 +35,15 @@ def metric(crs: Any) -> CRS:
     return parsed
 
 
+def refuse_no_shape(polygon: Any) -> None:
+    """Refuse what is no geometry, before its CRS is asked for: a table has one, but of its own."""
+    if not isinstance(polygon, BaseGeometry):
+        raise TrackError(
+            f"The field must be a shapely polygon, not {type(polygon).__name__}.",
+            hint="Give a shapely polygon with its CRS, or a geofield Field.",
+        )
+
+
 def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
     """Check a field's outline, and repair what can be repaired without a guess.
 
@@ -50,11 +59,7 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
         When the coordinates are degrees.
     """
     notes: list[str] = []
-    if not isinstance(polygon, BaseGeometry):
-        raise TrackError(
-            f"The field must be a shapely polygon, not {type(polygon).__name__}.",
-            hint="Give a shapely polygon with its CRS, or a geofield Field.",
-        )
+    refuse_no_shape(polygon)
     if polygon.is_empty:
         raise TrackError("The field's outline is empty.")
     if polygon.has_z:

@@ -35,7 +35,7 @@ from geofield.tracks.headland import (
 )
 from geofield.tracks.layout import LastStrip, Strips
 from geofield.tracks.losses import obstacle_losses
-from geofield.tracks.outline import clean_outline, metric, place_near
+from geofield.tracks.outline import clean_outline, metric, place_near, refuse_no_shape
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
 from geofield.tracks.tables import (
     BY_HAND,
@@ -145,6 +145,7 @@ def plan_tracks(
                 hint="Leave crs out: a Field has its own.",
             )
         crs, polygon = polygon.crs, polygon.polygon
+    refuse_no_shape(polygon)
     metric_crs = metric(crs)
     wide_m = spacing_m if width_m is None else width_m
     _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
