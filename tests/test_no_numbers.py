@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 import geofield as gf
 from geofield.errors import GeofieldError
+from geofield.farm.limits import Limits
 from geofield.simulate import SimulatedField, SimulationSettings
 
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
@@ -65,10 +66,21 @@ CALLS: dict[str, Callable[[SimulatedField, Any], object]] = {
     "column": lambda made, v: made.scene.crop(v, 0, 9, 9),
     "count": lambda made, v: list(gf.simulate_fields(v, seed=1)),
     "bootstrap": lambda made, v: gf.evaluate(made.obstacles, made.obstacles, bootstrap=v),
+    "time_s": lambda made, v: Limits(time_s=v),
+    "memory_mb": lambda made, v: Limits(memory_mb=v),
     "radius_m": lambda made, v: SimulationSettings(radius_m=(v, 9)),
 }  # fmt: skip
 #: Arguments for which None is a choice.
-OPTIONAL = {"size_m", "size_px", "resolution_m", "min_confidence", "threshold", "turning_radius_m"}
+OPTIONAL = {
+    "time_s",
+    "memory_mb",
+    "size_m",
+    "size_px",
+    "resolution_m",
+    "min_confidence",
+    "threshold",
+    "turning_radius_m",
+}
 #: Arguments that are counted.
 WHOLE = {
     "size_px", "zoom", "width_px", "height_px", "seed", "regions", "skip", "column", "count",

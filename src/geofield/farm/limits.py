@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from geofield.errors import SettingsError, refuse_no_number
 from geofield.farm.marks import Marks
 
 _EVERY_S = 0.2
@@ -29,6 +30,11 @@ class Limits:
     time_s: float | None = None
     #: Of the worker's whole process.
     memory_mb: float | None = None
+
+    def __post_init__(self) -> None:
+        # An alarm for no time, or at the end of time, is none.
+        refuse_no_number(SettingsError, "seconds", none_too=True, time_s=self.time_s)
+        refuse_no_number(SettingsError, "megabytes", none_too=True, memory_mb=self.memory_mb)
 
 
 class Watch:
