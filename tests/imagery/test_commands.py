@@ -169,21 +169,23 @@ def test_terms_are_refused_until_acknowledged(
 def test_a_named_picture_carries_its_terms(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from geofield.cli.imagery_tools import as_picture
-    from geofield.settings import load_settings
+    from geofield.cli.imagery_tools import imagery_of
+    from geofield.settings import ImagerySettings, load_settings
 
     path = write(tmp_path / "drone.tif", ground(), photometric="RGB")
     lon, lat = read_scene(path).grid.centre_lonlat
     text = f'[fetch.sources.drone]\nkind = "picture"\nurl = "{path}"\nattribution = "Me"\n'
     Path("geofield.toml").write_text(text)
-    with pytest.raises(TermsError), as_picture("drone", load_settings(), lat=lat, lon=lon):
-        pass
+    with pytest.raises(TermsError):
+        imagery_of("drone", load_settings(), (lon, lat))
     Path("geofield.toml").write_text(text + "may_derive = true\n")
-    with as_picture("drone", load_settings(), lat=lat, lon=lon) as picture:
+    found = imagery_of("drone", load_settings(), (lon, lat))
+    with found.at(lat, lon, ImagerySettings()) as picture:
         scene = read_scene(picture.path)
     assert scene.source.attribution == "Me"
     assert np.array_equal(scene.bands, ground())
-    with as_picture(path, load_settings(), lat=lat, lon=lon) as picture:
+    found = imagery_of(path, load_settings(), (lon, lat))
+    with found.at(lat, lon, ImagerySettings()) as picture:
         assert picture.path == path
 
 

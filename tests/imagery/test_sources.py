@@ -37,11 +37,11 @@ from geofield.errors import (
 from geofield.grid import Grid
 from geofield.imagery import (
     FetchOptions,
+    Imagery,
     Where,
     acquire,
     find_source,
     open_reader,
-    picture_at,
     read_scene,
 )
 from geofield.imagery.cache import cache_infos
@@ -52,7 +52,7 @@ from geofield.imagery.sources.registry import kind_of
 from geofield.imagery.sources.xyz import XYZSource, quadkey
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile
-from geofield.settings import Settings
+from geofield.settings import ImagerySettings, Settings
 from geofield.windows import open_scene
 from geofield_command import run_geofield
 
@@ -196,7 +196,7 @@ def test_google_needs_acknowledgement_and_is_never_cached(tmp_path: Path) -> Non
         options = replace(options, acknowledged=True)
         done = acquire(source, where, tmp_path / "a.tif", options=options)
         # Where no size is asked for, what the service gives at most; and no more of it.
-        with picture_at(source, lat=LAT, lon=LON, options=options) as picture:
+        with Imagery("", source, options).at(LAT, LON, ImagerySettings()) as picture:
             assert read_scene(picture.path).grid.shape == (640, 640)
             assert picture.wider(5000.0) is None
             assert not picture.offers_more

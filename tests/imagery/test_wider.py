@@ -83,7 +83,7 @@ def test_points_of_a_farm_are_looked_at_as_far_as_their_fields_go(
 def test_no_more_is_fetched_unasked_than_is_read_at_once(
     tiles: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("geofield.imagery.at_place.MAX_SIDE_PX", 300)
+    monkeypatch.setattr("geofield.imagery.reader.MAX_SIDE_PX", 300)
     command = ("field", tiles, *POINT, "--size-m", 100, "-o", tmp_path / "f.gpkg")
     with pytest.warns(FieldWarning, match="goes on outside"):
         done = told(*command)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from geofield.farm.places import Places
     from geofield.farm.run import Count
     from geofield.farm.store import Store
-    from geofield.farm.work import Imagery, Job
+    from geofield.farm.work import Job
+    from geofield.imagery import Imagery
     from geofield.settings import Settings, Stage
 
 #: Reviewed fields whose notes are told, each in a line.
@@ -263,26 +264,20 @@ def _imagery(
     """Where pictures come from, and what the record says of it; terms are checked here, once."""
     if what is None:
         return None, {}
-    from dataclasses import replace
-
     import numpy as np
 
-    from geofield.cli.imagery_tools import cache_dir_of, fetch_options, resolve
+    from geofield.cli.imagery_tools import source_of
     from geofield.farm.pictures import refuse_elsewhere
-    from geofield.farm.work import Imagery
-    from geofield.imagery import is_own_picture
+    from geofield.imagery import Imagery, is_own_picture
     from geofield.imagery.sources import PictureSource
-    from geofield.imagery.terms import check_terms
 
     if is_own_picture(what):
         refuse_elsewhere(Path(what), places, settings)
         return Imagery(str(Path(what).absolute())), {"imagery": Path(what).name}
-    options = fetch_options(settings, cache_dir_of(settings))
     first = int(np.flatnonzero(np.isfinite(places.lat))[0])
     point = (float(places.lon[first]), float(places.lat[first]))
-    source = resolve(what, settings, point=point, options=options)
+    source, options = source_of(what, settings, point, acknowledged=acknowledged)
     terms = source.terms
-    check_terms(source.name, terms, acknowledged=acknowledged)
     about = {
         "imagery": source.name,
         "attribution": terms.attribution,
@@ -290,8 +285,7 @@ def _imagery(
         "terms_url": terms.url,
         "identity": source.path if isinstance(source, PictureSource) else "",
     }
-    options = replace(options, acknowledged=acknowledged)
-    return Imagery(source=source, options=options), about
+    return Imagery("", source, options), about
 
 
 def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:

@@ -110,7 +110,7 @@ def field(
     IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline
     touches the window's edge, the window grows as far as the picture reaches.
     """
-    from geofield.cli.imagery_tools import as_picture, say_wider
+    from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import holds, known_outline
     from geofield.errors import OutputExistsError
     from geofield.pipeline import run_field
@@ -135,11 +135,10 @@ def field(
                 )
             previous = None if fresh else read_plan(output)
     seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
+    source = imagery_of(imagery, seen, (lon, lat), acknowledged=acknowledge_terms)
     with (
         progress_bar(quiet=as_json) as progress,
-        as_picture(
-            imagery, seen, lat=lat, lon=lon, acknowledged=acknowledge_terms, progress=progress
-        ) as picture,
+        source.at(lat, lon, seen.imagery, progress) as picture,
     ):
         if list_regions or regions or pictures is not None:
             scene = open_scene(picture.path, lat, lon, settings)

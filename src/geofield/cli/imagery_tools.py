@@ -9,16 +9,16 @@ from __future__ import annotations
 import os
 import sys
 import urllib.request
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, nullcontext
+from collections.abc import Mapping
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geofield.cli.console import Progress, say
+from geofield.cli.console import say
 
 if TYPE_CHECKING:
-    from geofield.imagery import Acquired, FetchOptions, PlacePicture, Where
+    from geofield.imagery import Acquired, FetchOptions, Imagery, PlacePicture, Where
     from geofield.imagery.sources import Source, SourceEntry
     from geofield.plan import Plan
     from geofield.settings import Settings
@@ -124,38 +124,27 @@ def resolve(
         )  # fmt: skip
 
 
-@contextmanager
-def as_picture(
-    what: str,
-    settings: Settings,
-    *,
-    lat: float,
-    lon: float,
-    acknowledged: bool = False,
-    progress: Progress | None = None,
-) -> Iterator[PlacePicture]:
-    """The user's own picture, or one fetched for the moment."""
-    from geofield.imagery import PlacePicture, is_own_picture
-
-    if is_own_picture(what):
-        yield PlacePicture(what)
-        return
-    from geofield.imagery import picture_at
+def source_of(
+    what: str, settings: Settings, point: tuple[float, float], *, acknowledged: bool
+) -> tuple[Source, FetchOptions]:
+    """The source that the user names, its terms checked, and how it is fetched from."""
     from geofield.imagery.terms import check_terms
 
     options = fetch_options(settings, cache_dir_of(settings))
-    source = resolve(what, settings, point=(lon, lat), options=options)
+    source = resolve(what, settings, point=point, options=options)
     check_terms(source.name, source.terms, acknowledged=acknowledged)
-    with picture_at(
-        source,
-        lat=lat,
-        lon=lon,
-        size_m=settings.imagery.size_m,
-        bands=settings.imagery.bands,
-        options=replace(options, acknowledged=acknowledged),
-        progress=progress,
-    ) as picture:
-        yield picture
+    return source, replace(options, acknowledged=acknowledged)
+
+
+def imagery_of(
+    what: str, settings: Settings, point: tuple[float, float], *, acknowledged: bool = False
+) -> Imagery:
+    """The user's own pictures, or a source of some."""
+    from geofield.imagery import Imagery, is_own_picture
+
+    if is_own_picture(what):
+        return Imagery(what)
+    return Imagery("", *source_of(what, settings, point, acknowledged=acknowledged))
 
 
 def say_wider(plan: Plan, picture: PlacePicture) -> None:

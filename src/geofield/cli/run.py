@@ -89,7 +89,7 @@ def run(
     Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON,
     Shapefiles, RDF, a map picture and report.json.
     """
-    from geofield.cli.imagery_tools import as_picture, say_wider
+    from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import known_outline, with_said_tracks
     from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
@@ -109,16 +109,11 @@ def run(
     previous = read_plan(earlier) if earlier.is_file() and not fresh else None
     tell_idle(with_said_tracks(settings, previous)[0], parcel=parcel is not None)
     timings: dict[str, float] = {}
+    seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
+    source = imagery_of(imagery, seen, (lon, lat), acknowledged=acknowledge_terms)
     with (
         progress_bar(quiet=as_json) as progress,
-        as_picture(
-            imagery,
-            showing(settings, lat, lon, known_outline(parcel, previous, lat, lon)),
-            lat=lat,
-            lon=lon,
-            acknowledged=acknowledge_terms,
-            progress=progress,
-        ) as picture,
+        source.at(lat, lon, seen.imagery, progress) as picture,
     ):
         plan = plan_field(
             picture.path, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,

@@ -12,7 +12,8 @@ from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryErr
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
 from geofield.farm.standing import own_obstacles
-from geofield.farm.work import Imagery, Job, in_words, listening, plan_place, told
+from geofield.farm.work import Job, in_words, listening, plan_place, told
+from geofield.imagery import Imagery
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 

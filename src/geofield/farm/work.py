@@ -29,8 +29,7 @@ from geofield.windows import WINDOW_M, open_scene, showing, wider
 if TYPE_CHECKING:
     import geopandas as gpd
 
-    from geofield.imagery import FetchOptions, PlacePicture
-    from geofield.imagery.sources import Source
+    from geofield.imagery import Imagery
 
 #: Share of the smaller outline that a place and its reviewed plan have in common at least.
 _SHARED = 0.1
@@ -38,34 +37,6 @@ _SHARED = 0.1
 _PARTED = 0.01
 #: Outlines that differ by less are the same, metres.
 _SAME_M = 0.001
-
-
-@dataclass(frozen=True)
-class Imagery:
-    """Where pictures come from; a value that any worker can use."""
-
-    #: The user's own picture, or set of pictures; empty for a source.
-    path: str = ""
-    source: Source | None = None
-    #: Of the source.
-    options: FetchOptions | None = None
-
-    @contextmanager
-    def at(self, lat: float, lon: float, settings: Settings) -> Iterator[PlacePicture]:
-        """The picture of a place."""
-        from geofield.imagery import PlacePicture
-
-        if self.source is None or self.options is None:
-            yield PlacePicture(self.path)
-            return
-        from geofield.imagery import picture_at
-
-        imagery = settings.imagery
-        with picture_at(
-            self.source, lat=lat, lon=lon, size_m=imagery.size_m, bands=imagery.bands,
-            options=self.options,
-        ) as picture:  # fmt: skip
-            yield picture
 
 
 @dataclass(frozen=True)
@@ -225,7 +196,7 @@ def _on_picture(
     outline = boundary if previous is None else previous.field
     asked = wider(settings, settings.imagery.size_m or WINDOW_M)
     seen = showing(asked, place.lat, place.lon, outline)
-    with imagery.at(place.lat, place.lon, seen) as picture:
+    with imagery.at(place.lat, place.lon, seen.imagery) as picture:
         window = open_scene(picture.path, place.lat, place.lon, seen, outline=outline)
         plan = run_field(
             picture.path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,

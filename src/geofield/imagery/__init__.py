@@ -12,11 +12,10 @@ from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
-    from geofield.imagery.at_place import picture_at
     from geofield.imagery.facts import picture_facts
     from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
-    from geofield.imagery.place_picture import PlacePicture, is_own_picture
+    from geofield.imagery.place_picture import Imagery, PlacePicture, is_own_picture
     from geofield.imagery.reader import SceneReader
     from geofield.imagery.scene import read_scene
     from geofield.imagery.sources import find_source
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Acquired",
     "FetchOptions",
+    "Imagery",
     "PlacePicture",
     "SceneReader",
     "Where",
@@ -32,7 +32,6 @@ __all__ = [
     "find_source",
     "is_own_picture",
     "open_reader",
-    "picture_at",
     "picture_facts",
     "read_scene",
     "write_scene",
@@ -42,11 +41,10 @@ __getattr__ = late_names(
     __name__,
     {
         "acquisition": "Acquired Where acquire",
-        "at_place": "picture_at",
         "facts": "picture_facts",
         "opening": "FetchOptions",
         "pictures": "open_reader",
-        "place_picture": "PlacePicture is_own_picture",
+        "place_picture": "Imagery PlacePicture is_own_picture",
         "reader": "SceneReader",
         "scene": "read_scene",
         "sources": "find_source",

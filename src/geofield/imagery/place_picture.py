@@ -6,8 +6,10 @@ Nothing that fetches is loaded for one's own.
 from __future__ import annotations
 
 import math
+import tempfile
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +18,12 @@ from geofield.errors import GeofieldError, ImageryWarning
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired
+    from geofield.imagery.opening import FetchOptions
+    from geofield.imagery.sources import Source
+    from geofield.settings import ImagerySettings
+
+#: Pixels on a side where no size was asked for.
+_SIDE_PX = 1024
 
 
 @dataclass
@@ -61,6 +69,69 @@ class PlacePicture:
                 stacklevel=2,
             )
             return None
+
+
+@dataclass(frozen=True)
+class Imagery:
+    """Where pictures come from; a value that any worker can use.
+
+    Attributes
+    ----------
+    path : str
+        The user's own picture, or set of pictures; empty for a source.
+    source : Source, optional
+        Its terms were checked.
+    options : FetchOptions, optional
+        Of the source.
+    """
+
+    path: str = ""
+    source: Source | None = None
+    options: FetchOptions | None = None
+
+    @contextmanager
+    def at(
+        self,
+        lat: float,
+        lon: float,
+        settings: ImagerySettings,
+        progress: Callable[[int, int, str], None] | None = None,
+    ) -> Iterator[PlacePicture]:
+        """The picture around a point, of the size and with the bands that settings say.
+
+        Yields
+        ------
+        PlacePicture
+            The user's own file or address, or files that are gone behind the block.
+        """
+        source, options = self.source, self.options
+        if source is None or options is None:
+            yield PlacePicture(self.path)
+            return
+        from geofield.imagery.acquisition import Where, acquire
+        from geofield.imagery.reader import MAX_SIDE_PX
+        from geofield.imagery.sources import PictureSource
+
+        if isinstance(source, PictureSource) and (
+            settings.bands or source.terms.attribution + source.terms.licence == ""
+        ):
+            yield PlacePicture(source.path)
+            return
+        # What the settings say of a picture's terms must travel with it: as a file that says so.
+        own = isinstance(source, PictureSource)
+        most_px = source.most_px if own else min(source.most_px, MAX_SIDE_PX)
+        first_px = None if own else int(min(_SIDE_PX, most_px))
+        with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
+
+            def fetch(size_m: float | None) -> Acquired:
+                path = Path(folder) / f"scene_{size_m or 0:.0f}.tif"
+                side_px = None if size_m else first_px
+                where = Where(lat=lat, lon=lon, size_m=size_m, size_px=side_px)
+                return acquire(source, where, path, options=options, progress=progress)
+
+            first = fetch(settings.size_m)
+            most_m = (most_px + 0.5) * first.grid.ground_resolution_m
+            yield PlacePicture(str(first.path), most_px < source.most_px, fetch, most_m)
 
 
 def is_own_picture(what: str) -> bool:
