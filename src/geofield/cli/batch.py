@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -314,8 +315,6 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
 
 def _has_dask() -> bool:
     """Whether the extra is there."""
-    from importlib.util import find_spec
-
     try:
         return find_spec("distributed") is not None
     except ValueError:

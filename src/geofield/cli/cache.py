@@ -11,6 +11,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import FOLDER
 from geofield.cli.options import settings_option
+from geofield.errors import ImageryError
 from geofield.settings import Settings
 from geofield.wording import counted
 
@@ -86,7 +87,6 @@ Example:
 def clear(source: str | None, cache_dir: Path | None, yes: bool, settings: Settings) -> None:
     """Delete the tiles of SOURCE, or of all sources."""
     from geofield.cli.imagery_tools import cache_dir_of
-    from geofield.errors import ImageryError
     from geofield.imagery.cache import cache_infos, clear_cache
 
     folder = cache_dir_of(settings, cache_dir)

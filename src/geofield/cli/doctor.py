@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json
+from geofield.errors import GeofieldError
 
 _LIBRARIES = (
     "geofield",
@@ -102,7 +103,6 @@ def _environment() -> dict[str, str]:
 
 
 def _problems() -> list[str]:
-    from geofield.errors import GeofieldError
     from geofield.grid import Grid
     from geofield.settings import load_settings
 

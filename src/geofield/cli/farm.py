@@ -8,6 +8,7 @@ import click
 
 from geofield.cli.console import say, say_note
 from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
+from geofield.errors import FormatError
 from geofield.wording import nearest
 
 
@@ -35,7 +36,6 @@ Example:
 @click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
 def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     """Write the plan of field ID of FARM as a GeoPackage, for QGIS and `geofield review`."""
-    from geofield.errors import FormatError
     from geofield.farm import read_farm
     from geofield.farm.taken_out import taken_out
     from geofield.plan_files import save_plan
@@ -93,7 +93,6 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
     It takes the place of the plan that is there, and no later run of `geofield batch` changes
     what a person said.
     """
-    from geofield.errors import FormatError
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
     from geofield.farm.overview import OVERVIEW

@@ -21,6 +21,8 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated, say_removed
+from geofield.errors import OutputExistsError
+from geofield.settings import as_before, with_values
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -112,11 +114,9 @@ def field(
     """
     from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import holds, known_outline
-    from geofield.errors import OutputExistsError
     from geofield.pipeline import run_field
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan
-    from geofield.settings import as_before, with_values
     from geofield.windows import open_scene, showing
 
     _refuse_at_odds(click.get_current_context().params)

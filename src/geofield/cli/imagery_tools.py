@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.cli.console import say
+from geofield.errors import ImageryError
 
 if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Imagery, PlacePicture, Where
@@ -219,7 +220,6 @@ def area_of(path: Path) -> Where:
     """The ground that a vector file covers."""
     import shapely
 
-    from geofield.errors import ImageryError
     from geofield.formats.foreign import read_vector
     from geofield.imagery import Where
 

@@ -9,6 +9,7 @@ import click
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import PATH, claim_file, output_option
 from geofield.cli.options import without_blanks
+from geofield.errors import FormatError
 
 
 @click.command(
@@ -48,7 +49,6 @@ def import_(
     names (boundary, trees), their columns, and what lies in what decide. What was taken as what
     is said on stderr.
     """
-    from geofield.errors import FormatError
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged
     from geofield.plan_files import staged_plan

@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import echo_json
 from geofield.cli.files import PATH
+from geofield.errors import CRSError, FormatError, GridError, ImageryError
 
 
 @click.command(
@@ -41,7 +42,6 @@ def info(file: Path, crs: str | None, as_json: bool) -> None:
 
 def _facts(file: Path, crs: str | None) -> dict[str, Any]:
     """What a file holds; one of no vector format that is known may be a picture of any kind."""
-    from geofield.errors import FormatError, ImageryError
     from geofield.formats import detect
     from geofield.imagery.pictures import holds_tiles
 
@@ -113,7 +113,6 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
 
 
 def _picture(file: Path) -> dict[str, Any]:
-    from geofield.errors import CRSError, GridError
     from geofield.grid import Grid
     from geofield.imagery.gdal import gdal_env, open_picture, reading
 

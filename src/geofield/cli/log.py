@@ -14,6 +14,7 @@ from pathlib import Path
 
 import click
 
+from geofield import __version__
 from geofield.cli.files import FILE
 
 #: Values in an address that are named like keys, and a name with its password before the server.
@@ -94,8 +95,6 @@ class _SinceStart(_Masked):
 
 
 def _add(handler: logging.Handler) -> None:
-    from geofield import __version__
-
     _LOGGER.setLevel(logging.DEBUG)
     _LOGGER.propagate = False
     _LOGGER.addHandler(handler)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tempfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import progress_bar, say_note
 from geofield.cli.standing import tell_unreached
+from geofield.errors import GeofieldError, TrackError
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -50,7 +52,6 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     TrackError
         When it holds no polygons.
     """
-    from geofield.errors import TrackError
     from geofield.farm.place_reader import read_places
 
     places = read_places(file, settings=settings, crs=crs, unnamed=file.stem)
@@ -142,7 +143,6 @@ def _figures(farm: Farm, target: Path, wanted: Wanted) -> Told:
 
 def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     """One after the other, each into a file of its own."""
-    from geofield.errors import GeofieldError, TrackError
     from geofield.farm.work import plan_place
     from geofield.formats.names import unlike
     from geofield.plan_files import save_plan
@@ -182,9 +182,6 @@ def file_name(name: str) -> str:
 
 def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
     """Figures of one field, plain JSON values."""
-    import math
-    from dataclasses import asdict
-
     if plan.tracks is None:
         return {}
     figures = {

@@ -12,6 +12,7 @@ from geofield.cli.files import OLD_FILE, claim_plan, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated, say_removed
+from geofield.errors import OutputExistsError
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ def obstacles(
     you say nothing else. The tracks are removed, for they no longer fit: run `geofield tracks`
     next.
     """
-    from geofield.errors import OutputExistsError
     from geofield.pipeline import run_obstacles
     from geofield.plan import read_plan
     from geofield.plan_files import save_plan

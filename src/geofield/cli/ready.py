@@ -8,6 +8,7 @@ import os
 
 import click
 
+from geofield.cli.main import cli
 from geofield.errors import GeofieldError
 
 #: What outline, obstacles and tracks need; loading it takes about as long as finding an outline.
@@ -50,8 +51,6 @@ def ready() -> None:
         words = None
     if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
         raise GeofieldError("The line is no JSON list of words.")
-    from geofield.cli.main import cli
-
     code = cli.main(args=words, prog_name="geofield", standalone_mode=False)
     if isinstance(code, int) and code:
         raise click.exceptions.Exit(code)

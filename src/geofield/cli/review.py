@@ -13,6 +13,7 @@ from geofield.cli.farm import say_waiting
 from geofield.cli.files import OLD_PATH
 from geofield.cli.refresh import say_outdated
 from geofield.cli.stops import stop_heard
+from geofield.errors import GeofieldError
 
 if TYPE_CHECKING:
     from geofield.review.shelf import Shelf
@@ -52,7 +53,6 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
 
     The page is served to this machine only, under an address that holds a key.
     """
-    from geofield.errors import GeofieldError
     from geofield.review.plans import is_farm, plans_in
     from geofield.review.server import ReviewServer
 
@@ -90,8 +90,6 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
 
 def end_session(shelf: Shelf, plan_file: Path) -> None:
     """Tell where edits are that were not saved; refuse to call it well where they are lost."""
-    from geofield.errors import GeofieldError
-
     for words in shelf.end():
         say(words)
     if plan_file.is_file():

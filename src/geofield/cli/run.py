@@ -20,6 +20,8 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
+from geofield.errors import OutputExistsError
+from geofield.staging import PREFIX
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -91,10 +93,8 @@ def run(
     """
     from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import known_outline, with_said_tracks
-    from geofield.errors import OutputExistsError
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
-    from geofield.staging import PREFIX
     from geofield.windows import showing
 
     parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)

@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from geofield.cli.console import echo_json
-from geofield.cli.options import SEPARATOR
+from geofield.cli.options import SEPARATOR, option_of
+from geofield.settings import SECTIONS, Machine, Settings
 
 
 @click.command(
@@ -32,17 +33,12 @@ def settings(context: click.Context, as_json: bool) -> None:
     for row in rows:
         default = "" if row["default"] in (None, [], {}) else f"  [default: {row['default']}]"
         click.echo(f"{row['section']}.{row['name']}: {row['description']}{default}")
-    from geofield.settings import Machine
-
     for name, field in Machine.model_fields.items():
         click.echo(f"machines.NAME.{name}: {field.description}")
 
 
 def all_settings() -> list[dict[str, Any]]:
     """Each setting of `geofield.settings`, plain JSON values."""
-    from geofield.cli.options import option_of
-    from geofield.settings import SECTIONS, Settings
-
     rows = []
     for section in SECTIONS:
         model = Settings.model_fields[section].annotation

@@ -10,7 +10,8 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import FOLDER, claim_folder
-from geofield.simulate import CLIMATES, SimulatedField
+from geofield.simulate import CLIMATES, SimulatedField, SimulationSettings, simulate_fields
+from geofield.staging import staged_folder
 
 
 @click.command(
@@ -95,9 +96,6 @@ def simulate(
 
     The truth has the layers field and obstacles, as `geofield evaluate` reads them.
     """
-    from geofield.simulate import SimulationSettings, simulate_fields
-    from geofield.staging import staged_folder
-
     settings = SimulationSettings(width_px=size_px, height_px=size_px, **asked)
     claim_folder(out)
     rows: list[dict[str, Any]] = []

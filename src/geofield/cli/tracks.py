@@ -27,6 +27,7 @@ from geofield.cli.options import (
 )
 from geofield.cli.refresh import say_outdated
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
+from geofield.errors import TrackError
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
@@ -137,8 +138,6 @@ def tracks(
         say(line_of(row))
         say_outdated(Path(row["file"]))
     if failed:
-        from geofield.errors import TrackError
-
         for one, reason in failed.items():
             say(f"{one}: {reason}")
         raise TrackError(

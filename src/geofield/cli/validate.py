@@ -9,6 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import PATH
+from geofield.errors import FormatError
 from geofield.wording import counted
 
 
@@ -28,7 +29,6 @@ def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> 
 
     Exit code 1 when there is an error; warnings alone leave it at 0.
     """
-    from geofield.errors import FormatError
     from geofield.formats import Finding, validate_file
 
     reports = {}

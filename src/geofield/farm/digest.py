@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from geofield import __version__
 from geofield.farm.folder import Record
 from geofield.farm.places import Places
@@ -65,8 +67,6 @@ def difference(there: Record, wanted: Record) -> str:
 
 def places_digest(places: Places) -> str:
     """A fingerprint of places: where they are, what they are called and all their columns."""
-    import pyarrow as pa
-
     columns: dict[str, Any] = {"id": places.ids, "name": places.names}
     columns |= {"lat": pa.array(places.lat), "lon": pa.array(places.lon)}
     if places.outlines is not None:

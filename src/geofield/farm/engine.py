@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from threading import Event
 from typing import Protocol
 
+import pyarrow as pa
+
 from geofield.errors import GeofieldError
 from geofield.farm.chunk import Done, Orders, Task, plan_chunk
 
@@ -81,7 +83,6 @@ class Patience:
 def one_thread() -> None:
     """Keep libraries that ask no environment to one thread in this process."""
     import cv2
-    import pyarrow as pa
 
     cv2.setNumThreads(1)
     pa.set_cpu_count(1)

@@ -6,6 +6,8 @@ import io
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 
 from geofield.crs import LONLAT, reproject
@@ -22,8 +24,6 @@ def write_failed(store: Store, places: Places) -> list[str]:
 
     There is none where every place has a plan.
     """
-    import pyarrow as pa
-    import pyarrow.compute as pc
     import pyarrow.csv
 
     bad = []
@@ -56,8 +56,6 @@ def write_failed(store: Store, places: Places) -> list[str]:
 
 def _positions(places: Places, at: Any) -> dict[str, Any]:
     """Where they are: latitude and longitude, or the parcels as text."""
-    import pyarrow as pa
-
     if places.outlines is None:
         lat, lon = (pa.array(values[at], from_pandas=True) for values in (places.lat, places.lon))
         return {"lat": lat, "lon": lon}
@@ -70,8 +68,6 @@ def _positions(places: Places, at: Any) -> dict[str, Any]:
 
 def _text(column: Any) -> Any:
     """What CSV has no type for, as text."""
-    import pyarrow as pa
-
     kind = column.type
     plain = pa.types.is_primitive(kind) or pa.types.is_string(kind) or pa.types.is_boolean(kind)
     return column if plain else column.cast(pa.string())

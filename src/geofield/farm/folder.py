@@ -17,9 +17,10 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import shapely
 
 from geofield import __version__, schema
@@ -27,9 +28,6 @@ from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.farm.layers import EXACT, GEOMETRY, KEPT, Tables
 from geofield.farm.store import Store
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 VERSION = 1
 RECORD = "farm.json"
@@ -125,7 +123,6 @@ def sweep_chunk(store: Store, chunk: int) -> None:
 
 def parquet_bytes(layer: str, table: pa.Table) -> memoryview:
     """A table as a Parquet file; GeoParquet 1.1 with boxes where it has shapes."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     if GEOMETRY in table.column_names:
@@ -171,7 +168,6 @@ def read_part(
     store: Store, layer: str, chunk: int, columns: Sequence[str] | None = None
 ) -> pa.Table | None:
     """A layer of one chunk, without its boxes; None where the chunk has no such layer."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     data = store.get(file_of(layer, chunk))

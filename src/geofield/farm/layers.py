@@ -12,9 +12,12 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import numpy as np
+import pandas as pd
+import pyarrow as pa
 import shapely
 from pyproj import CRS
 
@@ -28,10 +31,6 @@ from geofield.model import Dataset
 from geofield.model.dataset import refuse_other_crs
 from geofield.model.rows import Rows
 from geofield.plan import Plan
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-    import pyarrow as pa
 
 FIELD_ID = "field_id"
 EPSG = "utm_epsg"
@@ -82,8 +81,6 @@ def _layer(
     ids: Sequence[str],
     own: pa.Schema | None,
 ) -> pa.Table:
-    import pyarrow as pa
-
     counts = [len(rows) for _, rows in parts]
     mine = [ids[at] for at, _ in parts]
     zones = [epsg_of(crs[at]) for at, _ in parts]
@@ -108,9 +105,6 @@ def _layer(
 
 def _joined(column: schema.Column, parts: Sequence[Any]) -> pa.Array:
     """A column of several fields, of which some may be tables that a person has changed."""
-    import pandas as pd
-    import pyarrow as pa
-
     kind = arrow_type(column)
     if not parts:
         return pa.array([], kind)
@@ -126,8 +120,6 @@ def _joined(column: schema.Column, parts: Sequence[Any]) -> pa.Array:
 
 def _own(of: schema.Layer, parts: Sequence[Rows], own: pa.Schema | None) -> dict[str, Any]:
     """The user's own columns, by name; of given types where they are known before."""
-    import pyarrow as pa
-
     names = list(own.names) if own is not None else []
     names += [name for rows in parts for name in rows.own if name not in (EPSG, EXACT, FIELD_ID)]
     columns = {}
@@ -170,8 +162,6 @@ def _records(
     plans: Sequence[Plan], rows: Sequence[Mapping[str, Rows]], ids: Sequence[str]
 ) -> pa.Table:
     """What is no layer, as text; the same texts for many fields take no room."""
-    import pyarrow as pa
-
     settings: dict[int, str] = {}
     records = []
     for plan, layers in zip(plans, rows, strict=True):
@@ -237,8 +227,6 @@ def _frame(
     of: schema.Layer, table: pa.Table | None, own: Sequence[str], crs: CRS
 ) -> gpd.GeoDataFrame:
     """A layer of one field as it was before :func:`tables_of`."""
-    import geopandas as gpd
-
     if table is None or not table.num_rows:
         return schema.empty(of, crs)
     names = [name for name in (*of.column_names, *own) if name in table.column_names]
@@ -249,8 +237,6 @@ def _frame(
 
 def stacked(parts: Sequence[pa.Table]) -> pa.Table:
     """Parts of a layer as one table; where a column is of two kinds, text holds both."""
-    import pyarrow as pa
-
     for name in {name for part in parts for name in part.column_names}:
         kinds = [pa.schema([one.schema.field(name)]) for one in parts if name in one.column_names]
         try:
@@ -271,8 +257,6 @@ def _tells(table: pa.Table, name: str) -> bool:
 
 def _of_kind(table: pa.Table, name: str, kind: pa.DataType) -> pa.Table:
     """A table with a column of a kind, which is text where its values are of another."""
-    import pyarrow as pa
-
     if name not in table.column_names or table[name].type == kind:
         return table
     values = [None if each is None else str(each) for each in table[name].to_pylist()]
@@ -286,8 +270,6 @@ def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
     In the metric CRS where all its fields share one, else in WGS 84, or in Pacific Mercator where
     some are near 180 degrees; lengths and areas are true metres and hectares in their columns.
     """
-    import geopandas as gpd
-
     zones = table[EPSG].to_pandas()
     shared = zones.nunique(dropna=False) == 1 and zones.notna().all()
     shapes = shapely.from_wkb(table[EXACT if shared else GEOMETRY].to_numpy(zero_copy_only=False))
@@ -307,8 +289,5 @@ def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
 
 def _nullable(table: pa.Table) -> Any:
     """As pandas, whole numbers whole beside missing ones."""
-    import pandas as pd
-    import pyarrow as pa
-
     kinds = {pa.int64(): pd.Int64Dtype(), pa.bool_(): pd.BooleanDtype()}
     return table.to_pandas(types_mapper=kinds.get)

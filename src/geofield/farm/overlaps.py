@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import geopandas as gpd
 import numpy as np
 import shapely
 from pyproj import CRS
@@ -51,8 +52,6 @@ def _areas_m2(shapes: np.ndarray, places: Places, at: np.ndarray) -> np.ndarray:
         middle = metric_crs(float(places.lon[at[0]]), float(places.lat[at[0]]), places.crs)
         if middle == places.crs:
             return ground_areas_m2(shapes, middle)
-    import geopandas as gpd
-
     areas = np.zeros(len(shapes))
     zones = np.array([metric_crs(places.lon[k], places.lat[k]).to_epsg() for k in at])
     for zone in np.unique(zones):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import pandas as pd
+import pyarrow as pa
 import shapely
 
 from geofield.errors import CRSError, FormatError
@@ -16,9 +19,6 @@ from geofield.farm.row_crs import refuse_other_rows
 from geofield.formats.foreign import PARQUET
 from geofield.strangers import check_vector
 from geofield.wording import nearest
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 CSV = (".csv", ".tsv", ".txt")
 _ROWS = "Give one row per field."
@@ -66,9 +66,6 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
 
 def raw_of(frame: pd.DataFrame) -> RawPlaces:
     """A table of places that a Python user has."""
-    import geopandas as gpd
-    import pyarrow as pa
-
     name = "The table"
     shapes = frame.geometry if isinstance(frame, gpd.GeoDataFrame) else None
     if shapes is not None and shapes.crs is None:
@@ -90,7 +87,6 @@ def raw_of(frame: pd.DataFrame) -> RawPlaces:
 
 
 def _csv(path: Path, texts: set[str]) -> RawPlaces:
-    import pyarrow as pa
     import pyarrow.csv as pc
 
     try:
@@ -136,9 +132,7 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
 
 
 def _parquet(path: Path) -> RawPlaces:
-    import json
 
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
@@ -166,7 +160,6 @@ def _parquet(path: Path) -> RawPlaces:
 
 
 def _vector(path: Path, layer: str | None) -> RawPlaces:
-    import pyarrow as pa
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -25,10 +28,6 @@ from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
 from geofield.wording import counted, nearest
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-    import pyarrow as pa
 
 _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
@@ -117,8 +116,6 @@ def read_table(path: Path) -> gpd.GeoDataFrame:
     FormatError
         When there are no such columns, or positions are no positions.
     """
-    import geopandas as gpd
-
     raw = read_raw(path, layer=None, texts=())
     if raw.geometry is not None:
         shapes = shapely.from_wkb(raw.geometry.to_numpy(zero_copy_only=False))
@@ -188,8 +185,6 @@ def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
 
 def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -> tuple[Any, ...]:
     """The rows that are places, the part of the row, outlines, latitudes and longitudes."""
-    import pyarrow as pa
-
     kept, part, outlines, xs, ys, other = [], [], [], [], [], 0
     for begin in range(0, len(geometry), _BATCH):
         binary = geometry.slice(begin, _BATCH).to_numpy(zero_copy_only=False)
@@ -252,13 +247,9 @@ def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
 
 def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
     """A column's numbers; missing ones are not a number."""
-    import pyarrow as pa
-
     column = raw.table[name]
     try:
         if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-            import pyarrow.compute as pc
-
             column = pc.utf8_trim_whitespace(column)
             column = pc.if_else(pc.equal(column, ""), None, column)
         return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
@@ -311,9 +302,6 @@ def _names(
     FormatError
         When an id of the file comes twice.
     """
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     ids: list[str | None] = [None] * len(kept)
     names: list[str | None] = [None] * len(kept)
     if name_name is not None:
@@ -355,9 +343,6 @@ def _names(
 
 def _texts(column: Any) -> Any:
     """A column as text; whole numbers without a point, what is empty missing."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     if pa.types.is_floating(column.type):
         whole = pc.equal(pc.floor(column), column)
         if pc.all(whole.drop_null()).as_py():

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from geofield.errors import FormatError, SettingsError
 from geofield.settings import SECTIONS, Settings, with_values
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 #: Settings of one picture or of lists of places: no column of a place holds them.
 _NOT_PER_PLACE = {"bands", "crs", "scaling", "include", "exclude", "radius_m"}
@@ -39,9 +39,6 @@ def as_settings(settings: Settings, said: Mapping[str, Any]) -> Settings:
 
 def check_settings(file: str, said: pa.Table, settings: Settings | None) -> None:
     """Judge every value that occurs, before any work."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     for name in said.column_names:
         column = said[name]
         nested = pa.types.is_nested(column.type)  # a machine as a mapping

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
 import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -103,8 +104,6 @@ class Places:
 
     def order(self) -> NDArray[np.int64]:
         """Positions along a space-filling curve (Hilbert's): neighbours beside each other."""
-        import geopandas as gpd
-
         known = np.isfinite(self.lat) & np.isfinite(self.lon)
         far = np.full(len(self), np.iinfo(np.int64).max)
         if known.any():

@@ -6,13 +6,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import numpy as np
+import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.crs import LONLAT
+from geofield.crs import LONLAT, parse_crs
 from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import committed, read_part
 from geofield.farm.layers import GEOMETRY
@@ -20,15 +22,22 @@ from geofield.farm.place_files import CSV
 from geofield.farm.place_reader import read_table
 from geofield.farm.store import Store
 from geofield.formats.antimeridian import unwrapped
+from geofield.formats.foreign import layer_names, read_vector
+from geofield.formats.foreign_tables import (
+    BUFFER_COLUMNS,
+    NUMBER_COLUMNS,
+    RADIUS_COLUMNS,
+    column_like,
+    numbers_like,
+    obstacle_table,
+)
+from geofield.formats.gpkg_read import is_own
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
 from geofield.model.resized import strips
 from geofield.model.review import reconcile
 from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
-
-if TYPE_CHECKING:
-    import geopandas as gpd
 
 #: Outlines, in an array or a list.
 Shapes = Sequence[shapely.Geometry] | np.ndarray
@@ -69,9 +78,6 @@ def obstacles_of(path: Path, crs: str | None = None) -> gpd.GeoDataFrame:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> gpd.GeoDataFrame:
-    from geofield.crs import parse_crs
-    from geofield.formats.foreign_tables import NUMBER_COLUMNS, column_like
-
     frame, layers = _rows_and_layers(path)
     if frame.crs is None:
         if crs is None:
@@ -92,11 +98,6 @@ def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> g
 
 def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
     """The rows of a file, and of which of several layers they are."""
-    import pandas as pd
-
-    from geofield.formats.foreign import layer_names, read_vector
-    from geofield.formats.gpkg_read import is_own
-
     if _holds_obstacles(path):
         return read_vector(path, schema.OBSTACLES.name), []
     if path.suffix.lower() in CSV:
@@ -120,13 +121,6 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
 
 def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
     """Make radius and margin of points and lines numbers; refuse what would become smaller."""
-    from geofield.formats.foreign_tables import (
-        BUFFER_COLUMNS,
-        RADIUS_COLUMNS,
-        column_like,
-        numbers_like,
-    )
-
     for names in (RADIUS_COLUMNS, BUFFER_COLUMNS):
         said = column_like(rows, names)
         if said is None:
@@ -146,8 +140,6 @@ def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
 
 def own_obstacles(places: Path) -> Path | None:
     """The file of the places itself, where geofield wrote it with obstacles of theirs."""
-    from geofield.formats.gpkg_read import is_own
-
     mine = _holds_obstacles(places) and is_own(places)
     return places.absolute() if mine else None
 
@@ -155,8 +147,6 @@ def own_obstacles(places: Path) -> Path | None:
 def _holds_obstacles(path: Path) -> bool:
     """Whether it is a GeoPackage with a layer of obstacles in which something stands."""
     import pyogrio
-
-    from geofield.formats.foreign import layer_names
 
     layer = schema.OBSTACLES.name
     if not is_geopackage(path) or layer not in layer_names(path):
@@ -172,8 +162,6 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     TrackError
         When the plan has obstacles already.
     """
-    from geofield.formats.foreign_tables import RADIUS_COLUMNS, column_like, obstacle_table
-
     if plan.obstacles is not None and len(plan.obstacles):
         raise TrackError(
             f"{plan.field.name} has obstacles of its own.",
@@ -220,12 +208,6 @@ def any_reached(standing: gpd.GeoDataFrame, outlines_lonlat: Iterable[Shapes]) -
 
 def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
     """How far each row reaches beyond its own shape."""
-    from geofield.formats.foreign_tables import (
-        BUFFER_COLUMNS,
-        RADIUS_COLUMNS,
-        numbers_like,
-    )
-
     radius_m = numbers_like(standing, RADIUS_COLUMNS)
     margin_m = np.nan_to_num(numbers_like(standing, BUFFER_COLUMNS))
     point, line = standing.geom_type == "Point", standing.geom_type.isin(_LINES)
@@ -239,8 +221,6 @@ def _reach_m(standing: gpd.GeoDataFrame) -> np.ndarray:
 
 def unsized_points(standing: gpd.GeoDataFrame) -> int:
     """How many points say no radius."""
-    from geofield.formats.foreign_tables import RADIUS_COLUMNS, numbers_like
-
     sized = numbers_like(standing, RADIUS_COLUMNS) > 0
     return int(np.count_nonzero((standing.geom_type == "Point") & ~sized))
 
@@ -294,8 +274,6 @@ def _given(plan: Plan, table: gpd.GeoDataFrame) -> Plan:
 
 def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
     """A plan with further obstacles, numbered behind its own."""
-    import pandas as pd
-
     table, written = schema.empty(schema.OBSTACLES, plan.field.crs), plan.evidence.written
     if plan.obstacles is not None:
         table, written = reconcile(plan.obstacles, written, plan.grid)
@@ -321,8 +299,6 @@ def _is_one_of(shapes: Any, others: Any) -> np.ndarray:
 
 def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
     """Rows of the file around a field, by its index, in the file's order."""
-    import geopandas as gpd
-
     near = plan.field.polygon.buffer(2.0 * _near_m(standing))
     around = gpd.GeoSeries([near], crs=plan.field.crs)
     there = np.asarray(around.to_crs(standing.crs))

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import shapely
 
 from geofield.plan import Plan
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +62,6 @@ def outcome_words(plan: Plan) -> dict[str, Any]:
 
 def status_table(outcomes: Sequence[Outcome]) -> pa.Table:
     """The rows as Arrow, a point for each place."""
-    import pyarrow as pa
-
     number, text = pa.float64(), pa.string()
     kinds = {
         "field_id": text, "name": text, "status": text, "error": text, "hint": text, "notes": text,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import tempfile
 from dataclasses import dataclass
 from functools import cached_property
@@ -142,8 +143,6 @@ class Store:
     def remove(self, name: str) -> None:
         """Remove a file or a folder with all that is in it; none is none."""
         if self.folder is not None:
-            import shutil
-
             here = self.folder / name
             if here.is_dir() and not here.is_symlink():
                 shutil.rmtree(here, ignore_errors=True)

@@ -6,7 +6,9 @@ import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryError, refuse_other
 from geofield.farm.place_reader import read_places
@@ -16,9 +18,6 @@ from geofield.farm.work import Job, in_words, listening, plan_place, told
 from geofield.imagery import Imagery
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Places per worker that wait in the scheduler.
 _AHEAD = 4
@@ -65,8 +64,6 @@ def plan_fields(
     Plan
         With the place's `field_id`, name and columns.
     """
-    import pandas as pd
-
     settings = with_values(settings, **by_name)
     refuse_other(places, pd.DataFrame | str | Path | Places, "places", _MAKE_TABLE, FormatError)
     refuse_other(obstacles, str | Path | None, "obstacles", _WRITE_IT, FormatError)

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
+
+import geopandas as gpd
+import pyarrow as pa
+import pyarrow.compute as pc
+import shapely
 
 from geofield import schema
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import folder as place
 from geofield.farm.layers import (
+    EPSG,
+    EXACT,
     FIELD_ID,
+    GEOMETRY,
     KEPT,
     LAYERS,
     PLAN,
@@ -23,13 +32,10 @@ from geofield.farm.layers import (
 )
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
+from geofield.formats.arrow import arrow_type
 from geofield.model.card import card, field_drawn, words
 from geofield.plan import Plan
 from geofield.wording import counted
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-    import pyarrow as pa
 
 #: Fields per chunk of a farm that is written from memory.
 CHUNK_FIELDS = 250
@@ -107,15 +113,11 @@ class Farm:
 
     def __getitem__(self, field_id: str) -> Plan:
         if field_id not in self._where:
-            import difflib
-
             close = difflib.get_close_matches(str(field_id), self._where, n=1)
             raise KeyError(
                 f"no field {field_id!r} in this farm of {len(self)}"
                 + (f"; did you mean {close[0]!r}?" if close else "")
             )
-        import pyarrow.compute as pc
-
         tables = self._part(self._where[field_id])
         mine = {name: t.filter(pc.equal(t[FIELD_ID], field_id)) for name, t in tables.items()}
         return plan_of(mine)
@@ -205,10 +207,6 @@ class Farm:
 
         Places that failed have rows here alone.
         """
-        import geopandas as gpd
-        import pyarrow as pa
-        import shapely
-
         parts = [self._source.part(place.STATUS, chunk) for chunk in self._source.chunks]
         table = pa.concat_tables([*parts, status_table([])], promote_options="permissive")
         shapes = shapely.from_wkb(table["geometry"].to_numpy())
@@ -260,8 +258,6 @@ class Farm:
         )
 
     def _figures(self) -> dict[str, str]:
-        import pyarrow.compute as pc
-
         def total(layer: schema.Layer, column: str) -> float:
             parts = (self._source.part(layer.name, one, [column]) for one in self._source.chunks)
             return sum(pc.sum(part[column]).as_py() or 0.0 for part in parts if part is not None)
@@ -313,11 +309,6 @@ class _Folder:
 
 def _nothing(name: str) -> pa.Table:
     """A layer without rows."""
-    import pyarrow as pa
-
-    from geofield.farm.layers import EPSG, EXACT, GEOMETRY
-    from geofield.formats.arrow import arrow_type
-
     kinds = {FIELD_ID: pa.string(), EPSG: pa.int32()}
     kinds |= {each.name: arrow_type(each) for each in schema.layer(name).columns}
     kinds |= {GEOMETRY: pa.binary(), EXACT: pa.binary()}

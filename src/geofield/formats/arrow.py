@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -27,7 +29,6 @@ from geofield.formats.names import unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    import pyarrow as pa
 
     from geofield.model import Dataset
     from geofield.schema import Column, Layer
@@ -121,17 +122,12 @@ def promoted(of: Layer, geometry: NDArray[np.object_]) -> NDArray[np.object_]:
 
 def arrow_type(column: Column) -> Any:
     """The Arrow type of a column."""
-    import pyarrow as pa
-
     types = {"int": pa.int64(), "float": pa.float64(), "str": pa.string(), "date": pa.date32()}
     return types[column.type]
 
 
 def arrow_values(column: Column, series: Any) -> pa.Array:
     """A column's values as Arrow; missing ones (NaN included) as null."""
-    import pandas as pd
-    import pyarrow as pa
-
     try:
         if column.type == "date":
             return pa.array([None if pd.isna(v) else str(v)[:10] for v in series]).cast(pa.date32())
@@ -163,8 +159,6 @@ def arrow_table(
     large or small letters, or with a `reserved` one, has a number behind it. `lonlat` reprojects
     to WGS 84; `decimals` rounds the coordinates.
     """
-    import pyarrow as pa
-
     geometry = exact_geometry(of, table)
     if lonlat:
         geometry = cut_lonlat(geometry, CRS(table.crs))
@@ -190,9 +184,6 @@ def _rounded(geometry: NDArray[np.object_], decimals: int) -> NDArray[np.object_
 
 
 def _own_values(series: Any) -> pa.Array:
-    import pandas as pd
-    import pyarrow as pa
-
     try:
         values = pa.array(series, from_pandas=True)
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):
@@ -205,8 +196,6 @@ def layer_batches(
     dataset: Dataset, of: Layer, *, points: bool = True, **how: Any
 ) -> pa.RecordBatchReader:
     """A layer as Arrow batches (`how` as of :func:`arrow_table`); track points as they come."""
-    import pyarrow as pa
-
     if of.name != schema.TRACK_POINTS.name:
         return arrow_table(of, dataset.table(of.name), **how).to_reader()
     chunks: Iterator[Any] = iter(dataset.point_chunks() if points else ())

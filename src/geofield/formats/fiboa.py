@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import shapely
 
 from geofield import schema
@@ -107,8 +108,6 @@ def _write_geojson(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
 
 
 def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
-    import pyarrow as pa
-
     fields = pa.schema(
         [
             pa.field("id", pa.string(), nullable=False),

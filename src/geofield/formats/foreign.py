@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import shapely
 from pyproj import CRS
 from pyproj.exceptions import ProjError
+from shapely.errors import GEOSException
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
@@ -50,7 +52,6 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     import geopandas as gpd
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError
-    from shapely.errors import GEOSException
 
     if path.suffix.lower() in PARQUET:
         return read_parquet(path)
@@ -84,7 +85,6 @@ def read_parquet(path: Path) -> gpd.GeoDataFrame:
         When it is damaged or has no geometry.
     """
     import geopandas as gpd
-    import pyarrow as pa
 
     try:
         frame = gpd.read_parquet(path)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import shapely
 from pyproj import CRS
 
@@ -20,9 +21,6 @@ from geofield.formats import origin
 from geofield.formats.arrow import layer_batches
 from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_parquet
 from geofield.model import Dataset
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 GEOMETRY = "geometry"
 _ORIGIN_KEY = "geofield"
@@ -64,7 +62,6 @@ def write_geoparquet(
     covering : bool
         Whether each row gets its bounding box, by which readers skip rows.
     """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     columns, box = batches.schema, pa.struct([(side, pa.float64()) for side in _SIDES])
@@ -99,7 +96,6 @@ def write_geoparquet(
 
 def read(path: Path) -> Dataset:
     """The dataset in a GeoParquet file, or in all of a folder."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     layers, record = [], None

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+import pyarrow as pa
+import shapely
 from pyproj import CRS
 
 from geofield import schema
@@ -85,7 +88,6 @@ class PointsInFile:
     def __call__(self) -> Iterator[gpd.GeoDataFrame]:
         """The batches, as tables of layer `track_points`."""
         import geopandas as gpd
-        import pyarrow as pa
         from pyogrio.raw import open_arrow
 
         layer = schema.TRACK_POINTS
@@ -128,8 +130,6 @@ def in_own_terms(
     alone = frame.geom_type.eq(f"Multi{of.geometry}") & frame.count_geometries().eq(1)
     if not alone.any():
         return frame
-    import shapely
-
     shapes = frame.geometry.to_numpy()
     return frame.set_geometry(frame.geometry.mask(alone, shapely.get_geometry(shapes, 0)))
 
@@ -140,8 +140,6 @@ def _exact(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoData
     Beside an empty cell pandas makes a number with a point of a whole number or truth value, and
     a time of a date: from 2**53 on that is another number.
     """
-    import pandas as pd
-    import pyarrow as pa
     import pyogrio
 
     if "geometry" in pyogrio.read_info(path, layer=of.name)["fields"]:
@@ -238,8 +236,6 @@ def parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     What they are of is known by it: a size in the row is that of the whole, and none to draw
     the part by.
     """
-    import shapely
-
     if not (shapely.get_num_geometries(frame.geometry.to_numpy()) > 1).any():
         return frame
     return frame.explode(index_parts=False, ignore_index=True)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+import shapely
 from pyproj import CRS
 
 from geofield import schema
@@ -70,8 +72,6 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
     FormatError
         When two of them have a field, or the same layer of tracks.
     """
-    import pandas as pd
-
     if len(datasets) == 1 and name is None:
         return datasets[0]
     first = datasets[0]
@@ -110,8 +110,6 @@ def _with_inner_fields_as_obstacles(
     datasets: Sequence[Dataset], crs: CRS, notes: list[str]
 ) -> list[Dataset]:
     """The datasets in one CRS; of outlines that lie in another one, obstacles are made."""
-    import shapely
-
     moved = [
         replace(each, crs=crs, tables={k: t.to_crs(crs) for k, t in each.tables.items()})
         for each in datasets

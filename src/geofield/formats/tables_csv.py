@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 
 from geofield import schema
 from geofield.formats.arrow import arrow_type, arrow_values
@@ -14,7 +15,6 @@ from geofield.model import Dataset
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    import pyarrow as pa
 
     from geofield.schema import Layer
 
@@ -42,7 +42,6 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
 
 
 def _write(layer: Layer, chunks: Iterator[gpd.GeoDataFrame], path: Path) -> None:
-    import pyarrow as pa
     from pyarrow.csv import CSVWriter
 
     fields = pa.schema([(column.name, arrow_type(column)) for column in layer.columns])
@@ -52,8 +51,6 @@ def _write(layer: Layer, chunks: Iterator[gpd.GeoDataFrame], path: Path) -> None
 
 
 def _rounded(layer: Layer, chunk: gpd.GeoDataFrame, fields: pa.Schema) -> pa.Table:
-    import pyarrow as pa
-
     arrays = []
     for column in layer.columns:
         series = chunk[column.name]
