@@ -203,7 +203,6 @@ def scheduler(folder: Path) -> list[str]:
     from geofield.farm import read_places
     from geofield.farm.chunk import Orders, Task
     from geofield.farm.cluster import Cluster
-    from geofield.farm.engine import Control
     from geofield.farm.store import Store
     from geofield.farm.work import Job
     from geofield.settings import Settings
@@ -230,7 +229,7 @@ def scheduler(folder: Path) -> list[str]:
     with LocalCluster(n_workers=CORES, threads_per_worker=1, dashboard_address=None) as machines:
         cluster = Cluster(Client(machines, set_as_default=False), no_work)
         begun = time.perf_counter()
-        done = sum(one.counts["done"] for one in cluster.run(tasks, orders, Control()))
+        done = sum(one.counts["done"] for one in cluster.run(tasks, orders, threading.Event()))
         took = time.perf_counter() - begun
         cluster.close()
     held = psutil.Process().memory_info().rss / 1e6

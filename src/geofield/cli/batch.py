@@ -152,12 +152,12 @@ def batch(
     with (
         _overview_renewed(store, overview=overview),
         progress_bar(quiet=as_json) as progress,
-        two_interrupts() as control,
+        two_interrupts() as stop,
     ):
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
             limits=Limits(time_limit_s, memory_limit_mb), fresh=fresh, retry=retry,
-            imagery=about, control=control, tell=lambda at: _show(progress, at),
+            imagery=about, stop=stop, tell=lambda at: _show(progress, at),
         )  # fmt: skip
     unused = without_place(store, found.ids.to_pylist()) if count.done > count.before else []
     if unused:
@@ -350,6 +350,6 @@ def _summarise(count: Count, place: str, files: list[str]) -> None:
     if count.done > count.before:
         say(f"Pace       {count.per_minute:.0f} per minute")
     if count.failed:
-        few = "1 place has" if count.failed == 1 else f"{count.failed} places have"
+        few = counted(count.failed, "place has", "places have")
         say_note(f"{few} no plan: the reasons are in {place}/failed.csv.")
     say(f"Farm       {place}" + (f" ({', '.join(files)})" if files else ""))

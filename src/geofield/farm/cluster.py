@@ -10,12 +10,13 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Iterator
+from threading import Event
 from typing import Any
 
 from geofield import __version__
 from geofield.errors import GeofieldError, NetworkError
 from geofield.farm.chunk import Done, Orders, Task, plan_chunk
-from geofield.farm.engine import Control, Patience, one_thread
+from geofield.farm.engine import Patience, one_thread
 from geofield.farm.marks import WORK
 from geofield.farm.store import Store
 from geofield.staging import unstopped
@@ -123,7 +124,7 @@ class Cluster:
                     hint="Write to a folder that all machines share, or to an object store.",
                 )
 
-    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+    def run(self, tasks: Iterator[Task], orders: Orders, stop: Event) -> Iterator[Done]:
         """Plan chunks; see `geofield.farm.engine.Engine`."""
         from distributed import CancelledError, KilledWorker, wait
         from distributed.comm import CommClosedError
@@ -134,7 +135,7 @@ class Cluster:
         try:
             while True:
                 ahead = _AHEAD * max(1, sum(self._client.nthreads().values()))
-                while len(running) < ahead and not control.stop.is_set():
+                while len(running) < ahead and not stop.is_set():
                     task = again.pop() if again else next(tasks, None)
                     if task is None:
                         break

@@ -21,13 +21,6 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "GDAL_
 ONE_THREAD = dict.fromkeys((*_THREADS, "OPENCV_FOR_THREADS_NUM"), "1")
 
 
-@dataclass
-class Control:
-    """How a run is told to stop: no chunk is begun any more."""
-
-    stop: Event = field(default_factory=Event)
-
-
 class Engine(Protocol):
     """Plans chunks."""
 
@@ -35,8 +28,11 @@ class Engine(Protocol):
     def where(self) -> str:
         """Who does the work, in words; with the address of a dashboard where there is one."""
 
-    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
-        """Plan chunks, each handed out when it is done; ends when what was begun is done."""
+    def run(self, tasks: Iterator[Task], orders: Orders, stop: Event) -> Iterator[Done]:
+        """Plan chunks, each handed out when it is done; ends when what was begun is done.
+
+        No chunk is begun any more when `stop` is set.
+        """
 
     def close(self) -> None:
         """End all workers now."""
@@ -47,10 +43,10 @@ class Here:
 
     where = "this process"
 
-    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+    def run(self, tasks: Iterator[Task], orders: Orders, stop: Event) -> Iterator[Done]:
         """Plan chunks; see :class:`Engine`."""
         for task in tasks:
-            if control.stop.is_set():
+            if stop.is_set():
                 return
             yield plan_chunk(task, orders)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import queue
 import subprocess
 import sys
@@ -12,13 +13,14 @@ import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from threading import Event
 from typing import IO, Any
 
 from geofield.errors import GeofieldError
 from geofield.farm.chunk import Done, Orders, Task
-from geofield.farm.engine import ONE_THREAD, Control, Patience
+from geofield.farm.engine import ONE_THREAD, Patience
 from geofield.farm.folder import sweep_chunk
-from geofield.farm.worker import receive, send
+from geofield.farm.worker import ENDED, send
 
 #: What a worker is started with.
 PROGRAM: Sequence[str] = (sys.executable, "-m", "geofield.farm.worker")
@@ -46,13 +48,13 @@ class Pool:
         """In words."""
         return f"{self._count} worker{'s' if self._count > 1 else ''} on this machine"
 
-    def run(self, tasks: Iterator[Task], orders: Orders, control: Control) -> Iterator[Done]:
+    def run(self, tasks: Iterator[Task], orders: Orders, stop: Event) -> Iterator[Done]:
         """Plan chunks; see `geofield.farm.engine.Engine`."""
         patience, false_starts = Patience(), 0
         again: deque[Task] = deque()
         try:
             while True:
-                self._employ(tasks, again, orders, control)
+                self._employ(tasks, again, orders, stop)
                 if not any(worker.task for worker in self._workers):
                     return
                 # Not forever: an interrupt must come through on every system.
@@ -82,12 +84,12 @@ class Pool:
             self._end(orders)
 
     def _employ(
-        self, tasks: Iterator[Task], again: deque[Task], orders: Orders, control: Control
+        self, tasks: Iterator[Task], again: deque[Task], orders: Orders, stop: Event
     ) -> None:
         """Give every free worker a chunk, and start workers that are missing."""
         free = [worker for worker in self._workers if worker.task is None]
         while free or len(self._workers) < self._count:
-            if control.stop.is_set():
+            if stop.is_set():
                 return
             task = again.popleft() if again else next(tasks, None)
             if task is None:
@@ -138,9 +140,9 @@ class _Worker:
         worker = cls(process, errors)
 
         def listen() -> None:
-            with contextlib.suppress(EOFError, OSError, ValueError):
+            with contextlib.suppress(*ENDED, OSError, ValueError):
                 while process.stdout is not None:
-                    events.put((worker, receive(process.stdout)))  # type: ignore[arg-type]
+                    events.put((worker, pickle.load(process.stdout)))  # noqa: S301 - our child's
             events.put((worker, _GONE))
 
         threading.Thread(target=listen, name="answers", daemon=True).start()

@@ -6,13 +6,14 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from threading import Event
 from typing import Any
 
 from geofield.errors import OutputExistsError
 from geofield.farm import folder as place
 from geofield.farm.chunk import Orders, Task
 from geofield.farm.digest import difference, record_of
-from geofield.farm.engine import Control, Engine
+from geofield.farm.engine import Engine
 from geofield.farm.limits import Limits
 from geofield.farm.marks import CHANGED, WORK, excuse_all, forget_all
 from geofield.farm.places import Places
@@ -81,7 +82,7 @@ def run_farm(
     fresh: bool = False,
     retry: bool = False,
     imagery: Mapping[str, Any] | None = None,
-    control: Control | None = None,
+    stop: Event | None = None,
     tell: Callable[[Count], None] = lambda count: None,
 ) -> Count:
     """Plan all places that have no status yet.
@@ -131,7 +132,7 @@ def run_farm(
                 Task(chunk, list(places.take(order[chunk * size : (chunk + 1) * size])))
                 for chunk in missing
             )
-            for one in hired.run(tasks, orders, control or Control()):
+            for one in hired.run(tasks, orders, stop or Event()):
                 count.statuses.update(one.counts)
                 tell(count)
     finally:

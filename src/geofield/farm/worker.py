@@ -1,7 +1,7 @@
 """A worker process of the pool: reads tasks from its standard input until that ends.
 
-``python -m geofield.farm.worker`` is started by `geofield.farm.pool`; messages are pickles,
-each behind its length.
+``python -m geofield.farm.worker`` is started by `geofield.farm.pool`; messages are pickles, one
+behind the other.
 """
 
 from __future__ import annotations
@@ -10,37 +10,18 @@ import os
 import pickle
 import queue
 import signal
-import struct
 import sys
 import threading
 from typing import Any, BinaryIO
 
-_LENGTH = struct.Struct("<Q")
+#: The other side has gone, perhaps amid a message.
+ENDED = (EOFError, pickle.UnpicklingError)
 
 
 def send(stream: BinaryIO, value: Any) -> None:
     """Write a message."""
-    data = pickle.dumps(value)
-    stream.write(_LENGTH.pack(len(data)) + data)
+    stream.write(pickle.dumps(value))
     stream.flush()
-
-
-def receive(stream: BinaryIO) -> Any:
-    """Read a message.
-
-    Raises
-    ------
-    EOFError
-        When the other side has gone.
-    """
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        raise EOFError
-    (length,) = _LENGTH.unpack(head)
-    data = stream.read(length)
-    if len(data) < length:
-        raise EOFError
-    return pickle.loads(data)  # noqa: S301 - from our own parent or child
 
 
 def main() -> None:
@@ -56,8 +37,8 @@ def main() -> None:
     def read() -> None:
         try:
             while True:
-                tasks.put(receive(sys.stdin.buffer))
-        except EOFError:
+                tasks.put(pickle.load(sys.stdin.buffer))  # noqa: S301 - from our own parent
+        except ENDED:
             # The main process has gone: a chunk that is half done does not count.
             os._exit(0)
 
