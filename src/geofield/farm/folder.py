@@ -28,6 +28,7 @@ from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.farm.layers import EXACT, GEOMETRY, KEPT, Tables
 from geofield.farm.store import Store
+from geofield.formats.geoparquet import SIDES, described
 
 VERSION = 1
 RECORD = "farm.json"
@@ -35,7 +36,6 @@ STATUS = "status"
 REVIEWED = "reviewed"
 #: What may become of a place.
 STATUSES = ("done", "doubtful", "failed", "lost")
-_SIDES = ("xmin", "ymin", "xmax", "ymax")
 _CHUNK = re.compile(r"chunk=(\d+)")
 
 
@@ -135,33 +135,20 @@ def parquet_bytes(layer: str, table: pa.Table) -> memoryview:
         inside = np.where(outward < 0, boxes > bounds, boxes < bounds)
         boxes = np.where(inside, np.nextafter(boxes, outward), boxes)
         box = pa.StructArray.from_arrays(
-            [pa.array(boxes[:, side], from_pandas=True) for side in range(4)], names=list(_SIDES)
+            [pa.array(boxes[:, side], from_pandas=True) for side in range(4)], names=list(SIDES)
         )
         table = table.append_column("bbox", box)
-        table = table.replace_schema_metadata({"geo": json.dumps(_geo(layer, bounds))})
+        kind = "Point" if layer == STATUS else schema.layer(layer).geometry
+        # At the 180th meridian shapes are cut into parts.
+        kinds = [kind] if kind.startswith("Multi") or kind == "Point" else [kind, f"Multi{kind}"]
+        geo = described(LONLAT, kinds, bounds, covering=True)
+        table = table.replace_schema_metadata({"geo": geo})
     sink = io.BytesIO()
     # Exact shapes are all different: looking for repetition in them is time for nothing.
-    plain = [EXACT, GEOMETRY, *(f"bbox.{side}" for side in _SIDES)]
+    plain = [EXACT, GEOMETRY, *(f"bbox.{side}" for side in SIDES)]
     names = [name for name in table.column_names if name not in {*plain, "bbox"}]
     pq.write_table(table, sink, compression="zstd", use_dictionary=names)
     return sink.getbuffer()
-
-
-def _geo(layer: str, bounds: Any) -> dict[str, Any]:
-    kind = "Point" if layer == STATUS else schema.layer(layer).geometry
-    # At the 180th meridian shapes are cut into parts.
-    kinds = [kind] if kind.startswith("Multi") or kind == "Point" else [kind, f"Multi{kind}"]
-    column: dict[str, Any] = {
-        "encoding": "WKB",
-        "crs": LONLAT.to_json_dict(),
-        "geometry_types": kinds,
-        "orientation": "counterclockwise",
-        "covering": {"bbox": {side: ["bbox", side] for side in _SIDES}},
-    }
-    known = bounds[np.isfinite(bounds).all(axis=1)]
-    if len(known):
-        column["bbox"] = [*known[:, :2].min(axis=0).tolist(), *known[:, 2:].max(axis=0).tolist()]
-    return {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
 
 
 def read_part(

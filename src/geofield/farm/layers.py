@@ -69,18 +69,22 @@ def tables_of(plans: Iterable[Plan], own: pa.Schema | None = None) -> Tables:
         ]
         if parts or layer.name in ALWAYS:
             given = own if layer.name == schema.FIELD.name else None
-            tables[layer.name] = _layer(layer, parts, crs, ids, given)
+            tables[layer.name] = layer_table(layer, parts, crs, ids, given)
     tables[PLAN] = _records(plans, rows, ids)
     return tables
 
 
-def _layer(
+def layer_table(
     of: schema.Layer,
-    parts: Sequence[tuple[int, Rows]],
-    crs: Sequence[CRS],
-    ids: Sequence[str],
-    own: pa.Schema | None,
+    parts: Sequence[tuple[int, Rows]] = (),
+    crs: Sequence[CRS] = (),
+    ids: Sequence[str] = (),
+    own: pa.Schema | None = None,
 ) -> pa.Table:
+    """A layer of some fields; one without rows where none has it.
+
+    `parts` are the rows with the positions of their fields in `crs` and `ids`.
+    """
     counts = [len(rows) for _, rows in parts]
     mine = [ids[at] for at, _ in parts]
     zones = [epsg_of(crs[at]) for at, _ in parts]

@@ -41,11 +41,6 @@ class Outcome:
     seconds: float = 0.0
     worker: str = ""
 
-    @property
-    def planned(self) -> bool:
-        """Whether there is a plan."""
-        return self.status in ("done", "doubtful")
-
 
 def outcome_words(plan: Plan) -> dict[str, Any]:
     """Status, certainty and doubts of a plan that was made."""

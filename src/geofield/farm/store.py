@@ -61,13 +61,6 @@ class Store:
     def __getstate__(self) -> dict[str, str]:
         return {"place": self.place}
 
-    def path(self, name: str) -> Any:
-        """A file for pyarrow to read, with the file system as the second part."""
-        if self.folder is not None:
-            return str(self.folder / name), None
-        system, prefix = self._remote
-        return f"{prefix}/{name}", system
-
     def put(self, name: str, data: bytes | memoryview) -> None:
         """Write a file, whole or not at all.
 

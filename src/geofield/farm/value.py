@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import geopandas as gpd
 import pyarrow as pa
@@ -17,22 +17,19 @@ from geofield import schema
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import folder as place
 from geofield.farm.layers import (
-    EPSG,
-    EXACT,
     FIELD_ID,
-    GEOMETRY,
     KEPT,
     LAYERS,
     PLAN,
     Tables,
     frame_of,
+    layer_table,
     plan_of,
     stacked,
     tables_of,
 )
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
-from geofield.formats.arrow import arrow_type
 from geofield.model.card import card, field_drawn, words
 from geofield.plan import Plan
 from geofield.wording import counted
@@ -40,17 +37,6 @@ from geofield.wording import counted
 #: Fields per chunk of a farm that is written from memory.
 CHUNK_FIELDS = 250
 _SHOWN = 200
-
-
-class Source(Protocol):
-    """Where a farm's tables come from: memory or a folder."""
-
-    @property
-    def chunks(self) -> Sequence[int]:
-        """Their numbers."""
-
-    def part(self, layer: str, chunk: int, columns: Sequence[str] | None = None) -> Any:
-        """A layer of a chunk as Arrow; None where there is none."""
 
 
 class Farm:
@@ -71,9 +57,11 @@ class Farm:
     """
 
     def __init__(self, plans: Iterable[Plan] = ()) -> None:
-        self._source: Source = _Memory(list(plans))
+        made = _Memory(list(plans))
+        self._chunks: Sequence[int] = made.chunks
+        self._table: Callable[..., Any] = made.table
         self._where: dict[str, int] = {}
-        for chunk in self._source.chunks:
+        for chunk in self._chunks:
             for one in self._ids(chunk):
                 if one in self._where:
                     raise FormatError(
@@ -83,14 +71,15 @@ class Farm:
                 self._where[one] = chunk
 
     @classmethod
-    def _of(cls, source: Source) -> Farm:
+    def _in(cls, store: Store) -> Farm:
+        """The farm in a folder, of which only chunks with a status count."""
         farm = cls()
-        farm._source = source
-        farm._where = {one: chunk for chunk in source.chunks for one in farm._ids(chunk)}
+        farm._chunks, farm._table = place.committed(store), partial(place.read_part, store)
+        farm._where = {one: chunk for chunk in farm._chunks for one in farm._ids(chunk)}
         return farm
 
     def _ids(self, chunk: int) -> list[str]:
-        table = self._source.part(PLAN, chunk, [FIELD_ID])
+        table = self._table(PLAN, chunk, [FIELD_ID])
         return [] if table is None else table[FIELD_ID].to_pylist()
 
     # -- a mapping of plans ------------------------------------------------------------------
@@ -108,7 +97,7 @@ class Farm:
 
     def __iter__(self) -> Iterator[Plan]:
         """The plans, one after the other; only some of them are in memory."""
-        for chunk in self._source.chunks:
+        for chunk in self._chunks:
             yield from self._plans(chunk)
 
     def __getitem__(self, field_id: str) -> Plan:
@@ -123,7 +112,7 @@ class Farm:
         return plan_of(mine)
 
     def _part(self, chunk: int) -> Tables:
-        found = {name: self._source.part(name, chunk) for name in KEPT}
+        found = {name: self._table(name, chunk) for name in KEPT}
         return {name: table for name, table in found.items() if table is not None}
 
     def _plans(self, chunk: int) -> Iterator[Plan]:
@@ -150,11 +139,9 @@ class Farm:
                 f"A farm has no layer {name!r}.",
                 hint=f"Layers: {', '.join(each.name for each in LAYERS)}.",
             )
-        found = (self._source.part(name, chunk) for chunk in self._source.chunks)
+        found = (self._table(name, chunk) for chunk in self._chunks)
         parts = [part for part in found if part is not None]
-        if not parts:
-            return frame_of(name, _nothing(name))
-        return frame_of(name, stacked(parts))
+        return frame_of(name, stacked(parts or [layer_table(schema.layer(name))]))
 
     @cached_property
     def fields(self) -> gpd.GeoDataFrame:
@@ -207,7 +194,7 @@ class Farm:
 
         Places that failed have rows here alone.
         """
-        parts = [self._source.part(place.STATUS, chunk) for chunk in self._source.chunks]
+        parts = [self._table(place.STATUS, chunk) for chunk in self._chunks]
         table = pa.concat_tables([*parts, status_table([])], promote_options="permissive")
         shapes = shapely.from_wkb(table["geometry"].to_numpy())
         rest = table.drop_columns("geometry").to_pandas()
@@ -239,8 +226,8 @@ class Farm:
                     f"{folder} is not empty.", hint="Choose another folder, or allow overwriting."
                 )
             clear(store)
-        chunks = self._source.chunks
-        parts = [(self._part(one), self._source.part(place.STATUS, one)) for one in chunks]
+        chunks = self._chunks
+        parts = [(self._part(one), self._table(place.STATUS, one)) for one in chunks]
         store.put(place.RECORD, place.Record(chunks=len(parts)).to_json())
         for number, (tables, status) in enumerate(parts):
             place.write_chunk(store, number, tables, status)
@@ -259,7 +246,7 @@ class Farm:
 
     def _figures(self) -> dict[str, str]:
         def total(layer: schema.Layer, column: str) -> float:
-            parts = (self._source.part(layer.name, one, [column]) for one in self._source.chunks)
+            parts = (self._table(layer.name, one, [column]) for one in self._chunks)
             return sum(pc.sum(part[column]).as_py() or 0.0 for part in parts if part is not None)
 
         area_ha, length_m = total(schema.FIELD, "area_ha"), total(schema.TRACKS, "length_m")
@@ -279,7 +266,8 @@ class _Memory:
         self.chunks = range((len(plans) + CHUNK_FIELDS - 1) // CHUNK_FIELDS)
         self._made: dict[int, Tables] = {}
 
-    def part(self, layer: str, chunk: int, columns: Sequence[str] | None = None) -> Any:
+    def table(self, layer: str, chunk: int, columns: Sequence[str] | None = None) -> Any:
+        """A layer of a chunk, or some columns of it; None where there is none."""
         if chunk not in self._made:
             plans = self._plans[chunk * CHUNK_FIELDS : (chunk + 1) * CHUNK_FIELDS]
             self._made[chunk] = {
@@ -294,25 +282,6 @@ def _outcome(plan: Plan) -> Outcome:
     lat, lon = plan.point
     field = plan.field
     return Outcome(field.field_id, field.name, lat=lat, lon=lon, **outcome_words(plan))
-
-
-class _Folder:
-    """Tables in a folder; only chunks with a status count."""
-
-    def __init__(self, store: Store) -> None:
-        self.store = store
-        self.chunks = place.committed(store)
-
-    def part(self, layer: str, chunk: int, columns: Sequence[str] | None = None) -> Any:
-        return place.read_part(self.store, layer, chunk, columns)
-
-
-def _nothing(name: str) -> pa.Table:
-    """A layer without rows."""
-    kinds = {FIELD_ID: pa.string(), EPSG: pa.int32()}
-    kinds |= {each.name: arrow_type(each) for each in schema.layer(name).columns}
-    kinds |= {GEOMETRY: pa.binary(), EXACT: pa.binary()}
-    return pa.schema(list(kinds.items())).empty_table()
 
 
 def _runs(table: pa.Table) -> dict[str, tuple[int, int]]:
@@ -358,4 +327,4 @@ def read_farm(folder: str | Path) -> Farm:
             f"{folder} is no farm of geofield: there is no {place.RECORD}.",
             hint="Make one with `geofield batch PLACES --out FARM/`.",
         )
-    return Farm._of(_Folder(store))
+    return Farm._in(store)

@@ -7,13 +7,14 @@ file's key-value metadata.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import shapely
+from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield.errors import FormatError
@@ -24,7 +25,8 @@ from geofield.model import Dataset
 
 GEOMETRY = "geometry"
 _ORIGIN_KEY = "geofield"
-_SIDES = ("xmin", "ymin", "xmax", "ymax")
+#: Of the box of each row.
+SIDES = ("xmin", "ymin", "xmax", "ymax")
 
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
@@ -44,7 +46,7 @@ def write_geoparquet(
     path: Path,
     batches: pa.RecordBatchReader,
     crs: CRS,
-    geometry_types: list[str],
+    geometry_types: Sequence[str],
     metadata: Mapping[str, str],
     *,
     covering: bool = True,
@@ -55,7 +57,7 @@ def write_geoparquet(
     ----------
     batches : pa.RecordBatchReader
         Each becomes a row group.
-    geometry_types : list of str
+    geometry_types : sequence of str
         All that there are.
     metadata : mapping
         Further key-value metadata.
@@ -64,15 +66,8 @@ def write_geoparquet(
     """
     import pyarrow.parquet as pq
 
-    columns, box = batches.schema, pa.struct([(side, pa.float64()) for side in _SIDES])
-    column: dict[str, Any] = {
-        "encoding": "WKB",
-        "crs": crs.to_json_dict(),
-        "geometry_types": geometry_types,
-        "orientation": "counterclockwise",
-    }
+    columns, box = batches.schema, pa.struct([(side, pa.float64()) for side in SIDES])
     if covering:
-        column["covering"] = {"bbox": {side: ["bbox", side] for side in _SIDES}}
         # As optional as the geometry it covers.
         columns = columns.append(pa.field("bbox", box, columns.field(GEOMETRY).nullable))
     totals = []
@@ -82,16 +77,36 @@ def write_geoparquet(
         for batch in batches:
             shapes = shapely.from_wkb(batch[GEOMETRY].to_numpy(zero_copy_only=False))
             sides = [pa.array(side) for side in shapely.bounds(shapes).T]
-            boxes = pa.StructArray.from_arrays(sides, _SIDES)
+            boxes = pa.StructArray.from_arrays(sides, SIDES)
             arrays = [*batch.columns, boxes] if covering else batch.columns
             writer.write_table(pa.Table.from_arrays(arrays, schema=columns))
             totals.append(shapely.total_bounds(shapes))
-        known = np.array(totals).reshape(-1, 4)
-        known = known[np.isfinite(known).all(axis=1)]
-        if len(known):
-            column["bbox"] = [*known[:, :2].min(axis=0), *known[:, 2:].max(axis=0)]
-        geo = {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
-        writer.add_key_value_metadata({"geo": json.dumps(geo), **metadata})
+        bounds = np.array(totals).reshape(-1, 4)
+        geo = described(crs, geometry_types, bounds, covering=covering)
+        writer.add_key_value_metadata({"geo": geo, **metadata})
+
+
+def described(
+    crs: CRS, geometry_types: Sequence[str], bounds: NDArray[np.float64], *, covering: bool
+) -> str:
+    """What a file says of its column `geometry`: the value of its key ``geo``.
+
+    `bounds` (n, 4) are those of its shapes, or of parts of them; `covering` says whether each row
+    has its box in the column `bbox`.
+    """
+    column: dict[str, Any] = {
+        "encoding": "WKB",
+        "crs": crs.to_json_dict(),
+        "geometry_types": geometry_types,
+        "orientation": "counterclockwise",
+    }
+    if covering:
+        column["covering"] = {"bbox": {side: ["bbox", side] for side in SIDES}}
+    known = bounds[np.isfinite(bounds).all(axis=1)]
+    if len(known):
+        column["bbox"] = [*known[:, :2].min(axis=0), *known[:, 2:].max(axis=0)]
+    geo = {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+    return json.dumps(geo)
 
 
 def read(path: Path) -> Dataset:
