@@ -103,7 +103,7 @@ def clear(source: str | None, cache_dir: Path | None, yes: bool, settings: Setti
             f"The tile cache holds nothing of {source!r}.",
             hint=f"It holds: {', '.join(names) or 'nothing'}.",
         )
-    say(f"Deleted {len(gone)} file{'s' if len(gone) != 1 else ''} in {folder}.")
+    say(f"Deleted {counted(len(gone), 'file')} in {folder}.")
 
 
 def _day(seconds: int | None) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,10 +12,8 @@ from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated, say_removed
 from geofield.errors import OutputExistsError
+from geofield.settings import Settings
 from geofield.wording import counted
-
-if TYPE_CHECKING:
-    from geofield.settings import Settings
 
 
 @click.command(

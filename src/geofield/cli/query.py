@@ -10,7 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.errors import FormatError
-from geofield.wording import nearest
+from geofield.wording import counted, nearest
 
 
 @click.command(
@@ -62,7 +62,7 @@ def query(
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(answer.columns)
         writer.writerows(answer.rows)
-    say(f"{len(answer.rows)} answer{'' if len(answer.rows) == 1 else 's'}.")
+    say(f"{counted(len(answer.rows), 'answer')}.")
 
 
 def _own(name: str, known: list[str]) -> str:

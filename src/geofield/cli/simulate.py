@@ -12,6 +12,7 @@ from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import FOLDER, claim_folder
 from geofield.simulate import CLIMATES, SimulatedField, SimulationSettings, simulate_fields
 from geofield.staging import staged_folder
+from geofield.wording import counted
 
 
 @click.command(
@@ -114,8 +115,8 @@ def simulate(
         echo_json(rows)
         return
     trees = sum(row["obstacles"] for row in rows)
-    plural = "" if fields == 1 else "s"
-    say(f"Wrote {fields} field{plural} with {trees} trees to {out}/; points are in seeds.csv.")
+    wrote = counted(fields, "field")
+    say(f"Wrote {wrote} with {trees} trees to {out}/; points are in seeds.csv.")
 
 
 def _write(one: SimulatedField, folder: Path, name: str) -> dict[str, Any]:

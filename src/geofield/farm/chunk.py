@@ -8,7 +8,8 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+
+import pyarrow as pa
 
 from geofield import __version__
 from geofield.errors import FormatError, GeofieldError
@@ -22,9 +23,6 @@ from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.farm.work import Job, in_words, listening, plan_place, told
 from geofield.plan import Plan
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 _LIMIT_HINT = "Look at it alone with `geofield run`, or give it more: --{}-limit."
 

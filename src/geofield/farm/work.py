@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import numpy as np
 import shapely
 
@@ -18,6 +19,7 @@ from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_further
+from geofield.imagery import Imagery
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.pipeline import run_field, run_obstacles, run_tracks
@@ -25,11 +27,6 @@ from geofield.plan import Plan
 from geofield.settings import Settings
 from geofield.tracks.outline import clean_outline
 from geofield.windows import WINDOW_M, open_scene, showing, wider
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.imagery import Imagery
 
 #: Share of the smaller outline that a place and its reviewed plan have in common at least.
 _SHARED = 0.1

@@ -100,7 +100,7 @@ def _split(whole: NDArray[np.object_]) -> list[Any]:
             "pole never is.",
             hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
         )
-    west = shapely.transform(shapely.intersection(whole, _WEST), _negative)
+    west = shapely.transform(shapely.intersection(whole, _WEST), lambda xy: xy - (360.0, 0.0))
     east = shapely.intersection(whole, _EAST)
     return [_collected(*parts) for parts in zip(east, west, strict=True)]
 
@@ -120,10 +120,6 @@ def _as_one(whole: Any) -> Any:
 def _positive(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.where(lonlat[:, 0] < 0, lonlat[:, 0] + 360, lonlat[:, 0]),
                             lonlat[:, 1]])  # fmt: skip
-
-
-def _negative(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.column_stack([lonlat[:, 0] - 360.0, lonlat[:, 1]])
 
 
 def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:

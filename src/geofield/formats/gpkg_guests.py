@@ -21,14 +21,14 @@ from geofield.staging.generations import keep_earlier
 
 #: Of QGIS: their rows are brought one by one.
 _OF_QGIS = {"layer_styles", "qgis_projects"}
-#: Tables of the standard and of GDAL in which a layer has rows, and the column of its name.
-_REGISTERS = {
-    "gpkg_contents": "table_name",
-    "gpkg_geometry_columns": "table_name",
-    "gpkg_extensions": "table_name",
-    "gpkg_ogr_contents": "table_name",
-    "gpkg_data_columns": "table_name",
-}
+#: Tables of the standard and of GDAL in which a layer has rows, by its `table_name`.
+_REGISTERS = (
+    "gpkg_contents",
+    "gpkg_geometry_columns",
+    "gpkg_extensions",
+    "gpkg_ogr_contents",
+    "gpkg_data_columns",
+)
 
 
 def replace_plan(there: Path, new: Path) -> None:
@@ -128,17 +128,17 @@ def _bring_layer(connection: sqlite3.Connection, name: str, kind: str) -> None:
         raise sqlite3.DatabaseError(f"{kind} of {name}")
     _bring_system(connection, name)
     _create(connection, "type IN ('table', 'view') AND name = ?", name)
-    if not _is_view(connection, name):
+    if not _has(connection, "old", name, "view"):
         _fill(connection, name)
     for index in _indexes(connection, name):
         _create(connection, "type = 'table' AND name = ?", index)
         _fill(connection, index)
     _create(connection, "type IN ('index', 'trigger') AND tbl_name = ?", name)
-    for register, column in _REGISTERS.items():
+    for register in _REGISTERS:
         if _has(connection, "old", register) and _has(connection, "main", register):
             # Triggers may have counted the rows already.
-            connection.execute(f'DELETE FROM main."{register}" WHERE {column} = ?', (name,))  # noqa: S608
-            _fill(connection, register, f"WHERE {column} = ?", name)
+            connection.execute(f'DELETE FROM main."{register}" WHERE table_name = ?', (name,))  # noqa: S608
+            _fill(connection, register, "WHERE table_name = ?", name)
 
 
 def _bring_system(connection: sqlite3.Connection, name: str) -> None:
@@ -267,14 +267,10 @@ def _fill(
     )
 
 
-def _has(connection: sqlite3.Connection, of: str, name: str) -> bool:
-    query = f"SELECT 1 FROM {of}.sqlite_master WHERE type IN ('table', 'view') AND name = ?"  # noqa: S608
-    return connection.execute(query, (name,)).fetchone() is not None
-
-
-def _is_view(connection: sqlite3.Connection, name: str) -> bool:
-    query = "SELECT type FROM old.sqlite_master WHERE name = ?"
-    return bool(connection.execute(query, (name,)).fetchone() == ("view",))
+def _has(connection: sqlite3.Connection, of: str, name: str, *kinds: str) -> bool:
+    query = f"SELECT type FROM {of}.sqlite_master WHERE type IN ('table', 'view') AND name = ?"  # noqa: S608
+    found = connection.execute(query, (name,)).fetchone()
+    return found is not None and found[0] in (kinds or ("table", "view"))
 
 
 def _quoted(name: str) -> str:

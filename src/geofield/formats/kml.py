@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pandas as pd
@@ -17,9 +17,7 @@ from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_v
 from geofield.formats.origin import lineage
 from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
-
-if TYPE_CHECKING:
-    from geofield.schema import Layer
+from geofield.schema import Layer
 
 KML = "http://www.opengis.net/kml/2.2"
 #: 1e-9 degrees are a tenth of a millimetre.
@@ -116,13 +114,6 @@ def _own_type(values: pd.Series[Any]) -> str:
     return _TYPES[kind]
 
 
-def _style_name(layer: Layer, row: Mapping[str, Any]) -> str:
-    """Obstacles look as their status says."""
-    if layer.name != schema.OBSTACLES.name:
-        return layer.name
-    return f"obstacles_{row['status']}"
-
-
 def _style(name: str, colour: str, width: float, fill: str | None) -> ET.Element:
     line = node("LineStyle", node("color", colour), node("width", f"{width:g}"))
     polygon = [] if fill is None else [node("PolyStyle", node("color", fill))]
@@ -140,10 +131,12 @@ def _folder(layer: Layer, dataset: Dataset) -> ET.Element:
             if not pd.isna(value):
                 text = repr(float(value)) if isinstance(value, float) else str(value)
                 data.append(node("SimpleData", text, name=str(name)))
+        # Obstacles look as their status says.
+        look = f"_{row['status']}" if layer.name == schema.OBSTACLES.name else ""
         placemark = node(
             "Placemark",
             node("name", row_name(layer, row)),
-            node("styleUrl", f"#style_{_style_name(layer, row)}"),
+            node("styleUrl", f"#style_{layer.name}{look}"),
             node("ExtendedData", data),
             _geometry(shape),
         )

@@ -97,7 +97,7 @@ class _Part:
     def told(self, count: int, what: str) -> str:
         """A line for people."""
         thing = {"Polygon": "polygon", "LineString": "line", "Point": "point"}[self.kind]
-        return f"{self.layer}: {count} {thing}{'' if count == 1 else 's'} {what}"
+        return f"{self.layer}: {counted(count, thing)} {what}"
 
 
 def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path) -> list[str]:

@@ -53,7 +53,8 @@ def source_from_tags(tags: Mapping[str, str], path: str) -> ImagerySource:
         return tags.get(_PREFIX + name, "")
 
     date = tag("IMAGERY_DATE") or next((tags[n] for n in _DATE_TAGS if tags.get(n)), "")
-    zoom = tag("ZOOM")
+    zoom, details = tag("ZOOM"), _loaded(tag("DETAILS"))
+    told = details.items() if isinstance(details, dict) else ()
     return ImagerySource(
         name=tag("SOURCE") or display_name(path),
         date=date or None,
@@ -62,7 +63,7 @@ def source_from_tags(tags: Mapping[str, str], path: str) -> ImagerySource:
         may_derive=tag("MAY_DERIVE") != "no",
         may_cache=tag("MAY_CACHE") != "no",
         zoom=int(zoom) if zoom.isdecimal() else None,
-        details=tuple(_object(tag("DETAILS")).items()),
+        details=tuple((str(key), str(value)) for key, value in told),
     )
 
 
@@ -83,11 +84,6 @@ def notes_from_tags(tags: Mapping[str, str]) -> tuple[str, ...]:
     """What was done to the pixels before they came into the file."""
     values = _loaded(tags.get(_PREFIX + "NOTES", ""))
     return tuple(str(each) for each in values) if isinstance(values, list) else ()
-
-
-def _object(text: str) -> dict[str, str]:
-    value = _loaded(text)
-    return {str(k): str(v) for k, v in value.items()} if isinstance(value, dict) else {}
 
 
 def _loaded(text: str) -> object:

@@ -14,7 +14,6 @@ from geofield.crs import grid_north_deg, ground_scale_of
 from geofield.errors import FormatError, GeofieldError
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
-    counted,
     credit_in_words,
     doubts_in_words,
     figures_in_words,
@@ -22,6 +21,7 @@ from geofield.model.map_words import (
     round_length_m,
 )
 from geofield.model.scene import Scene
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

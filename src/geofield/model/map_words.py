@@ -10,6 +10,7 @@ from geofield import schema
 from geofield.model.dataset import Dataset
 from geofield.model.frame import along_frame
 from geofield.model.obstacles import active
+from geofield.wording import counted
 
 
 def figures_in_words(dataset: Dataset) -> list[str]:
@@ -73,8 +74,3 @@ def round_length_m(longest_m: float) -> float:
 def length_in_words(length_m: float) -> str:
     """Metres, or kilometres from 1000 on."""
     return f"{length_m:g} m" if length_m < 1000 else f"{length_m / 1000:g} km"
-
-
-def counted(number: int, thing: str) -> str:
-    """``1 track``, ``2 tracks``."""
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
