@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from geofield import schema
 from geofield.formats.format import Drop, Format
@@ -19,6 +20,10 @@ _TERMINAL_DROPS = (
     _ORIGIN,
 )
 
+#: A file for each layer.
+_by_layer = partial(Format, layers=_ALL, reads_folders=True, fields="joined")
+#: What shows a plan to people, on its picture.
+_shown = partial(Format, drops=(_ORIGIN,), crs="metric", pictured=True)
 _RDFXML = Format(
     "rdf",
     "RDF/XML linked data",
@@ -79,20 +84,17 @@ CATALOGUE: tuple[Format, ...] = (
         validator="geofield.formats.checks.gpkg:check",
         fields="joined",
     ),
-    Format(
+    _by_layer(
         "geojson",
         "GeoJSON (RFC 7946)",
         ("geojson/<layer>.geojson",),
-        _ALL,
-        "geofield.formats.geojson:write",
-        "geofield.formats.geojson:read",
+        writer="geofield.formats.geojson:write",
+        reader="geofield.formats.geojson:read",
         suffixes=(".geojson", ".json"),
         drops=(_ORIGIN,),
         precision_m=0.012,
         asks_crs=True,
         validator="geofield.formats.checks.geojson:check",
-        reads_folders=True,
-        fields="joined",
     ),
     Format(
         "shapefile",
@@ -111,32 +113,26 @@ CATALOGUE: tuple[Format, ...] = (
         reads_folders=True,
         fields="many",
     ),
-    Format(
+    _by_layer(
         "geoparquet",
         "GeoParquet 1.1",
         ("geoparquet/<layer>.parquet",),
-        _ALL,
-        "geofield.formats.geoparquet:write",
-        "geofield.formats.geoparquet:read",
+        writer="geofield.formats.geoparquet:write",
+        reader="geofield.formats.geoparquet:read",
         suffixes=(".parquet",),
         precision_m=0.0,
         crs="metric",
-        reads_folders=True,
-        fields="joined",
     ),
-    Format(
+    _by_layer(
         "flatgeobuf",
         "FlatGeobuf",
         ("flatgeobuf/<layer>.fgb",),
-        _ALL,
-        "geofield.formats.flatgeobuf:write",
-        "geofield.formats.flatgeobuf:read",
+        writer="geofield.formats.flatgeobuf:write",
+        reader="geofield.formats.flatgeobuf:read",
         suffixes=(".fgb",),
         drops=(_ORIGIN,),
         precision_m=0.0,
         crs="metric",
-        reads_folders=True,
-        fields="joined",
     ),
     Format(
         "kml",
@@ -254,47 +250,36 @@ CATALOGUE: tuple[Format, ...] = (
             Drop("the confidence of obstacles", "obstacles.confidence"),
         ),
     ),
-    Format(
+    _shown(
         "scene",
         "Picture of the plan (cloud-optimised GeoTIFF)",
         ("scene.tif",),
         (),
         "geofield.products:write_scene",
-        drops=(_ORIGIN,),
         crs="the picture's own",
         automatic=True,
-        pictured=True,
     ),
-    Format(
+    _shown(
         "map",
         "Map picture",
         ("map.png",),
         (*_MAP[:4], "headland", *_MAP[4:]),
         "geofield.products:write_map",
-        drops=(_ORIGIN,),
-        crs="metric",
         automatic=True,
-        pictured=True,
     ),
-    Format(
+    _shown(
         "map-svg",
         "Map as lines for drawing programs (SVG)",
         ("map.svg",),
         _MAP,
         "geofield.mapping.plot:write_svg",
-        drops=(_ORIGIN,),
-        crs="metric",
-        pictured=True,
     ),
-    Format(
+    _shown(
         "map-pdf",
         "Map on a page for print (PDF)",
         ("map.pdf",),
         _MAP,
         "geofield.mapping.plot:write_pdf",
-        drops=(_ORIGIN,),
-        crs="metric",
-        pictured=True,
     ),
     Format(
         "report",
@@ -304,15 +289,12 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.products:write_report",
         automatic=True,
     ),
-    Format(
+    _shown(
         "html",
         "Web page in one file",
         ("{stem}.html",),
         ("field", "obstacles", "segments", "gaps", "headland_tracks", "route", "turns"),
         "geofield.web.html:write",
         suffixes=(".html",),
-        drops=(_ORIGIN,),
-        crs="metric",
-        pictured=True,
     ),
 )

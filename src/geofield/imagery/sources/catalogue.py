@@ -7,6 +7,7 @@ add sources of their own in the settings file, ``[fetch.sources.NAME]``.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from geofield.imagery.sources.google import GOOGLE_TERMS
 from geofield.imagery.terms import Terms
@@ -49,102 +50,83 @@ _PNOA = (
     "&TILEMATRIXSET=GoogleMapsCompatible&TILEMATRIX={z}&TILEROW={y}&TILECOL={x}"
 )
 
+
+def _open(
+    address: str, title: str, region: str, *, attribution: str, licence: str, url: str, **more: Any
+) -> SourceEntry:
+    """Open imagery, of which tiles may be kept, and twenty are asked for in a second."""
+    terms = Terms(attribution, licence, may_cache=True, url=url)
+    known = {"kind": "xyz", "rate_per_s": 20, **more}
+    return SourceEntry(address=address, terms=terms, title=title, region=region, **known)
+
+
 BUILTIN: dict[str, SourceEntry] = {
-    "naip": SourceEntry(
-        "xyz",
+    "naip": _open(
         "https://gis.apfo.usda.gov/arcgis/rest/services/NAIP/USDA_CONUS_PRIME/ImageServer/tile/"
         "{z}/{y}/{x}",
-        Terms(
-            "USDA Farm Production and Conservation - Business Center, NAIP",
-            "public domain",
-            may_cache=True,
-            url="https://naip-usdaonline.hub.arcgis.com",
-        ),
         "NAIP, 0.6 m",
         "United States, without Alaska and Hawaii",
+        attribution="USDA Farm Production and Conservation - Business Center, NAIP",
+        licence="public domain",
+        url="https://naip-usdaonline.hub.arcgis.com",
         max_zoom=18,
-        rate_per_s=20,
     ),
-    "austria": SourceEntry(
-        "xyz",
+    "austria": _open(
         "https://maps.wien.gv.at/basemap/bmaporthofoto30cm/normal/google3857/{z}/{y}/{x}.jpeg",
-        Terms("basemap.at", "CC BY 4.0", may_cache=True, url="https://basemap.at"),
         "basemap.at orthophoto, 0.3 m",
         "Austria",
+        attribution="basemap.at",
+        licence="CC BY 4.0",
+        url="https://basemap.at",
         max_zoom=19,
-        rate_per_s=20,
     ),
-    "france": SourceEntry(
-        "xyz",
+    "france": _open(
         _GEOPF,
-        Terms(
-            "IGN-F/Géoportail",
-            "Licence Ouverte 2.0 (Etalab)",
-            may_cache=True,
-            url="https://geoservices.ign.fr",
-        ),
         "BD ORTHO, 0.2 m",
         "France",
+        attribution="IGN-F/Géoportail",
+        licence="Licence Ouverte 2.0 (Etalab)",
+        url="https://geoservices.ign.fr",
         max_zoom=19,
-        rate_per_s=20,
     ),
-    "netherlands": SourceEntry(
-        "xyz",
+    "netherlands": _open(
         "https://service.pdok.nl/hwh/luchtfotorgb/wmts/v1_0/Actueel_orthoHR/EPSG:3857/"
         "{z}/{x}/{y}.jpeg",
-        Terms(
-            "Beeldmateriaal Nederland, PDOK",
-            "CC BY 4.0",
-            may_cache=True,
-            url="https://www.pdok.nl",
-        ),
         "Luchtfoto HR, 0.08 m",
         "Netherlands",
+        attribution="Beeldmateriaal Nederland, PDOK",
+        licence="CC BY 4.0",
+        url="https://www.pdok.nl",
         max_zoom=20,
-        rate_per_s=20,
     ),
-    "nrw": SourceEntry(
-        "wmts",
+    "nrw": _open(
         "https://www.wmts.nrw.de/geobasis/wmts_nw_dop/1.0.0/WMTSCapabilities.xml",
-        Terms(
-            "Geobasis NRW",
-            "DL-DE-ZERO-2.0",
-            may_cache=True,
-            url="https://www.govdata.de/dl-de/zero-2-0",
-        ),
         "DOP, 0.1 m",
         "North Rhine-Westphalia, Germany",
+        attribution="Geobasis NRW",
+        licence="DL-DE-ZERO-2.0",
+        url="https://www.govdata.de/dl-de/zero-2-0",
+        kind="wmts",
         layer="nw_dop",
-        rate_per_s=20,
     ),
-    "spain": SourceEntry(
-        "xyz",
+    "spain": _open(
         _PNOA,
-        Terms(
-            "PNOA, cedido por © Instituto Geográfico Nacional",
-            "CC BY 4.0",
-            may_cache=True,
-            url="https://www.ign.es/web/ign/portal/info-aviso-legal",
-        ),
         "PNOA, 0.25 m",
         "Spain",
+        attribution="PNOA, cedido por © Instituto Geográfico Nacional",
+        licence="CC BY 4.0",
+        url="https://www.ign.es/web/ign/portal/info-aviso-legal",
         max_zoom=19,
-        rate_per_s=20,
     ),
-    "switzerland": SourceEntry(
-        "xyz",
+    "switzerland": _open(
         "https://wmts.geo.admin.ch/1.0.0/ch.swisstopo.swissimage/default/current/3857/"
         "{z}/{x}/{y}.jpeg",
-        Terms(
-            "© swisstopo",
-            "open government data of swisstopo, source to be named",
-            may_cache=True,
-            url="https://www.swisstopo.admin.ch/en/terms-of-use-free-geodata-and-geoservices",
-        ),
         "SWISSIMAGE, 0.1 m",
         "Switzerland",
+        attribution="© swisstopo",
+        licence="open government data of swisstopo, source to be named",
+        url="https://www.swisstopo.admin.ch/en/terms-of-use-free-geodata-and-geoservices",
         max_zoom=20,
-        rate_per_s=20,
     ),
     "google": SourceEntry(
         "google",
