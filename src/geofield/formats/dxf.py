@@ -13,7 +13,7 @@ from typing import Any
 from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats.arrow import disk_hint, exact_geometry, gdal_config
-from geofield.formats.avoided import avoided
+from geofield.formats.terminal import avoided
 from geofield.model import Dataset
 
 #: DXF layer by layer of the schema.

@@ -12,8 +12,8 @@ import shapely
 
 from geofield import schema
 from geofield.formats.arrow import exact_geometry, to_lonlat
-from geofield.formats.avoided import avoided
 from geofield.formats.origin import imagery_day, lineage
+from geofield.formats.terminal import avoided
 from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
 

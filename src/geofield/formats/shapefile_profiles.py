@@ -15,9 +15,9 @@ import shapely
 from geofield import schema
 from geofield.crs import ground_areas_m2
 from geofield.formats.arrow import cut_lonlat
-from geofield.formats.avoided import avoided, passed_through
 from geofield.formats.names import line_names, safe_name
 from geofield.formats.shapefile_layer import Column, ShapefileLayer, schema_layer
+from geofield.formats.terminal import avoided
 from geofield.model import Dataset
 
 if TYPE_CHECKING:
@@ -46,8 +46,11 @@ def generic(dataset: Dataset, customer: str, farm: str) -> Shapefiles:
     field = table.drop(columns=told)
     yield schema_layer(dataset, _FLAT / "boundary", schema.FIELD, field, before)
     yield schema_layer(dataset, _FLAT / "obstacles", schema.OBSTACLES, avoided(dataset))
-    for status, table in passed_through(dataset).items():
-        yield schema_layer(dataset, _FLAT / f"obstacles_{status}", schema.OBSTACLES, table)
+    obstacles = dataset.table("obstacles")
+    rest = obstacles[obstacles["status"].isin(schema.NOT_AVOIDED)]
+    for status, part in rest.groupby("status", sort=True):
+        place, table = _FLAT / f"obstacles_{status}", part.reset_index(drop=True)
+        yield schema_layer(dataset, place, schema.OBSTACLES, table)
     yield schema_layer(dataset, _FLAT / "guidance", schema.SEGMENTS, dataset.table("segments"))
 
 

@@ -1,13 +1,15 @@
-"""What terminals are told of a field: its main part, and obstacles that do not overlap.
+"""What machines are told of a field: what is driven around, and terminals its main part.
 
-A terminal subtracts each obstacle from the field's area, and some refuse shapes that overlap or
-leave the field: obstacles are joined where they meet and clipped to the field.
+Obstacles that a person rejected, and those that are merely possible, are not driven around:
+formats for machines leave them out, formats for people show them apart. A terminal subtracts each
+obstacle from the field's area, and some refuse shapes that overlap or leave the field: obstacles
+are joined where they meet and clipped to the field.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -15,9 +17,12 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.formats.arrow import exact_geometry
-from geofield.formats.avoided import avoided
 from geofield.model import Dataset
+from geofield.model.obstacles import active
 from geofield.model.track_statistics import SHARED_EDGE_M
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 #: Smaller pieces are left over from clipping, square metres.
 _SLIVER_M2 = 0.01
@@ -42,6 +47,11 @@ class TerminalObstacle:
     name: str
     shape: shapely.Polygon
     trees: tuple[tuple[int, shapely.Point], ...]
+
+
+def avoided(dataset: Dataset) -> gpd.GeoDataFrame:
+    """The rows of layer `obstacles` that are driven around."""
+    return active(dataset.table(schema.OBSTACLES.name)).reset_index(drop=True)
 
 
 def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[TerminalObstacle]:

@@ -15,10 +15,9 @@ from geofield.crs import ground_areas_m2
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
 from geofield.formats.arrow import exact_geometry, to_lonlat
-from geofield.formats.avoided import avoided
 from geofield.formats.names import safe_name
 from geofield.formats.origin import imagery_day
-from geofield.formats.terminal import are_bent, main_field, terminal_obstacles
+from geofield.formats.terminal import are_bent, avoided, main_field, terminal_obstacles
 from geofield.model import Dataset
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
