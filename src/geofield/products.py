@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from geofield import schema
+from geofield import __version__, schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
 from geofield.formats import format_named, write_dataset
@@ -211,8 +211,6 @@ def versions() -> dict[str, str]:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            from geofield import __version__
-
             found[name] = __version__ if name == "geofield" else "unknown"
     return found
 

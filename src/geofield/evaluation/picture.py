@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from geofield import schema
+from geofield.crs import is_metric
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
@@ -47,8 +48,6 @@ def read_obstacles(
     """
     import geopandas as gpd
     import pyogrio
-
-    from geofield.crs import is_metric
 
     check_vector(path)
     try:

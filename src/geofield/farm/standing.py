@@ -35,7 +35,7 @@ from geofield.formats.gpkg_read import is_own
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
 from geofield.model.resized import strips
 from geofield.model.review import reconcile
-from geofield.model.written import PlainShape, matches, plain, same_shapes, shapes_of_plain
+from geofield.model.written import listed, matches, plain, same_shapes, shapes_of_plain, unlisted
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
 
@@ -252,20 +252,20 @@ def with_given(plan: Plan, before: Plan) -> Plan:
     given = before.evidence.farm.get(_GIVEN, ())
     if not given or before.obstacles is None or before.field.crs != plan.field.crs:
         return plan
-    shapes = shapes_of_plain([*map(_shape, given)])
+    shapes = shapes_of_plain([*map(unlisted, given)])
     return _given(plan, before.obstacles[_is_one_of(before.obstacles.geometry, shapes)])
 
 
 def _given(plan: Plan, table: gpd.GeoDataFrame) -> Plan:
     """A plan with those rows that are new to it."""
     known = list(plan.evidence.farm.get(_GIVEN, ()))
-    now = [list(one) if isinstance(one, tuple) else one for one in plain(table.geometry)]
+    now = [*map(listed, plain(table.geometry))]
     given = {_GIVEN: [*known, *(one for one in now if one not in known)]}
     evidence = replace(plan.evidence, farm={**plan.evidence.farm, **given})
     if plan.obstacles is None:
         return replace(plan, obstacles=table, evidence=evidence)
     before, written = reconcile(plan.obstacles, plan.evidence.written, plan.grid)
-    shapes = shapes_of_plain([*map(_shape, known), *written.removed])
+    shapes = shapes_of_plain([*map(unlisted, known), *written.removed])
     new = ~_is_one_of(table.geometry, np.concatenate([before.geometry.to_numpy(), shapes]))
     if not new.any():
         return plan
@@ -282,10 +282,6 @@ def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
     parts = [part for part in (table, rows) if len(part)]
     joined = schema.conform(schema.OBSTACLES, pd.concat(parts, ignore_index=True), extras=True)
     return replace(plan, obstacles=joined, evidence=replace(plan.evidence, written=written))
-
-
-def _shape(listed: Any) -> PlainShape:
-    return listed if isinstance(listed, str) else (listed[0], listed[1], listed[2])
 
 
 def _is_one_of(shapes: Any, others: Any) -> np.ndarray:

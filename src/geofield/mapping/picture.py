@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from affine import Affine
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
@@ -61,8 +62,6 @@ def draw_map(
 
 def _plain_grid(dataset: Dataset) -> Grid:
     """A grid around the field with a margin, where there is no picture."""
-    from affine import Affine
-
     x0, y0, x1, y1 = dataset.table(schema.FIELD.name).total_bounds
     margin = 0.06 * max(x1 - x0, y1 - y0)
     x0, y0, x1, y1 = x0 - margin, y0 - margin, x1 + margin, y1 + margin
@@ -87,8 +86,6 @@ def _margins_px(dataset: Dataset, grid: Grid) -> Margins:
 
 
 def _widened(grid: Grid, margins: Margins) -> Grid:
-    from affine import Affine
-
     left, top, right, bottom = margins
     width, height = grid.width_px + left + right, grid.height_px + top + bottom
     corner = Affine.translation(-left, -top)

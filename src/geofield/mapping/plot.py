@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -194,7 +195,5 @@ def _north(dataset: Dataset) -> str:
 
 def _needed() -> None:
     """Refuse in words where matplotlib is not installed."""
-    from importlib.util import find_spec
-
     if find_spec("matplotlib") is None:
         raise GeofieldError("Drawing this needs matplotlib.", hint="pip install 'geofield[plot]'")

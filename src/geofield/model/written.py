@@ -88,8 +88,8 @@ class Written:
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; see :meth:`from_json`."""
         return {
-            "rows": [[*row[:-1], _listed(row.shape)] for row in self.rows],
-            "removed": [_listed(shape) for shape in self.removed],
+            "rows": [[*row[:-1], listed(row.shape)] for row in self.rows],
+            "removed": [listed(shape) for shape in self.removed],
         }
 
     @classmethod
@@ -97,10 +97,10 @@ class Written:
         """The record that was written with :meth:`to_json`."""
         return cls(
             tuple(
-                WrittenRow._make((number, _word(kind), _word(status), *rest, _unlisted(shape)))
+                WrittenRow._make((number, _word(kind), _word(status), *rest, unlisted(shape)))
                 for number, kind, status, *rest, shape in value["rows"]
             ),
-            tuple(_unlisted(shape) for shape in value["removed"]),
+            tuple(unlisted(shape) for shape in value["removed"]),
         )
 
 
@@ -223,9 +223,11 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else round(float(value), 6)
 
 
-def _listed(shape: PlainShape) -> list[float] | str:
+def listed(shape: PlainShape) -> list[float] | str:
+    """A shape as JSON has it."""
     return shape if isinstance(shape, str) else list(shape)
 
 
-def _unlisted(shape: Any) -> PlainShape:
+def unlisted(shape: Any) -> PlainShape:
+    """A shape of JSON."""
     return shape if isinstance(shape, str) else (shape[0], shape[1], shape[2])

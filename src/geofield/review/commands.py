@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from pydantic import ValidationError
 from shapely import Polygon
 
 from geofield import schema
@@ -148,8 +149,6 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
     if unknown:
         raise EditError(f"Tracks have no setting {unknown[0]!r}.")
     settings = plan.settings or Settings()
-    from pydantic import ValidationError
-
     try:
         tracks = TrackSettings(**said_over(settings.tracks.model_dump(), given))
     except ValidationError as error:

@@ -13,9 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 import shapely
 
+from geofield import schema
 from geofield.errors import GeofieldError
+from geofield.plan import read_plan
 from geofield.review.session import Step, planned
 from geofield.staging import log_of
 from geofield.web.view import ends_of
@@ -57,8 +60,6 @@ class LivePlans:
             return {"error": {"message": f"The question cannot be understood: {error}", "hint": ""}}
 
     def _read(self, path: Path) -> Plan:
-        from geofield.plan import read_plan
-
         key = (path, _version(path))
         if self._plan is None or key != self._key:
             self._plan, self._key = read_plan(path), key
@@ -100,9 +101,6 @@ def _edited(plan: Plan, question: Mapping[str, Any]) -> Plan:
 def _obstacles(plan: Plan, rows: list[Mapping[str, Any]]) -> gpd.GeoDataFrame:
     """The rows of the layer as the file would give them, had they been saved."""
     import geopandas as gpd
-    import pandas as pd
-
-    from geofield import schema
 
     names = [column.name for column in schema.OBSTACLES.columns]
     columns = {name: [row.get(name) for row in rows] for name in names}

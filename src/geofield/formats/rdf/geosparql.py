@@ -15,15 +15,14 @@ import numpy as np
 import pyoxigraph as ox
 import shapely
 from numpy.typing import NDArray
-from pyproj import CRS, Geod
+from pyproj import CRS
 from shapely.errors import ShapelyError
 
-from geofield.crs import LONLAT, northing_first, reproject, utm_crs
+from geofield.crs import GEOD, LONLAT, northing_first, reproject, utm_crs
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import joined, split
 from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, EPSG, GEOF, expand, node
 
-_GEOD = Geod(ellps="WGS84")
 #: Units of measure that `geof:distance` and `geof:buffer` take.
 METRE_IRIS = ("http://www.opengis.net/def/uom/OGC/1.0/metre", expand("unit:M"))
 
@@ -143,17 +142,17 @@ def distance(first: str, second: str, unit: str = METRE_IRIS[0]) -> float:
     _need_metres(unit)
     near = shapely.shortest_line(*_side_by_side([first, second]))
     (lon0, lat0), (lon1, lat1) = shapely.get_coordinates(near).tolist()
-    return float(_GEOD.inv(lon0, lat0, lon1, lat1)[2])
+    return float(GEOD.inv(lon0, lat0, lon1, lat1)[2])
 
 
 def metric_length(literal: str) -> float:
     """`geof:metricLength`: metres on the ellipsoid."""
-    return float(_GEOD.geometry_length(_shape(literal)))
+    return float(GEOD.geometry_length(_shape(literal)))
 
 
 def metric_area(literal: str) -> float:
     """`geof:metricArea`: square metres on the ellipsoid."""
-    return abs(float(_GEOD.geometry_area_perimeter(shapely.orient_polygons(_shape(literal)))[0]))
+    return abs(float(GEOD.geometry_area_perimeter(shapely.orient_polygons(_shape(literal)))[0]))
 
 
 def buffer(literal: str, radius: float, unit: str = METRE_IRIS[0]) -> str:
