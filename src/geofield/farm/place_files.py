@@ -40,7 +40,6 @@ class RawPlaces:
     crs: Any = None
     #: Whether coordinates without a CRS are degrees.
     in_degrees: bool = False
-    notes: tuple[str, ...] = ()
 
 
 def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawPlaces:

@@ -75,7 +75,7 @@ def read_places(
     raw = _without_ours(raw)
     id_name, name_name = _found(raw, id_column, ID_COLUMNS), _found(raw, name_column, NAME_COLUMNS)
     lat_name, lon_name = _found(raw, lat_column, _LAT), _found(raw, lon_column, _LON)
-    notes: list[str] = list(raw.notes)
+    notes: list[str] = []
     kept = np.arange(raw.table.num_rows)
     outlines, part = None, np.zeros(raw.table.num_rows, dtype=np.int64)
     source = LONLAT

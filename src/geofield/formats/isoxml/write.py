@@ -148,12 +148,12 @@ def _add_polygons(
     placed = np.array([shape for _, _, shape in shapes], dtype=object)
     areas_m2 = ground_areas_m2(placed, dataset.crs)
     rows = zip(shapes, areas_m2, to_lonlat(placed, dataset.crs), strict=True)
-    for (kind, each, _), area_m2, lonlat in rows:
-        _add_polygon(part, kind, each, area_m2, lonlat)
+    part.extend(_polygon(kind, each, area_m2, lonlat) for (kind, each, _), area_m2, lonlat in rows)
     trees = [tree for each in obstacles for tree in each.trees] if version == 4 else []
     centres = to_lonlat(np.array([centre for _, centre in trees], dtype=object), dataset.crs)
     for (number, _), centre in zip(trees, centres, strict=True):
-        _add_point(part, PointType.OBSTACLE, centre.x, centre.y, name=f"Obstacle {number}")
+        place = (centre.x, centre.y)
+        part.append(_point(PointType.OBSTACLE, place, B=f"Obstacle {number}"))
 
 
 def _headland(dataset: Dataset, polygon: Any, options: Mapping[str, Any]) -> list[Any]:
@@ -167,18 +167,11 @@ def _headland(dataset: Dataset, polygon: Any, options: Mapping[str, Any]) -> lis
     return [shapely.Polygon(part.exterior) for part in main_field(dataset, polygon)]
 
 
-def _add_polygon(
-    part: ET.Element, kind: PolygonType, name: str, area_m2: float, lonlat: Any
-) -> None:
-    element = ET.SubElement(
-        part, "PLN", A=kind, B=cut_name(name, DESIGNATOR), C=str(round(area_m2))
-    )
+def _polygon(kind: PolygonType, name: str, area_m2: float, lonlat: Any) -> ET.Element:
     rings = [(LineType.EXTERIOR, lonlat.exterior)]
     rings += [(LineType.INTERIOR, ring) for ring in lonlat.interiors]
-    for role, ring in rings:
-        line = ET.SubElement(element, "LSG", A=role)
-        for lon, lat in ring.coords:
-            _add_point(line, PointType.OTHER, lon, lat)
+    lines = (node("LSG", {"A": role}, *_points(ring)) for role, ring in rings)
+    return node("PLN", *lines, A=kind, B=cut_name(name, DESIGNATOR), C=str(round(area_m2)))
 
 
 def _add_guidance_groups(part: ET.Element, dataset: Dataset, numbers: Iterator[int]) -> None:
@@ -206,10 +199,8 @@ def _group(
 ) -> ET.Element:
     inner = len(lonlat.coords) - 2
     straight = {} if inner else {"G": f"{_heading_deg(lonlat):.4f}"}
-    line = node("LSG", {"A": LineType.GUIDANCE}, width)
     kinds = [PointType.GUIDANCE_A, *[PointType.GUIDANCE_POINT] * inner, PointType.GUIDANCE_B]
-    for kind, (lon, lat) in zip(kinds, lonlat.coords, strict=True):
-        _add_point(line, kind, lon, lat)
+    line = node("LSG", {"A": LineType.GUIDANCE}, width, *map(_point, kinds, lonlat.coords))
     pattern = node(
         "GPN",
         {"A": f"GPN{number}", "B": name, "C": Guidance.CURVE if inner else Guidance.AB},
@@ -225,10 +216,7 @@ def _group(
 def _add_guidance_lines(part: ET.Element, dataset: Dataset) -> None:
     width = _width(_pattern(dataset))
     for name, lonlat in _lines(dataset):
-        line = node("LSG", {"A": LineType.GUIDANCE, "B": name}, width)
-        for lon, lat in lonlat.coords:
-            _add_point(line, PointType.OTHER, lon, lat)
-        part.append(line)
+        part.append(node("LSG", {"A": LineType.GUIDANCE, "B": name}, width, *_points(lonlat)))
 
 
 def _lines(dataset: Dataset) -> Iterator[tuple[str, Any]]:
@@ -239,14 +227,14 @@ def _lines(dataset: Dataset) -> Iterator[tuple[str, Any]]:
     return zip(names, placed, strict=True)
 
 
-def _add_point(
-    parent: ET.Element, kind: PointType, lon: float, lat: float, *, name: str = ""
-) -> None:
-    point = ET.SubElement(parent, "PNT", A=kind)
-    if name:
-        point.set("B", cut_name(name, DESIGNATOR))
-    point.set("C", f"{lat:.{DECIMALS}f}")
-    point.set("D", f"{lon:.{DECIMALS}f}")
+def _points(line: Any) -> Iterator[ET.Element]:
+    return (_point(PointType.OTHER, place) for place in line.coords)
+
+
+def _point(kind: PointType, place: tuple[float, float], **name: str) -> ET.Element:
+    lon, lat = place
+    position = {"C": f"{lat:.{DECIMALS}f}", "D": f"{lon:.{DECIMALS}f}"}
+    return node("PNT", {"A": kind}, name, position)
 
 
 def _heading_deg(line: Any) -> float:
