@@ -133,10 +133,13 @@ def _end_stopped() -> NoReturn:
 
 
 def _end_if_known(error: Exception) -> None:
-    """End with a message where an error of no kind of our own has a plain reason."""
+    """End with a message where an error is one of our own, or has a plain reason."""
     if was_stopped():
         # A library that was calling back makes an error of its own of a stop.
         _end_stopped()
+    if isinstance(error, GeofieldError):
+        say_error(error.message, error.hint)
+        sys.exit(error.exit_code)
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         place = error.filename or "what was printed has no room"
         say_error(f"The disk is full: {place}.", "Free some space, then repeat.")
@@ -229,11 +232,6 @@ def _run(args: list[str] | None) -> None:
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt):
             _end_stopped()
-        except GeofieldError as error:
-            if was_stopped():
-                _end_stopped()
-            say_error(error.message, error.hint)
-            sys.exit(error.exit_code)
         except Exception as error:
             _end_if_known(error)
             raise

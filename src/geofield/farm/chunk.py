@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import pyarrow as pa
 
 from geofield import __version__
-from geofield.errors import FormatError, GeofieldError
+from geofield.errors import FormatError
 from geofield.farm.folder import sweep_chunk, write_chunk
 from geofield.farm.layers import tables_of
 from geofield.farm.limits import Limits, Watch
@@ -107,8 +107,6 @@ def _planned(place: Place, orders: Orders) -> tuple[Plan | None, Outcome]:
             previous = reviewed_plan(orders.store, place.field_id) if is_reviewed else None
             plan = plan_place(place, orders.job, previous)
             words = outcome_words(plan)
-        except GeofieldError as error:
-            words = in_words(error)
         except Exception as error:  # noqa: BLE001 - a fault in one field must not stop a million
             words = in_words(error)
     return plan, _outcome(

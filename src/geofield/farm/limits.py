@@ -74,11 +74,9 @@ class Watch:
             if self._limits.time_s is not None and took_s > self._limits.time_s:
                 self._marks.over_time(at, self._limits.time_s)
                 os._exit(OVER_LIMIT)
-            if self._limits.memory_mb is not None:
-                used_mb = memory_mb()
-                if used_mb > self._limits.memory_mb:
-                    self._marks.over_memory(at, self._limits.memory_mb)
-                    os._exit(OVER_LIMIT)
+            if self._limits.memory_mb is not None and memory_mb() > self._limits.memory_mb:
+                self._marks.over_memory(at, self._limits.memory_mb)
+                os._exit(OVER_LIMIT)
 
     @contextmanager
     def watching(self) -> Iterator[Watch]:

@@ -67,17 +67,12 @@ class Marks:
             kind, _, rest = line.partition(" ")
             if begun is not None and kind == _BEGIN:
                 self.deaths[begun] += 1
-            if kind == _BEGIN:
-                begun = int(rest)
-            elif kind == _END:
+            begun = int(rest) if kind == _BEGIN else None
+            if kind == _END:
                 self.deaths.pop(int(rest), None)
-                begun = None
             elif kind in (_TIME, _MEMORY):
                 at, _, value = rest.partition(" ")
                 self.over[int(at)] = (kind, float(value))
-                begun = None
-            else:
-                begun = None
         if begun is not None:
             self.deaths[begun] += 1
 

@@ -76,5 +76,4 @@ def status_table(outcomes: Sequence[Outcome]) -> pa.Table:
 def outcomes_of(table: pa.Table) -> list[dict[str, Any]]:
     """The rows of a status table as arguments of :class:`Outcome`."""
     rows = table.drop_columns("geometry").to_pylist()
-    may_miss = ("certainty",)
-    return [{k: v for k, v in row.items() if v is not None or k in may_miss} for row in rows]
+    return [{k: v for k, v in row.items() if v is not None or k == "certainty"} for row in rows]

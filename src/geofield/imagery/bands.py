@@ -241,22 +241,17 @@ def _from_count(roles: list[str], looks: Sequence[Look]) -> tuple[list[str], tup
     if "alpha" not in roles and len(pictures) in (2, 4) and looks[last] == "mask":
         roles[last] = "alpha"
         pictures = pictures[:-1]
-    if len(pictures) < 3:
-        for n, i in enumerate(pictures):
-            roles[i] = "grey" if n == 0 else "other"
-        if len(pictures) == 2:
-            return roles, ("The first of two bands is taken as brightness.",)
-        return roles, ()
+    count = len(pictures)
+    is_nir = count == 4 and looks[pictures[3]] not in ("flat", "empty")
+    order = ["red", "green", "blue", *["nir"] * is_nir] if count > 2 else ["grey"]
     for n, i in enumerate(pictures):
-        roles[i] = ("red", "green", "blue", "nir")[n] if n < min(4, len(pictures)) else "other"
-    if len(pictures) > 4:
-        roles[pictures[3]] = "other"
+        roles[i] = order[n] if n < len(order) else "other"
+    if count == 2:
+        return roles, ("The first of two bands is taken as brightness.",)
+    if count > 4:
         return roles, (
-            f"The first three of {len(pictures)} unnamed bands are taken as red, green, blue; "
-            f"{_HOW}.",
+            f"The first three of {count} unnamed bands are taken as red, green, blue; {_HOW}.",
         )
-    if len(pictures) == 4 and looks[pictures[3]] in ("flat", "empty"):
-        roles[pictures[3]] = "other"
-    elif len(pictures) == 4:
+    if is_nir:
         return roles, (f"Four unnamed bands are taken as red, green, blue, near infrared; {_HOW}.",)
     return roles, ()

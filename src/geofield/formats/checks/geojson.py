@@ -59,9 +59,7 @@ def _check_feature(feature: Any, where: str) -> Iterator[Finding]:
         )
     for polygon in shapely.get_parts(shape):
         if polygon.geom_type == "Polygon" and not polygon.is_empty:
-            wrong = not shapely.is_ccw(polygon.exterior)
-            wrong = wrong or any(shapely.is_ccw(ring) for ring in polygon.interiors)
-            if wrong:
-                yield Finding(
-                    "error", where, "rings do not follow the right-hand rule (section 3.1.6)"
-                )
+            inner = any(shapely.is_ccw(ring) for ring in polygon.interiors)
+            if inner or not shapely.is_ccw(polygon.exterior):
+                words = "rings do not follow the right-hand rule (section 3.1.6)"
+                yield Finding("error", where, words)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 from geofield.formats.foreign import files_in
 from geofield.formats.validation import Finding
 
-_PARTS = {
+_PARTS: dict[str, tuple[Literal["error", "warning"], str]] = {
     ".shx": ("error", "the index"),
     ".dbf": ("error", "the attributes"),
     ".prj": ("warning", "the CRS: readers will guess"),
@@ -23,11 +24,7 @@ def check(path: Path) -> Iterator[Finding]:
         beside = {other.name.lower() for other in file.parent.iterdir()}
         for suffix, (level, what) in _PARTS.items():
             if f"{file.stem}{suffix}".lower() not in beside:
-                yield Finding(
-                    "error" if level == "error" else "warning",
-                    file.name,
-                    f"{file.stem}{suffix} is missing: {what}",
-                )
+                yield Finding(level, file.name, f"{file.stem}{suffix} is missing: {what}")
         with file.open("rb") as content:
             header = content.read(28)
         if len(header) < 28 or header[:4] != _SHAPE_FILE_CODE:
