@@ -106,6 +106,7 @@ def left_out(fold: int) -> Learned:
     net, table = f"outline_{fold}", f"outline_ranking_{fold}"
     for file, tool in (
         (f"{net}.onnx", f"train_outlines.py --without {fold}"),
+        (f"{net}_points.onnx", f"train_outlines.py --without {fold}"),
         (f"{net}.json", f"train_outlines.py --without {fold}"),
         (f"{table}.json", "train_ranking.py"),
     ):

@@ -6,6 +6,8 @@ together: 400 outlines are too few to learn that from.
 
 from __future__ import annotations
 
+from typing import Any, Literal
+
 import torch
 from tiny_vit import WIDTHS as KNOWN
 from tiny_vit import Mlp, TinyViT, attended
@@ -18,6 +20,8 @@ WINDOWS = (0, 8, 16, 8)
 REDUCED = (24, 32, 64, 96)
 #: Channels of the U-Net at each depth; so many of the upper ones compare with the points.
 WIDTHS, COMPARED = (32, 48, 96, 128), 2
+#: What is seen in a picture: at these shares of its side, and beside the encoder.
+FEATURES = ("quarter", "eighth", "sixteenth", "stem", "colours")
 #: The depth at which every place asks every other, its side, and by how many heads.
 EVERYWHERE, EVERYWHERE_SIDE, HEADS = 2, 16, 4
 
@@ -104,11 +108,19 @@ class OutlineNet(nn.Module):
 
     def forward(self, bands: Tensor, points: Tensor) -> Tensor:
         """Log odds of belonging, at a quarter of the resolution."""
+        return self.odds(*self.picture(bands), points)
+
+    def picture(self, bands: Tensor) -> tuple[Tensor, ...]:
+        """What is seen in a picture whichever points are meant, in the order of `FEATURES`."""
         seen = [to(one) for to, one in zip(self.reduced, self.encoder(bands), strict=True)]
-        known = [seen[0], seen[1], torch.cat(seen[2:], 1)]
-        quarter = functional.avg_pool2d(bands, 4)
+        deep = torch.cat(seen[2:], 1)
+        return seen[0], seen[1], deep, self.stem(bands), functional.avg_pool2d(bands, 4)
+
+    def odds(self, *given: Tensor) -> Tensor:
+        """Log odds of belonging, from what is seen and the maps of the points."""
+        *known, stem, colours, points = given
         at_points = points[:, :1]
-        x = torch.cat([self.stem(bands), quarter, unlike(quarter, at_points), points], 1)
+        x = torch.cat([stem, colours, unlike(colours, at_points), points], 1)
         kept = []
         for at, block in enumerate(self.down):
             if at:
@@ -135,24 +147,13 @@ def unlike(x: Tensor, at_points: Tensor) -> Tensor:
     return torch.abs(x - (x * share).sum((2, 3), keepdim=True))
 
 
-class Whole(nn.Module):
-    """The network with one input, as it is run.
+class Step(nn.Module):
+    """A step of the network, as it is run: `picture` is kept for all points, `odds` asked anew."""
 
-    Parameters
-    ----------
-    net : OutlineNet
-    bands : int
-        So many of the input's channels are of the picture, the others maps of the points, at the
-        resolution of the picture.
-    reduction : int
-        Pixels of the picture to one of the answer.
-    """
-
-    def __init__(self, net: OutlineNet, bands: int, reduction: int) -> None:
+    def __init__(self, net: OutlineNet, step: Literal["picture", "odds"]) -> None:
         super().__init__()
-        self.net, self.bands, self.reduction = net, bands, reduction
+        self.net, self.step = net, step
 
-    def forward(self, x: Tensor) -> Tensor:
-        """Log odds of belonging."""
-        points = functional.avg_pool2d(x[:, self.bands :], self.reduction)
-        return self.net(x[:, : self.bands], points)
+    def forward(self, *given: Tensor) -> Any:
+        """Apply."""
+        return getattr(self.net, self.step)(*given)

@@ -47,6 +47,7 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -56,7 +57,7 @@ from numpy.typing import NDArray
 from onnx_file import finish
 from outline_cases import FOLDS, TABLES, fold_of
 from outline_lessons import FURTHER, MOST_FURTHER, Asked, Kept, Lessons
-from outline_network import OutlineNet, Whole
+from outline_network import FEATURES, OutlineNet, Step
 from outline_pictures import SIMULATION, Picture, kinds, read
 from tiny_vit import pretrained
 from torch import Tensor, nn
@@ -215,19 +216,15 @@ def train(options: argparse.Namespace) -> None:
 def write(learner: Learner, lessons: Lessons, options: argparse.Namespace) -> None:
     """Write the network and what it was trained on."""
     net = learner.average.to("cpu", memory_format=torch.contiguous_format)
-    shown = torch.zeros(1, len(BANDS) + len(POINTS), SIDE_PX, SIDE_PX)
-    shown[:, len(BANDS) :] = 1.0
-    whole = Whole(net, len(BANDS), SIDE_PX // ANSWER_PX).eval()
     file = options.out or (
         LEARNED / "outline.onnx"
         if options.without is None
         else LEFT_OUT / f"outline_{options.without}.onnx"
     )
-    torch.onnx.export(whole, (shown,), str(file), opset_version=17, dynamo=False)
-    finish(file)
     facts = {
         "inputs": [*BANDS, *POINTS],
         "outputs": ["log_odds"],
+        "steps": write_steps(net, file),
         "learned_by": "tools/train_outlines.py",
         "learned_with": learned_with(
             [*(table for _, table, _ in TABLES), pretrained()],
@@ -243,6 +240,34 @@ def write(learner: Learner, lessons: Lessons, options: argparse.Namespace) -> No
     }
     text = json.dumps(facts, indent=1).replace(",\n  ", ", ")
     file.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+
+
+def write_steps(net: OutlineNet, file: Path) -> list[dict[str, Any]]:
+    """Write what sees the picture, and beside it what is asked about points; what each takes."""
+    bands = torch.zeros(1, len(BANDS), SIDE_PX, SIDE_PX)
+    points = torch.ones(1, len(POINTS), ANSWER_PX, ANSWER_PX)
+    with torch.no_grad():
+        seen = net.picture(bands)
+    asked = dict(zip(FEATURES, seen, strict=True), points=points)
+    steps = (
+        ("", Step(net, "picture").eval(), {"bands": bands}, FEATURES),
+        ("_points", Step(net, "odds").eval(), asked, ("log_odds",)),
+    )
+    told = []
+    for suffix, step, given, gives in steps:
+        part = file.with_stem(file.stem + suffix)
+        torch.onnx.export(
+            step,
+            tuple(given.values()),
+            str(part),
+            input_names=list(given),
+            output_names=list(gives),
+            opset_version=17,
+            dynamo=False,
+        )
+        finish(part)
+        told.append({"suffix": suffix, "takes": list(given), "gives": list(gives)})
+    return told
 
 
 def main() -> None:

@@ -44,6 +44,7 @@ import pickle
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -290,7 +291,8 @@ def write(ranking: Ranking, file: Path, folds: Sequence[int]) -> None:
         }
         for n, name in enumerate(ranking.names)
     ]
-    networks = [LEFT_OUT / f"outline_{fold}.onnx" for fold in folds]
+    steps = product(folds, ("", "_points"))
+    networks = [LEFT_OUT / f"outline_{fold}{step}.onnx" for fold, step in steps]
     table = {
         "learned_by": "tools/train_ranking.py",
         "learned_with": learned_with([*networks, *(table for _, table, _ in TABLES)]),

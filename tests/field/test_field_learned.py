@@ -22,7 +22,8 @@ from geofield.field.ranking import Ranking, exact, log_odds, trained
 from geofield.field.said import Said
 from geofield.field.search import Candidate
 from geofield.field.straight import ring
-from geofield.learned import Network, network
+from geofield.learned import network
+from geofield.learned.network import Step
 from geofield.simulate import SimulationSettings, simulate_field
 
 OUTLINES = (
@@ -190,7 +191,8 @@ def test_a_search_asks_what_it_was_given_and_nothing_else(include, exclude, monk
     # Wider than the first view: the network is asked whether its ground goes on, too.
     truth = simulate_field(101, SimulationSettings(width_px=640, height_px=640))
     known = shipped()
-    own = Learned(replace(known.network, name="own"), replace(known.ranking))
+    steps = tuple(replace(step) for step in known.network.steps)
+    own = Learned(replace(known.network, steps=steps), replace(known.ranking))
     asked: dict[str, set[int]] = {}
 
     def watched(kind, name):
@@ -202,7 +204,7 @@ def test_a_search_asks_what_it_was_given_and_nothing_else(include, exclude, monk
 
         monkeypatch.setattr(kind, name, call)
 
-    watched(Network, "__call__")
+    watched(Step, "__call__")
     for name in ("scores", "exactness", "certainty"):
         watched(Ranking, name)
 
@@ -224,9 +226,9 @@ def test_a_search_asks_what_it_was_given_and_nothing_else(include, exclude, monk
         return field, asked["__call__"], rankings
 
     field, *answered = found(FieldSearch((truth.lon, truth.lat), own))
-    assert answered == [{id(own.network)}, {id(own.ranking)}]
+    assert answered == [{id(step) for step in own.network.steps}, {id(own.ranking)}]
     usual, *answered = found(None)
-    assert answered == [{id(known.network)}, {id(known.ranking)}]
+    assert answered == [{id(step) for step in known.network.steps}, {id(known.ranking)}]
     assert usual.polygon == field.polygon
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from geofield.field.learned import shipped
+from geofield.field.network import ANSWER_PX, BANDS, POINTS, SIDE_PX
 from geofield.field.ranking import trained
 from geofield.learned import facts
 
@@ -79,7 +80,8 @@ def test_a_network_was_learned_from_the_tables_that_lie_here(fold):
 @pytest.mark.parametrize("fold", [None, *range(FOLDS)])
 def test_a_ranking_was_learned_behind_the_networks_of_its_folds(fold):
     """What is shipped behind all three, table K behind the two of the other folds."""
-    behind = [f"outline_{other}.onnx" for other in range(FOLDS) if other != fold]
+    others = [other for other in range(FOLDS) if other != fold]
+    behind = [f"outline_{other}{step}.onnx" for other in others for step in ("", "_points")]
     known = (
         told("outline_ranking", None) if fold is None else told(f"outline_ranking_{fold}", LEFT_OUT)
     )
@@ -95,7 +97,12 @@ def test_a_missing_model_is_told_with_how_to_learn_it(tmp_path, monkeypatch):
 
 def test_a_network_that_has_seen_the_fold_judges_none_of_it(tmp_path, monkeypatch):
     """Whatever the file is called: outlines of the fold were learned from."""
-    for file in ("outline_0.onnx", "outline_0.json", "outline_ranking_0.json"):
+    for file in (
+        "outline_0.onnx",
+        "outline_0_points.onnx",
+        "outline_0.json",
+        "outline_ranking_0.json",
+    ):
         (tmp_path / file.replace("_0", "_1")).write_bytes((LEFT_OUT / file).read_bytes())
     monkeypatch.setattr(outline_cases, "LEFT_OUT", tmp_path)
     with pytest.raises(ValueError, match="learned from sites of fold 1"):
@@ -105,9 +112,11 @@ def test_a_network_that_has_seen_the_fold_judges_none_of_it(tmp_path, monkeypatc
 ASKED = """
 import pickle, sys
 import numpy as np
-known, batch, figures = pickle.load(sys.stdin.buffer)
-again = known.network(batch), known.ranking.scores(figures), known.ranking.exactness(figures)
-pickle.dump((*again, known.ranking.calibration, known.network.folder), sys.stdout.buffer)
+known, bands, points, figures = pickle.load(sys.stdin.buffer)
+sees, told = known.network.steps
+ranking = known.ranking
+again = told(*sees(bands), points)[0], ranking.scores(figures), ranking.exactness(figures)
+pickle.dump((*again, ranking.calibration, known.network.folder), sys.stdout.buffer)
 """
 
 
@@ -115,18 +124,20 @@ pickle.dump((*again, known.ranking.calibration, known.network.folder), sys.stdou
 def test_what_was_learned_travels_to_other_processes(which):
     known = shipped() if which == "shipped" else left_out(which)
     rng = np.random.default_rng(2)
-    batch = rng.normal(size=(1, len(known.network.inputs), 256, 256)).astype(np.float32)
+    bands = rng.normal(size=(1, len(BANDS), SIDE_PX, SIDE_PX)).astype(np.float32)
+    points = rng.uniform(size=(1, len(POINTS), ANSWER_PX, ANSWER_PX)).astype(np.float32)
     names = known.ranking.names
     values = rng.normal(size=(3, len(names)))
     figures = [dict(zip(names, row, strict=True)) for row in values]
     answer = subprocess.run(
         [sys.executable, "-c", ASKED],
-        input=pickle.dumps((known, batch, figures)),
+        input=pickle.dumps((known, bands, points, figures)),
         capture_output=True,
         check=True,
     ).stdout
     odds, scores, exactness, calibration, folder = pickle.loads(answer)
-    assert np.array_equal(odds, known.network(batch))
+    sees, asked = known.network.steps
+    assert np.array_equal(odds, asked(*sees(bands), points)[0])
     assert np.array_equal(scores, known.ranking.scores(figures))
     assert np.array_equal(exactness, known.ranking.exactness(figures))
     assert calibration == known.ranking.calibration
@@ -140,4 +151,4 @@ def test_nothing_that_is_installed_knows_the_left_out_models():
     for file in (ROOT / "src").rglob("*.py"):
         assert not place.search(file.read_text("utf-8")), file
     assert shipped().network.folder is None
-    assert not [one for one in (ROOT / "src").rglob("outline_*") if re.search(r"_\d\.", one.name)]
+    assert not [one for one in (ROOT / "src").rglob("outline_*") if re.search(r"_\d", one.name)]

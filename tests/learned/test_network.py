@@ -14,7 +14,7 @@ import pytest
 
 from geofield.errors import GeofieldError
 from geofield.field.looks import seen
-from geofield.field.network import shown
+from geofield.field.network import BANDS, POINTS, features, points_maps
 from geofield.learned import facts, network
 from geofield.obstacles.crowns import (
     CELL_PX,
@@ -122,16 +122,38 @@ def test_every_output_of_the_network_has_a_part(crowns, picture, trees, monkeypa
 def test_every_channel_of_the_outlines_network_has_a_part(simulated):
     """Two inputs swapped change the answer, whichever they are."""
     outlines = network("outline")
-    picture = seen(simulated.scene)
+    assert outlines.inputs == (*BANDS, *POINTS)
+    picture = seen(simulated.scene, outlines)
     bands = picture.bands(picture.whole)
-    batch = shown(bands, [(128.5, 120.5), (90.5, 150.5)], [(10.5, 20.5)])
-    assert batch.shape[1] == len(outlines.inputs)
-    right = outlines(batch)
-    for i, j in itertools.combinations(range(batch.shape[1]), 2):
-        order = np.arange(batch.shape[1])
-        order[[i, j]] = j, i
-        change = np.abs(outlines(batch[:, order]) - right).max()
-        assert change > 0.05, (outlines.inputs[i], outlines.inputs[j])
+    maps = points_maps([(128.5, 120.5), (90.5, 150.5)], [(10.5, 20.5)])
+
+    def answer(bands, maps):
+        return outlines.steps[1](*features(outlines, bands), maps[None])[0]
+
+    right = answer(bands, maps)
+    for i, j in itertools.combinations(range(len(BANDS)), 2):
+        assert np.abs(answer(swapped(bands, i, j), maps) - right).max() > 0.05, (BANDS[i], BANDS[j])
+    for i, j in itertools.combinations(range(len(POINTS)), 2):
+        change = np.abs(answer(bands, swapped(maps, i, j)) - right).max()
+        assert change > 0.05, (POINTS[i], POINTS[j])
+
+
+def swapped(channels, i, j):
+    order = np.arange(len(channels))
+    order[[i, j]] = j, i
+    return channels[order]
+
+
+def test_every_feature_that_one_step_hands_to_the_next_has_a_part(simulated):
+    outlines = network("outline")
+    picture = seen(simulated.scene, outlines)
+    known = features(outlines, picture.bands(picture.whole))
+    assert outlines.steps[0].gives == outlines.steps[1].takes[:-1]
+    maps = points_maps([(128.5, 120.5)], [])[None]
+    (right,) = outlines.steps[1](*known, maps)
+    for number, name in enumerate(outlines.steps[0].gives):
+        other = [one[:, ::-1] if k == number else one for k, one in enumerate(known)]
+        assert np.abs(outlines.steps[1](*other, maps)[0] - right).max() > 0.05, name
 
 
 def test_threads_and_pickles_get_the_same_answer(crowns, picture):
@@ -149,6 +171,8 @@ def test_wrong_channels_are_refused(crowns, picture):
         crowns(np.zeros((1, 3, 32, 32), np.float32))
     with pytest.raises(ValueError, match="takes"):
         crowns.stacked(red=0.0)
+    with pytest.raises(ValueError, match="zip"):
+        network("outline").steps[1](np.zeros((1, 24, 64, 64), np.float32))
 
 
 def test_an_unknown_network_is_told(tmp_path):
@@ -160,7 +184,7 @@ def test_an_unknown_network_is_told(tmp_path):
 
 def test_a_network_of_another_folder_is_told_from_that_of_the_package(tmp_path):
     package = files("geofield.learned")
-    for file in ("outline.json", "outline.onnx"):
+    for file in ("outline.json", "outline.onnx", "outline_points.onnx"):
         (tmp_path / file).write_bytes((package / file).read_bytes())
     other, own = network("outline", tmp_path), network("outline")
     assert other is not own

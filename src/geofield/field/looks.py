@@ -7,14 +7,21 @@ truth by .823 instead of .814 in four bands, .816 (.809) in colour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from geofield.field.network import ANSWER_PX, SIDE_PX, Points, normalised, shown
+from geofield.field.network import (
+    ANSWER_PX,
+    SIDE_PX,
+    Features,
+    Points,
+    features,
+    log_odds,
+    normalised,
+)
 from geofield.field.segmentation import part_at
 from geofield.learned.network import Network
 from geofield.model import Scene
@@ -64,15 +71,21 @@ class Seen:
     valid : bool array (rows, columns)
     scale : float
         Pixels of these along one of the scene.
+    network : Network
+        The one that is asked.
     times : int
         So many pixels of the scene were made along one that it came with.
+    shown : dict
+        What the network saw in each part, kept for further points.
     """
 
     rgb: FloatArray
     nir: FloatArray | None
     valid: BoolArray
     scale: float
+    network: Network
     times: int = 1
+    shown: dict[Square, Features] = field(default_factory=dict)
 
     @property
     def whole(self) -> Square:
@@ -86,18 +99,12 @@ class Seen:
         valid = _framed(self.valid.astype(np.float32), part) > 0.5
         return normalised(rgb, nir, valid)
 
-    @cached_property
-    def _whole_bands(self) -> FloatArray:
-        """What every further point is asked with again."""
-        return self.bands(self.whole)
-
     def probability(
         self,
         include: Points,
         exclude: Points,
         shape: tuple[int, int],
         factor: int,
-        network: Network,
         *,
         once: bool = False,
     ) -> FloatArray:
@@ -110,30 +117,29 @@ class Seen:
         shape : (int, int)
             Rows and columns of the reduced scene.
         factor : int
-        network : Network
-            The one that is asked.
         once : bool
             Look at the whole picture alone.
         """
         scale = factor * self.scale
         belong, apart = ([(x * scale, y * scale) for x, y in one] for one in (include, exclude))
-        first = self._look(self.whole, belong, apart, network)
+        first = self._look(self.whole, belong, apart)
         odds = _onto(first, self.whole, shape, scale)
         near = None if once else self._near(first, belong)
         if near is not None:
-            second = _onto(self._look(near, belong, apart, network), near, shape, scale)
+            second = _onto(self._look(near, belong, apart), near, shape, scale)
             row, column = ((np.arange(length) + 0.5) * scale for length in shape)
             share = _SECOND * near.holds(column, row[:, None])
             odds += share.astype(np.float32) * (second - odds)
         return np.asarray(expit(odds), dtype=np.float32)
 
-    def _look(self, part: Square, include: Points, exclude: Points, network: Network) -> FloatArray:
+    def _look(self, part: Square, include: Points, exclude: Points) -> FloatArray:
         """Log odds of belonging in a part, (ANSWER_PX, ANSWER_PX)."""
         belong, apart = (
             [part.of(x, y) for x, y in one if part.holds(x, y)] for one in (include, exclude)
         )
-        bands = self._whole_bands if part == self.whole else self.bands(part)
-        return np.asarray(network(shown(bands, belong, apart))[0, 0])
+        if part not in self.shown:
+            self.shown[part] = features(self.network, self.bands(part))
+        return log_odds(self.network, self.shown[part], belong, apart)
 
     def _near(self, odds: FloatArray, include: Points) -> Square | None:
         """The part that holds the ground at the points, unless that is most of the picture."""
@@ -159,12 +165,13 @@ class Seen:
         return Square(left, top, side)
 
 
-def seen(scene: Scene, times: int = 1) -> Seen:
-    """A scene, kept for the network's looks.
+def seen(scene: Scene, network: Network, times: int = 1) -> Seen:
+    """A scene, kept for a network's looks.
 
     Parameters
     ----------
     scene : Scene
+    network : Network
     times : int
         So many of its pixels were made along one that it came with.
     """
@@ -180,7 +187,7 @@ def seen(scene: Scene, times: int = 1) -> Seen:
     else:
         rgb = np.repeat(kept(scene.grey)[None], 3, axis=0)
     nir = None if scene.nir is None else kept(scene.nir)
-    return Seen(rgb, nir, kept(scene.valid) > 0.5, scale, times)
+    return Seen(rgb, nir, kept(scene.valid) > 0.5, scale, network, times)
 
 
 def _resized(band: FloatArray, size: tuple[int, int]) -> FloatArray:

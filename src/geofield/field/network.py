@@ -1,8 +1,8 @@
 """Network: what is shown to the network that says which ground belongs to the field.
 
 A small network (`learned/outline.onnx`, trained by `tools/train_outlines.py`) sees a picture at one
-size, the points that belong to the field and those that do not. Its answer is coarse: it says which
-ground; where exactly that ends is asked of the picture itself.
+size, and is told the points that belong to the field and those that do not (`outline_points.onnx`).
+Its answer is coarse: it says which ground; where exactly that ends is asked of the picture itself.
 """
 
 from __future__ import annotations
@@ -12,9 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield.learned.network import Network
+
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 Points = Sequence[tuple[float, float]]
+Features = tuple[FloatArray, ...]
 
 #: Sides of the picture that the network sees, and of its answer, pixels.
 SIDE_PX, ANSWER_PX = 256, 64
@@ -70,17 +73,28 @@ def points_maps(include: Points, exclude: Points) -> FloatArray:
     return np.stack(maps).astype(np.float32)
 
 
-def shown(bands: FloatArray, include: Points, exclude: Points) -> FloatArray:
-    """The network's input, a batch of one.
+def features(network: Network, bands: FloatArray) -> Features:
+    """What the network sees in a picture, whichever points are meant: four fifths of its work.
 
     Parameters
     ----------
+    network : Network
     bands : float32 array (bands, SIDE_PX, SIDE_PX)
         As `normalised` gives them.
+    """
+    return network.steps[0](bands[None])
+
+
+def log_odds(network: Network, picture: Features, include: Points, exclude: Points) -> FloatArray:
+    """Log odds of belonging to the field that points mean, (ANSWER_PX, ANSWER_PX).
+
+    Parameters
+    ----------
+    network : Network
+    picture : tuple of float32 array
+        What it sees there, as `features` gives it.
     include, exclude : sequence of (float, float)
         Points that belong and that do not, pixel coordinates of `SIDE_PX`.
     """
-    often = SIDE_PX // ANSWER_PX
-    maps = points_maps(include, exclude)
-    large = np.repeat(np.repeat(maps, often, axis=1), often, axis=2)
-    return np.concatenate([bands, large])[None]
+    (odds,) = network.steps[1](*picture, points_maps(include, exclude)[None])
+    return np.asarray(odds[0, 0])

@@ -137,9 +137,7 @@ class WindowSearch:
         self, include: Points, exclude: Points, *, once: bool = False
     ) -> NDArray[np.float32]:
         points = (self.seed_px, *include), exclude
-        likely = self.seen.probability(
-            *points, self.frame.shape, self.factor, self.learned.network, once=once
-        )
+        likely = self.seen.probability(*points, self.frame.shape, self.factor, once=once)
         return likely if self.frame.inside is None else likely * self.frame.inside
 
     def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
@@ -274,7 +272,7 @@ def search_field(
     y_px: float,
     *,
     learned: Learned | None = None,
-    times: int = 1,
+    looks: Seen | None = None,
 ) -> WindowSearch:
     """Make a scene ready.
 
@@ -285,8 +283,8 @@ def search_field(
         The seed, pixel coordinates.
     learned : Learned, optional
         The network and the ranking to ask; those of this package unless given.
-    times : int
-        So many pixels of the scene were made along one that it came with.
+    looks : Seen, optional
+        The scene as that network sees it, where it was looked at before.
 
     Raises
     ------
@@ -295,9 +293,11 @@ def search_field(
     """
     if min(scene.grid.shape) < _SMALLEST_PX:
         raise FieldError("The picture is too small to find a field in.")
+    learned = learned or shipped()
+    looks = looks or seen(scene, learned.network)
     factor = max(1, math.ceil(max(scene.grid.shape) / COARSE_PX))
     seed = (x_px / factor, y_px / factor)
-    frame = Frame.of(scene, factor, seed, times)
+    frame = Frame.of(scene, factor, seed, looks.times)
     raw, inside = channels(scene, factor), frame.inside
     whitened = whiten(raw, seed, inside)
     stack, things = clear(whitened, scene.grid.ground_resolution_m * factor)
@@ -307,10 +307,10 @@ def search_field(
         np.ascontiguousarray(np.moveaxis(stack, 0, -1)),
         things,
         frame,
-        seen(scene, times),
+        looks,
         footing,
         footing != seed,
-        learned or shipped(),
+        learned,
     )
 
 

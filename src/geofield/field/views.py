@@ -19,14 +19,13 @@ from shapely import Polygon, affinity
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field.learned import Learned, shipped
 from geofield.field.likely import likeliest
-from geofield.field.looks import seen
+from geofield.field.looks import Seen, seen
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
 from geofield.field.points import Points
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
 from geofield.grid import Grid
-from geofield.learned.network import Network
 from geofield.model import Scene
 
 #: Longitude and latitude, degrees.
@@ -132,11 +131,12 @@ class FieldSearch:
             seed, *belong = (seen_part.pixel_of(lat=y, lon=x) for x, y in (self.lonlat, *include))
             apart = tuple(seen_part.pixel_of(lat=y, lon=x) for x, y in exclude)
             points = (seed, *belong), apart
-            if level not in self.views and _ground_goes_on(
-                seen_part, part, *points, self.learned.network
-            ):
-                return False
-            view = self._at(scene, level)
+            looks = None
+            if level not in self.views:
+                looks = seen(seen_part, self.learned.network, part.times)
+                if _ground_goes_on(looks, part, *points):
+                    return False
+            view = self._at(scene, level, looks)
         except (FieldError, PointOutsideError):
             return False
         search = view.search
@@ -148,13 +148,15 @@ class FieldSearch:
         first = likeliest(found, self.learned.ranking)
         return not view.cuts(first.candidate.polygon)
 
-    def _at(self, scene: Scene, level: int) -> View:
+    def _at(self, scene: Scene, level: int, looks: Seen | None = None) -> View:
+        """The view of a level, by what the network has seen there where that is known."""
         if level not in self.views:
             part = self._parts(scene)[level]
             seen_part = part.of(scene)
             lon, lat = self.lonlat
             seed = seen_part.pixel_of(lat=lat, lon=lon)
-            search = search_field(seen_part, *seed, learned=self.learned, times=part.times)
+            looks = looks or seen(seen_part, self.learned.network, part.times)
+            search = search_field(seen_part, *seed, learned=self.learned, looks=looks)
             self.views[level] = View(part, search)
         return self.views[level]
 
@@ -176,19 +178,18 @@ class FieldSearch:
         return [part.magnified() for part in (*parts, Part.whole(scene))]
 
 
-def _ground_goes_on(
-    scene: Scene, part: Part, include: Points, exclude: Points, network: Network
-) -> bool:
+def _ground_goes_on(looks: Seen, part: Part, include: Points, exclude: Points) -> bool:
     """Whether the network's ground goes on beyond sides of a part that lie within the picture.
 
     It is asked long before an outline is found.
     """
-    factor = math.ceil(max(scene.grid.shape) / SIDE_PX)
+    width, height = (part.times * length for length in part.box[2:])
+    factor = math.ceil(max(width, height) / SIDE_PX)
     belong, apart = (
         tuple((x / factor, y / factor) for x, y in points) for points in (include, exclude)
     )
-    rows, columns = (math.ceil(length / factor) for length in scene.grid.shape)
-    likely = seen(scene, part.times).probability(belong, apart, (rows, columns), factor, network)
+    shape = math.ceil(height / factor), math.ceil(width / factor)
+    likely = looks.probability(belong, apart, shape, factor)
     ground = np.pad(part_at(likely > 0.5, *belong[0]), 1)
     if not ground.any():
         return False

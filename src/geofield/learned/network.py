@@ -16,13 +16,42 @@ from geofield.learned.model_facts import facts, model_file, unreadable
 
 FloatImage = NDArray[np.float32]
 
+#: How a network is run whose file says nothing else.
+ONE_STEP = {"suffix": "", "takes": [""], "gives": []}
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A file of a network: arrays go in by name, arrays come out.
+
+    Any thread may call it: OpenCV's networks hold what runs through them, so each thread loads one
+    of its own.
+
+    Attributes
+    ----------
+    takes, gives : tuple of str
+        The arrays' names; that of an only one is not needed.
+    """
+
+    _model: bytes = field(repr=False)
+    takes: tuple[str, ...]
+    gives: tuple[str, ...]
+    _local: threading.local = field(default_factory=threading.local, repr=False)
+
+    def __call__(self, *arrays: FloatImage) -> tuple[FloatImage, ...]:
+        """Run the step: arrays (n, channels, rows, cols) for arrays of that kind."""
+        if not hasattr(self._local, "net"):
+            self._local.net = cv2.dnn.readNetFromONNX(np.frombuffer(self._model, np.uint8))
+        net = self._local.net
+        for name, array in zip(self.takes, arrays, strict=True):
+            net.setInput(np.ascontiguousarray(array, dtype=np.float32), name)
+        given = net.forward(self.gives or net.getUnconnectedOutLayersNames())
+        return tuple(np.array(one, dtype=np.float32) for one in given)
+
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """A network and what its channels mean.
-
-    Any thread may call it: OpenCV's networks hold the pictures that run through them, so each
-    thread loads one of its own. It travels to other processes by its name and folder.
+    """A network and what its channels mean; it travels to other processes by name and folder.
 
     Attributes
     ----------
@@ -31,6 +60,8 @@ class Network:
         The channels' names, in the network's order.
     facts : dict
         The rest of ``NAME.json``.
+    steps : tuple of Step
+        What it is run in: several where what the first of them sees is asked more than once.
     folder : Path or None
         Where it lies; None in this package.
     """
@@ -39,12 +70,11 @@ class Network:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     facts: dict[str, Any]
-    _model: bytes = field(repr=False)
-    _local: threading.local = field(default_factory=threading.local, repr=False)
+    steps: tuple[Step, ...] = field(repr=False)
     folder: Path | None = None
 
     def __call__(self, batch: FloatImage) -> FloatImage:
-        """Run the network.
+        """Run a network of one step.
 
         Parameters
         ----------
@@ -64,10 +94,8 @@ class Network:
             raise ValueError(
                 f"{self.name} takes (n, {len(self.inputs)}, rows, cols), not {batch.shape}"
             )
-        if not hasattr(self._local, "net"):
-            self._local.net = cv2.dnn.readNetFromONNX(np.frombuffer(self._model, np.uint8))
-        self._local.net.setInput(np.ascontiguousarray(batch, dtype=np.float32))
-        return np.array(self._local.net.forward(), dtype=np.float32)
+        (step,) = self.steps
+        return step(batch)[0]
 
     def stacked(self, **channels: FloatImage | float) -> FloatImage:
         """Return channels, given by name, as one batch (1, inputs, rows, cols).
@@ -104,8 +132,15 @@ def network(name: str, folder: Path | None = None) -> Network:
     """
     known = facts(name, folder)
     try:
-        model = model_file(f"{name}.onnx", folder).read_bytes()
+        steps = tuple(
+            Step(
+                model_file(f"{name}{one['suffix']}.onnx", folder).read_bytes(),
+                tuple(one["takes"]),
+                tuple(one["gives"]),
+            )
+            for one in known.pop("steps", [ONE_STEP])
+        )
         inputs, outputs = tuple(known.pop("inputs")), tuple(known.pop("outputs"))
-    except (OSError, KeyError) as error:
+    except (OSError, KeyError, TypeError) as error:
         raise unreadable(name, folder) from error
-    return Network(name, inputs, outputs, known, model, folder=folder)
+    return Network(name, inputs, outputs, known, steps, folder)
