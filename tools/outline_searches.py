@@ -53,7 +53,7 @@ class Searched:
 
 
 def searched(case: Case) -> list[Searched]:
-    """The search of a case, of every other one again with points where its best outline errs."""
+    """The search of a case, of every other one again with points where the one taken errs."""
     learned = learned_without(case.site)
     search = search_field(case.scene, case.x_px, case.y_px, learned=learned)
     truth = shapely.transform(case.truth, lambda c: c / search.factor)
@@ -62,7 +62,8 @@ def searched(case: Case) -> list[Searched]:
     exclude: tuple[tuple[float, float], ...] = ()
     for turn in range(1 + CORRECTIONS):
         candidates = search.candidates(include, exclude)
-        if not candidates:
+        taken = search.likeliest(include, exclude)
+        if taken is None:
             break
         polygons = [one.polygon for one in candidates]
         common = shapely.area(shapely.intersection(polygons, truth))
@@ -73,7 +74,7 @@ def searched(case: Case) -> list[Searched]:
         mark = case.mark if turn == 0 else f"{case.mark} clicked {turn}"
         overlap = common / either
         found.append(Searched(name, mark, case.site, names, values, polygons, overlap, turn))
-        wrong = middle_of_error(polygons[0], truth, search.frame.shape)
+        wrong = middle_of_error(taken.candidate.polygon, truth, search.frame.shape)
         if wrong is None or zlib.crc32(case.name.encode()) % 2:
             break
         if wrong[0]:

@@ -53,6 +53,7 @@ from outline_cases import FOLDS, TABLES, left_out
 from outline_searches import Searched, all_searched
 from scipy.optimize import minimize
 
+from geofield.field.candidate import Candidate
 from geofield.field.likely import MOST_CERTAIN, evidence_of
 from geofield.field.quality import TRUSTED
 from geofield.field.ranking import (
@@ -68,7 +69,6 @@ from geofield.field.ranking import (
     expected_overlaps,
     trained,
 )
-from geofield.field.search import Candidate
 
 #: Pull towards zero, of curves and of what certainty is worth.
 RIDGE, CALM = 5e-2, 1.0

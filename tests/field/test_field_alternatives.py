@@ -11,9 +11,10 @@ import shapely
 
 from geofield.field import extract_field
 from geofield.field.alternatives import other_outlines
+from geofield.field.candidate import Candidate
 from geofield.field.doubt import doubtful
 from geofield.field.likely import Likely
-from geofield.field.search import Candidate, WindowSearch, search_field
+from geofield.field.search import WindowSearch, search_field
 from geofield.simulate import SimulationSettings, simulate_field
 
 

@@ -1,6 +1,7 @@
 """Further points correct the outline that was there: locally, and without losing its ground."""
 
 import warnings
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,12 +13,14 @@ from shapely import box
 
 from geofield.field import extract_field, prepare_field
 from geofield.field.frame import Frame, covered
-from geofield.field.mend import mended
+from geofield.field.likely import likeliest
+from geofield.field.mend import forced, mended
 from geofield.field.outline import straight_outline
 from geofield.field.points import drawn, obeys
 from geofield.field.ranking import log_odds
 from geofield.field.refine import carried
 from geofield.field.said import Said
+from geofield.field.search import search_field
 from geofield.field.straight import ring
 from geofield.grid import Grid
 from geofield.model.scene import Scene
@@ -183,3 +186,40 @@ def test_points_given_at_once_are_taken_one_after_the_other(field):
         one_by_one = outline_of(field, [], exclude[:count], search)
     fresh = prepare_field(scene, lat=field.lat, lon=field.lon)
     assert outline_of(field, [], exclude, fresh).equals(one_by_one)
+
+
+def test_a_point_corrects_the_outline_that_was_shown(field, monkeypatch):
+    """Not the one with the best score: nobody has seen that."""
+    shown, corrected = [], []
+
+    def worst(found, ranking):
+        assert len(found) > 1
+        shown.append(found[-1].polygon)
+        return replace(likeliest(found, ranking), candidate=found[-1])
+
+    def said(likely, points, before):
+        corrected.append(before)
+        return Said(likely, points, before)
+
+    monkeypatch.setattr("geofield.field.search.likeliest", worst)
+    monkeypatch.setattr("geofield.field.search.Said", said)
+    place = field.scene.pixel_of(lat=field.lat, lon=field.lon)
+    search = search_field(field.scene, *place)
+    inner = field.field.polygon_px(field.scene.grid).buffer(-4).exterior.coords[1]
+    search.likeliest((), (search.place(*inner),))
+    first, second = corrected
+    assert first is None
+    assert np.array_equal(second, covered(ring(shown[0]), second.shape))
+
+
+def test_a_strip_to_a_point_far_off_is_the_last_resort():
+    """Ground elsewhere, joined to the point by a strip, was taken where .95 had been right."""
+    seed, details = (20.0, 20.0), [(45.0, 45.0), (60.0, 60.0)]
+    found = mended(SQUARE, [seed, *details], [(119.0, 80.0)], FRAME)
+    assert not any(one.contains(box(60, 60, 100, 100)) and one.area < 6500 for one in found)
+    (strip,) = forced(SQUARE, [seed, *details], [(119.0, 80.0)])
+    assert strip.contains(shapely.Point(seed))
+    assert SQUARE.area < strip.area + 40 < SQUARE.area + 120
+    # Beside the border it is a detail.
+    near = mended(SQUARE, [(60.0, 60.0), *details], [(119.0, 80.0)], FRAME)
+    assert any(0 < SQUARE.area - one.area < 40 for one in near)

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import shapely
 
-from geofield.errors import FieldError, PointOutsideError, SettingsError
+from geofield.errors import FieldError, FieldWarning, PointOutsideError, SettingsError
 from geofield.field import extract_field, prepare_field
 from geofield.field.points import obeying, obeys
 from geofield.imagery import write_scene
+from geofield.model.segmentation import Segmentation
 from geofield.plan import read_plan
 from geofield.simulate import SimulationSettings, simulate_field
 from geofield_command import run_geofield
@@ -38,6 +39,24 @@ def written(value):
 
 def in_zone(place, layer):
     return gpd.GeoSeries([shapely.Point(place)], crs=4326).to_crs(layer.crs).iloc[0]
+
+
+def test_a_strip_to_the_point_that_pixels_break_loses_no_ground(sample, monkeypatch):
+    """The part at the point was a few pixels, and the field strips of a metre between points."""
+    truth, _ = sample
+    scene = truth.scene
+    mask = np.zeros(scene.grid.shape, bool)
+    mask[200:300, 40:280] = True
+    mask[100:103, 100:103] = True
+    found = Segmentation(mask, (), (("certainty", 0.1),))
+    monkeypatch.setattr("geofield.field.extract.method_of", lambda *_: lambda *_, **__: found)
+    lon, lat = scene.grid.to_lonlat(101.5, 101.5)
+    with pytest.warns(FieldWarning):
+        field = extract_field(scene, lat=lat, lon=lon, include=[scene.grid.to_lonlat(150, 250)])
+    outline = field.polygon_px(scene.grid)
+    assert shapely.contains_xy(outline, [101.5, 150], [101.5, 250]).all()
+    assert outline.intersection(shapely.box(40, 200, 280, 300)).area > 0.98 * 100 * 240
+    assert outline.area < 1.05 * 100 * 240
 
 
 def test_points_are_obeyed_whatever_the_picture_shows(sample):

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from geofield.field.candidate import Candidate
 from geofield.field.likely import Likely
 from geofield.field.ranking import WEIGHED, expected_overlaps
-from geofield.field.search import Candidate
 
 #: So many different outlines are offered with the one that is taken; they overlap less than this.
 _OFFERED, _DIFFERENT = 3, 0.88

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geofield.field.alternatives import other_outlines
-from geofield.field.likely import Likely, likeliest
+from geofield.field.likely import Likely
 from geofield.field.morphology import inner, plump
 from geofield.field.refine import carried, enlarged
 from geofield.field.search import WindowSearch, search_field
@@ -60,15 +60,15 @@ def segment(
     if search is None:
         search = search_field(scene, x_px, y_px)
     belong, apart = (tuple(search.place(*at) for at in one) for one in (include, exclude))
-    found = search.candidates(belong, apart)
-    if not found:
+    taken = search.likeliest(belong, apart)
+    if taken is None:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
-    taken = likeliest(found, search.learned.ranking)
     # Who gives further points does not choose between grounds any more.
     ask = not (belong or apart) and taken.certainty < _SURE
     more = search.imagined() if ask else ()
-    likely = [taken, *other_outlines(taken, [*found, *more])]
+    found = [*search.candidates(belong, apart), *more]
+    likely = [taken, *other_outlines(taken, found)]
     outlines = [one.candidate.polygon for one in likely]
     points = (search.seed_px, *belong), apart
     masks = carried(scene, outlines, search.factor, *points, times=search.seen.times)

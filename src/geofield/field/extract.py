@@ -26,7 +26,7 @@ from geofield.field.part import Part
 from geofield.field.plausible import look
 from geofield.field.points import EXACT_PX, drawn, obeying
 from geofield.field.quality import judge
-from geofield.field.segmentation import fill_holes, part_at
+from geofield.field.segmentation import fill_holes, part_at_any
 from geofield.field.views import FieldSearch
 from geofield.grid import Grid
 from geofield.methods import FIELD
@@ -148,7 +148,7 @@ def extract_field(
         """Outline, pixel coordinates, and its quality."""
         filled = fill_holes(one.mask, smallest_kept_px=smallest)
         if not regions:
-            filled = part_at(filled, *seed)
+            filled = part_at_any(filled, (seed, *belong))
         if not filled.any():
             raise FieldError(
                 f"No field was found at lat {lat}, lon {lon}.",

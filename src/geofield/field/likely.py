@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geofield.field.candidate import Candidate
 from geofield.field.ranking import (
     WEIGHED,
     Figures,
@@ -16,7 +17,6 @@ from geofield.field.ranking import (
     expected_overlaps,
     log_odds,
 )
-from geofield.field.search import Candidate
 
 #: Outlines that overlap more than this speak for each other's ground.
 _ALIKE = 0.85

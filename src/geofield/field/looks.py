@@ -2,7 +2,9 @@
 
 The network looks at the whole picture first, then once more at the part that holds the ground it
 saw there, as large as it can be shown. On 111 fields of left-out sites its answer overlaps the
-truth by .823 instead of .814 in four bands, .816 (.809) in colour.
+truth by .823 instead of .814 in four bands, .816 (.809) in colour. A further look at each, with the
+picture turned or mirrored, gives .824 to .827 where these two have .825 (552 fields), the mean of
+what further points of the same ground say .830 to .835 for .832 (276): within chance.
 """
 
 from __future__ import annotations

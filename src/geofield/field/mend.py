@@ -25,8 +25,8 @@ Points = Sequence[tuple[float, float]]
 
 #: Sides beside a point that are moved; by so many times its distance, pixels at least.
 _SIDES, _REACHES, _LEAST_PX = 2, (1.5, 2.0, 3.0), 1.0
-#: From so many corrections on they are details: before, a whole side is meant.
-_DETAILS_FROM = 3
+#: From so many corrections on those this near a border are details: before, a whole side is meant.
+_DETAILS_FROM, _DETAIL_PX = 3, 8.0
 #: A side is turned about an end that is farther from the point than this share of it.
 _LEVER = 0.3
 
@@ -34,8 +34,7 @@ _LEVER = 0.3
 def mended(polygon: Polygon, include: Points, exclude: Points, frame: Frame) -> list[Polygon]:
     """Outlines with a side moved or turned past the first point that the given one disobeys.
 
-    Where the other points leave no side anywhere to go, and where a person is at details, one
-    gives way at the points alone.
+    Where a person is at details, and points lie beside the border, one gives way at them alone.
 
     Parameters
     ----------
@@ -53,13 +52,23 @@ def mended(polygon: Polygon, include: Points, exclude: Points, frame: Frame) -> 
     moved = _beyond(polygon, *wrong[0], frame.shape)
     moved = frame.within(moved[shapely.is_valid(moved)])
     found = list(moved[obeys(moved, include, exclude)])
-    if found and len(include) + len(exclude) - 1 < _DETAILS_FROM:
-        return found
-    # Whether points that share a pixel of a reduced picture contradict each other is asked at
-    # full size.
-    with suppress(FieldError):
-        found.append(obeying(polygon, include, exclude))
+    away = shapely.distance(
+        polygon.exterior, shapely.points(np.array([point for point, _ in wrong]))
+    )
+    if len(include) + len(exclude) - 1 >= _DETAILS_FROM and away.max() <= _DETAIL_PX:
+        found += forced(polygon, include, exclude)
     return found
+
+
+def forced(polygon: Polygon, include: Points, exclude: Points) -> list[Polygon]:
+    """An outline that gives way at the points alone, with strips to those that lie far off.
+
+    None where points contradict each other: those that share a pixel of a reduced picture are
+    told apart at full size.
+    """
+    with suppress(FieldError):
+        return [obeying(polygon, include, exclude)]
+    return []
 
 
 def _beyond(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -48,3 +50,11 @@ def part_at(mask: BoolArray, x_px: float, y_px: float) -> BoolArray:
         number = labels[rows[nearest], columns[nearest]]
     part: BoolArray = labels == number
     return part
+
+
+def part_at_any(mask: BoolArray, points_px: Iterable[tuple[float, float]]) -> BoolArray:
+    """The largest of the parts nearest to some pixel positions.
+
+    A strip that joins what a person said may be thinner than pixels.
+    """
+    return max((part_at(mask, *at) for at in points_px), key=np.count_nonzero)

@@ -18,7 +18,6 @@ from shapely import Polygon, affinity
 
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field.learned import Learned, shipped
-from geofield.field.likely import likeliest
 from geofield.field.looks import Seen, seen
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
@@ -140,13 +139,10 @@ class FieldSearch:
         except (FieldError, PointOutsideError):
             return False
         search = view.search
-        found = search.candidates(
+        taken = search.likeliest(
             *(tuple(search.place(*at) for at in places) for places in (belong, apart))
         )
-        if not found:
-            return False
-        first = likeliest(found, self.learned.ranking)
-        return not view.cuts(first.candidate.polygon)
+        return taken is not None and not view.cuts(taken.candidate.polygon)
 
     def _at(self, scene: Scene, level: int, looks: Seen | None = None) -> View:
         """The view of a level, by what the network has seen there where that is known."""

@@ -2,7 +2,7 @@
 
 A model is ``NAME.json`` of this folder: what goes in by name, the figures that belong to it
 (curves, calibration, thresholds), and what it was learned with (data, seed, versions). Where it is
-a network, ``NAME.onnx`` lies beside it, which OpenCV runs; what is asked anew of what that saw is in
+a network, ``NAME.onnx`` lies beside it, which OpenCV runs; what is asked of what that saw is in
 ``NAME_points.onnx``. Trainers are in ``tools/``. Begin with `network` and `facts`.
 """
 
