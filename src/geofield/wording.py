@@ -6,7 +6,7 @@ And the nearest name for one that was mistyped.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 _OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
 #: What an option is called in Python, where that is not its own name with underscores.
@@ -47,6 +47,16 @@ def none_of(number: int, one: str) -> str:
     ('No place', 'None of the 3 places')
     """
     return f"No {one}" if number == 1 else f"None of the {counted(number, one)}"
+
+
+def some_of(names: Sequence[str], most: int) -> str:
+    """The first names, and how many more there are.
+
+    >>> some_of("abc", 2), some_of("ab", 2)
+    ('a, b and 1 more', 'a, b')
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def learn(names: dict[str, str]) -> None:

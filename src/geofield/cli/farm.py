@@ -130,7 +130,6 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
 
 def _refuse_other_edits(folder: Path, overview: Path) -> None:
     """Refuse the overview of another place while the farm's own has edits: it is written anew."""
-    from geofield.errors import FormatError
     from geofield.farm.edits import is_edited
     from geofield.farm.overview import OVERVIEW
 

@@ -18,7 +18,7 @@ from geofield.farm.as_left import tell
 from geofield.farm.layers import FIELD_ID
 from geofield.model.tracks_written import SAME_M
 from geofield.model.written import same_shapes
-from geofield.wording import counted
+from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -33,7 +33,7 @@ KEYS = {
 _OUT_M = 0.01
 _M_PER_DEGREE = 111_000.0
 #: Fields that are told by name.
-_TOLD = 5
+TOLD = 5
 
 _Mask = NDArray[np.bool_]
 _At = NDArray[np.int64]
@@ -224,8 +224,7 @@ def _tell(of: schema.Layer, gone: gpd.GeoDataFrame, words: str) -> None:
     if gone.empty:
         return
     ids = sorted(set(gone[FIELD_ID].astype(str)))
-    more = f" and {len(ids) - _TOLD} more" if len(ids) > _TOLD else ""
     tell(
-        f"Layer {of.name!r}: {counted(len(gone), 'row')} of field {', '.join(ids[:_TOLD])}{more} "
+        f"Layer {of.name!r}: {counted(len(gone), 'row')} of field {some_of(ids, TOLD)} "
         f"merged into another row: {words}."
     )

@@ -23,7 +23,7 @@ from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS, record_in, table_in, tell
 from geofield.farm.as_written import digests_of, own_digests, own_names, with_rest
-from geofield.farm.dissolved import undissolved
+from geofield.farm.dissolved import TOLD, undissolved
 from geofield.farm.doubles import changed_elsewhere, refuse_double, tell_double
 from geofield.farm.edited_in_place import BEGUN
 from geofield.farm.edited_plan import Edits, edited_plan, planned
@@ -36,7 +36,7 @@ from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.formats.gpkg_read import parts_apart
 from geofield.plan import Plan
-from geofield.wording import counted
+from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -183,10 +183,9 @@ def _tracks(
         bare = _bare(tables, fields, written)
     for of, some in bare.items():
         if some:
-            more = f" and {len(some) - 5} more" if len(some) > 5 else ""
             tell(
-                f"{overview.name}: no {of.name} are left of field {', '.join(some[:5])}{more}. No "
-                "field is left without any: they come back."
+                f"{overview.name}: no {of.name} are left of field {some_of(some, TOLD)}. No field "
+                "is left without any: they come back."
             )
     return (tables, driven) if whole else ({}, {})
 

@@ -131,7 +131,6 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
 
 
 def _parquet(path: Path) -> RawPlaces:
-
     import pyarrow.parquet as pq
 
     try:

@@ -52,11 +52,10 @@ def mended(polygon: Polygon, include: Points, exclude: Points, frame: Frame) -> 
     moved = _beyond(polygon, *wrong[0], frame.shape)
     moved = frame.within(moved[shapely.is_valid(moved)])
     found = list(moved[obeys(moved, include, exclude)])
-    away = shapely.distance(
-        polygon.exterior, shapely.points(np.array([point for point, _ in wrong]))
-    )
-    if len(include) + len(exclude) - 1 >= _DETAILS_FROM and away.max() <= _DETAIL_PX:
-        found += forced(polygon, include, exclude)
+    if len(include) + len(exclude) - 1 >= _DETAILS_FROM:
+        places = shapely.points([point for point, _ in wrong])
+        if shapely.distance(polygon.exterior, places).max() <= _DETAIL_PX:
+            found += forced(polygon, include, exclude)
     return found
 
 

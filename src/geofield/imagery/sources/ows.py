@@ -19,7 +19,7 @@ from geofield.imagery.sources.base import TileSource
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import TilePyramid
 from geofield.strangers import parse_xml
-from geofield.wording import nearest
+from geofield.wording import nearest, some_of
 
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 
@@ -176,7 +176,7 @@ def choose_layer(names: list[str], wanted: str, address: str) -> str:
             return wanted
         raise ImageryError(
             f"{plain_address(address)} has no layer {wanted!r}.",
-            hint=nearest(wanted, names).strip() or f"Layers: {_listed(names)}.",
+            hint=nearest(wanted, names).strip() or f"Layers: {some_of(names, 12)}.",
         )
     if len(names) == 1:
         return names[0]
@@ -184,9 +184,5 @@ def choose_layer(names: list[str], wanted: str, address: str) -> str:
         raise ImageryError(f"{plain_address(address)} offers no layer.")
     raise ImageryError(
         f"{plain_address(address)} offers {len(names)} layers: choose one.",
-        hint=f"Add --layer NAME; layers: {_listed(names)}.",
+        hint=f"Add --layer NAME; layers: {some_of(names, 12)}.",
     )
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
