@@ -39,7 +39,15 @@ measured in squares of 5 px. Pixel by pixel, as today, these have .826, .874, .8
 Superpixels merged into a tree, minimum cuts, and outlines redrawn along their long sides made many
 more outlines: the best of all had .884 (.855 without), what was taken .825 as well; after none to
 three points .869, .896, .917 and .925 where without them it was .872, .905, .915 and .930 (46
-fields, by the curves of before).
+fields, by the curves of before). Outlines that change by one piece, where the answer to the last
+point differs from what was taken, make the best there a little better (.919, .935 and .946 with
+two to four points for .915, .932 and .944) and what is taken hardly (+.002, standard error .001,
+two to six points, 170 fields).
+
+Certainty is told no better by what else can be asked: whether the answers from six other places in
+the ground, or from the picture mirrored, are the same ground, and whether those from ground beside
+it take it in. Bad outlines (below .8) are told from good ones (from .88 on) with an area under the
+curve of .873 to .881, .875 without (552 fields, folds left out).
 """
 
 from __future__ import annotations

@@ -140,6 +140,18 @@ def test_what_was_seen_is_asked_again_about_further_points(scene):
     assert len(net.seen) == 3
 
 
+def test_of_the_parts_that_were_seen_the_last_ones_are_kept(scene):
+    net: Any = Discs(DISC_PX, 300, round(0.31 * 300))
+    looks, shape = seen(scene, net), (240, 300)
+    for x in range(50, 250, 10):
+        net.asked.clear()  # the first look is told the wide disc
+        looks.probability([(float(x), 120.0)], [], shape, 1)
+    # The whole is asked about each time: it was seen once, and stays.
+    assert len(net.seen) == 1 + 20
+    assert len(looks.shown) == 12
+    assert looks.whole in looks.shown
+
+
 @pytest.mark.parametrize("factor", [1, 2])
 def test_a_large_picture_is_answered_on_its_own_pixels(factor):
     large = simulate_field(5, SimulationSettings(width_px=1400, height_px=900, obstacles=3)).scene

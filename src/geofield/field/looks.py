@@ -40,6 +40,8 @@ _AROUND, _LEAST, _MOST = 1.6, 0.31, 0.85
 _LEAST_PX = 44
 #: What the second look counts where both were taken.
 _SECOND = 2 / 3
+#: What was seen is kept of so many parts, 1.2 MB of each: a person at work clicks on and on.
+_KEPT_PARTS = 12
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Seen:
     times : int
         So many pixels of the scene were made along one that it came with.
     shown : dict
-        What the network saw in each part, kept for further points.
+        What the network saw in the parts that were asked about last, kept for further points.
     """
 
     rgb: FloatArray
@@ -139,9 +141,11 @@ class Seen:
         belong, apart = (
             [part.of(x, y) for x, y in one if part.holds(x, y)] for one in (include, exclude)
         )
-        if part not in self.shown:
-            self.shown[part] = features(self.network, self.bands(part))
-        return log_odds(self.network, self.shown[part], belong, apart)
+        known = self.shown.pop(part, None) or features(self.network, self.bands(part))
+        if len(self.shown) == _KEPT_PARTS:
+            del self.shown[next(iter(self.shown))]
+        self.shown[part] = known
+        return log_odds(self.network, known, belong, apart)
 
     def _near(self, odds: FloatArray, include: Points) -> Square | None:
         """The part that holds the ground at the points, unless that is most of the picture."""
