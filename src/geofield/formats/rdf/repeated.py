@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
+from functools import cache
 from itertools import groupby, islice
 from pathlib import Path
 from typing import IO, Any, Final
 from xml.sax.saxutils import escape, unescape
 
+import pandas as pd
 import pyoxigraph as ox
 
+from geofield import schema
 from geofield.errors import FormatError
 from geofield.formats.rdf import jsonld
+from geofield.formats.rdf.features import point_group
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.guard import check_json, check_xml
-from geofield.formats.rdf.namespaces import DOUBLE, INTEGER, TYPE, node
+from geofield.formats.rdf.names import Names
+from geofield.formats.rdf.namespaces import DOUBLE, INTEGER, PREFIXES, STUDY_PREFIXES, TYPE, node
+from geofield.formats.rdf.study import study_points
 from geofield.formats.rdf.triples import Group, Nodes, Texts, Values, single, triples
 
 #: Fewer nodes than this are not worth it.
@@ -31,11 +36,9 @@ _MANY: Final = 200
 _FEW: Final = 500
 #: Larger files are read as a stream.
 _MAX_BYTES: Final = 1 << 28
-#: So many characters may tell one feature and its geometry.
-_MAX_SAMPLE: Final = 10_000
-#: Values that other nodes have in another form are none of the pattern.
+#: What is read by the pattern means the same in any place; values in another form do not.
 _IRI: Final = r"(https?://[A-Za-z0-9.-]+(?::[0-9]+)?/[A-Za-z0-9._~:/@!$*+,;=()-]*)"
-_NUMBER: Final = r"([0-9]+)"
+_KINDS: Final = {None: _IRI, node(INTEGER): r"([0-9]+)"}
 _TEXT: Final = r'([^"\\\x00-\x1f]*)'
 _XML_WORDS: Final = r"[^\"<>&\x00-\x08\x0b-\x1f\n\ufffe\uffff]*"
 _XML_TEXT: Final = rf"({_XML_WORDS}(?:&(?:lt|gt|amp);{_XML_WORDS})*)"
@@ -52,63 +55,32 @@ _UNESCAPED: Final = r'[^"\\\x01-\x1f\x7f]*'
 _QUOTES: Final = {'"': "&quot;", "'": "&apos;"}
 
 
-@dataclass(frozen=True, slots=True)
-class _Form:
-    """A syntax as geofield writes it.
+class _Writer:
+    """A syntax and its prefixes; `head` and `end` stand before all nodes and after them."""
 
-    Attributes
-    ----------
-    value : str
-        Values in the text of a node; the first group is the node's own name.
-    between, end : str
-        What stands between lines, and after the last node.
-    text, unescape
-        A text on one line, as a group, and what it means.
-    """
+    def __init__(self, syntax: ox.RdfFormat, prefixes: dict[str, str]) -> None:
+        self.syntax, self.prefixes, self.head, self.end = syntax, prefixes, "", ""
+        if syntax == ox.RdfFormat.JSON_LD:
+            self.head, self.end = jsonld.head(prefixes), jsonld.END
+        elif syntax == ox.RdfFormat.RDF_XML:
+            self.head, self.end = re.split("(?=\n</rdf:RDF>)", self.told([]))
+        else:  # Turtle begins with its prefixes where anything is told
+            self.head = self.told([single(_PLACE, "rdf:Property")]).partition(f"<{_PLACE}")[0]
 
-    value: str
-    between: str = "\n"
-    end: str = "\n"
-    text: str = _TEXT
-    unescape: Callable[[str], str] = str
-
-
-_FORMS: Final = {
-    ox.RdfFormat.RDF_XML: _Form(
-        r' rdf:about="([^"]*)| rdf:resource="([^"]*)|>([^<\n]+)<',
-        end="\n</rdf:RDF>",
-        text=_XML_TEXT,
-        unescape=unescape,
-    ),
-    ox.RdfFormat.TURTLE: _Form(
-        r'(?m)^<([^>]*)>| <([^>]*)>(?= [;.])|"([^"\n]*)"|(?<= )([0-9]+)(?= [;.])'
-    ),
-    ox.RdfFormat.N_TRIPLES: _Form(r'(?m)^<([^>]*)>|(?<!#type>) <([^>]*)>(?= \.)|"([^"\n]*)"'),
-    ox.RdfFormat.JSON_LD: _Form(
-        r'(?m)^\{"@id": "([^"]*)"|(?<!"@type": )"([^"\n]*)"(?=[,}])', ",\n", jsonld.END
-    ),
-}
+    def told(self, groups: Iterable[Group]) -> str:
+        """The nodes of groups."""
+        if self.syntax == ox.RdfFormat.JSON_LD:
+            return jsonld.lines(groups)
+        text = ox.serialize(triples(groups), None, self.syntax, prefixes=self.prefixes) or b""
+        return text.decode().removeprefix(self.head).removesuffix(self.end)
 
 
 def write_repeated(
     groups: Iterable[Group], file: IO[bytes], syntax: ox.RdfFormat, prefixes: dict[str, str]
 ) -> None:
     """Write groups of nodes in a syntax, as they come."""
-
-    def told(groups: Iterable[Group]) -> str:
-        if syntax == ox.RdfFormat.JSON_LD:
-            return jsonld.lines(groups)
-        text = ox.serialize(triples(groups), None, syntax, prefixes=prefixes) or b""
-        return text.decode().removeprefix(head).removesuffix(end)
-
-    head = end = ""
-    if syntax == ox.RdfFormat.JSON_LD:
-        head, end = jsonld.head(prefixes), jsonld.END
-    elif syntax == ox.RdfFormat.RDF_XML:
-        head, end = re.split("(?=\n</rdf:RDF>)", told([]))
-    else:  # Turtle begins with its prefixes where anything is told
-        head = told([single(_PLACE, "rdf:Property")]).partition(f"<{_PLACE}")[0]
-    file.write(head.encode())
+    writer = _Writer(syntax, prefixes)
+    file.write(writer.head.encode())
     comma = ","
     for many, some in groupby(groups, lambda group: len(group[0].subjects) >= _MANY):
         # Few at a time, so that a farm's fields stream.
@@ -116,7 +88,7 @@ def write_repeated(
             columns: list[list[str]] = []
             if many:
                 batch[0], columns = _one(batch[0], is_xml=syntax == ox.RdfFormat.RDF_XML)
-            text = told(batch)
+            text = writer.told(batch)
             if columns:
                 places = [int(a or b) for a, b in _PLACES.findall(text)]
                 pattern = _PLACES.sub("%s", text.replace("%", "%%"))
@@ -125,7 +97,7 @@ def write_repeated(
             # Before the first node of JSON there is no comma.
             file.write(text.removeprefix(comma).encode())
             comma = "" if text else comma
-    file.write(end.encode())
+    file.write(writer.end.encode())
 
 
 def _one(group: Group, *, is_xml: bool) -> tuple[Group, list[list[str]]]:
@@ -158,101 +130,90 @@ def _one(group: Group, *, is_xml: bool) -> tuple[Group, list[list[str]]]:
 
 
 def repeated(path: Path, syntax: ox.RdfFormat) -> Graph | None:
-    """The graph of a file that ends in many nodes of one shape; None for any other file."""
-    form = _FORMS[syntax]
+    """The graph of a file of many track points as geofield writes them; None for any other."""
     try:
         text = path.read_bytes().decode("utf-8") if path.stat().st_size <= _MAX_BYTES else ""
-        short, runs, values, columns = _parted(form, text)
-        if any(each in short for each in _HIDING):
-            return None
-        if syntax == ox.RdfFormat.JSON_LD:
-            check_json(short, path.name)
-        elif syntax == ox.RdfFormat.RDF_XML:
-            check_xml(io.BytesIO(short.encode()), path.name)
-        rest = [(s.value, p.value, o) for s, p, o, _ in ox.parse(short, syntax)]
-    except (OSError, UnicodeError, LookupError, SyntaxError, FormatError):
-        return None
-    one = rest[-len(values) :]
-    found, rest = _without(rest, [*one, *one])
-    # With one of their class that is told otherwise, only the parser knows their order.
-    classes = {o for _, p, o in one if p == TYPE}
-    if found != runs or any(p == TYPE and o in classes for _, p, o in rest):
-        return None
-    others = {s for s, _, _ in rest}
-    graph = Graph()
-    graph.add((s, p, o.value) for s, p, o in rest)
-    subject, subjects = "", [""]
-    for (s, p, o), (is_subject, value), column in zip(one, values, columns, strict=True):
-        # A name that is no whole IRI may be another one in another place.
-        named = re.fullmatch(_IRI, value) is not None
-        if is_subject:
-            subject, subjects = value, column
-            pairs, known = dict.fromkeys(column, o.value), named and p == TYPE
-            known = known and others.isdisjoint(column)
-        else:
-            pairs = dict(zip(subjects, column, strict=False))
-            known = (named or isinstance(o, ox.Literal)) and o.value == value
-        if not known or s != subject or len(pairs) != len(column):
-            return None
-        graph.merge(Graph({p: pairs}))
-    return graph
+        for point, sample, shape in _points(syntax):
+            short, runs, columns = _parted(text, sample, shape)
+            if runs and not any(each in short for each in _HIDING):
+                if syntax == ox.RdfFormat.JSON_LD:
+                    check_json(short, path.name)
+                elif syntax == ox.RdfFormat.RDF_XML:
+                    check_xml(io.BytesIO(short.encode()), path.name)
+                    columns = [unescape("\n".join(each)).split("\n") for each in columns]
+                rest = [(s.value, p.value, o) for s, p, o, _ in ox.parse(short, syntax)]
+                return _graph(rest, point, runs, columns)
+    except (OSError, UnicodeError, SyntaxError, FormatError):
+        pass
+    return None
 
 
-def _without(triples: list[Any], pair: list[Any]) -> tuple[int, list[Any]]:
-    """How often triples stand among others, and the others."""
-    found, others, place = 0, [], 0
-    while place < len(triples):
-        if triples[place] == pair[0] and triples[place : place + len(pair)] == pair:
-            found, place = found + 1, place + len(pair)
-        else:
-            others.append(triples[place])
-            place += 1
-    return found, others
+@cache
+def _points(syntax: ox.RdfFormat) -> list[tuple[Group, str, re.Pattern[str]]]:
+    """A track point with places for its values, its text, and what matches any: of each profile."""
+    row = pd.DataFrame({column.name: [1] for column in schema.TRACK_POINTS.columns})
+    writer = _Writer(syntax, {**PREFIXES, **STUDY_PREFIXES})
+    told = []
+    for point_of in (point_group, study_points):
+        one, _ = _one(point_of(row, Names(*[""] * 7)), is_xml=False)
+        sample = writer.told([one])
+        told.append((one, sample, _shape(one, sample, is_xml=syntax == ox.RdfFormat.RDF_XML)))
+    return told
 
 
-def _parted(form: _Form, text: str) -> tuple[str, int, list[tuple[bool, str]], list[list[str]]]:
-    """A text with two nodes in place of each run, how many runs, the values of one, and of all.
+def _shape(one: Group, sample: str, *, is_xml: bool) -> re.Pattern[str]:
+    """What nodes like a sample match, with a group for each value."""
+    values = [value for each in one for value in (each.subjects, *(v for _, v in each.columns))]
+    text = _XML_TEXT if is_xml else _TEXT
+    kinds = [_KINDS.get(each.datatype, text) for each in values if isinstance(each, Texts)]
+    shape, place, known = "", 0, 0
+    for found in _PLACES.finditer(sample):
+        number = int(found[1] or found[2])
+        shape += re.escape(sample[place : found.start()])
+        # A name that is told again is the same one.
+        shape += rf"(?:\{number + 1})" if number < known else kinds[number]
+        place, known = found.end(), max(known, number + 1)
+    return re.compile(shape + re.escape(sample[place:]))
+
+
+def _parted(text: str, sample: str, shape: re.Pattern[str]) -> tuple[str, int, list[list[str]]]:
+    """A text with two samples in place of each run, how many runs, and the values; 0 for few.
 
     The nodes of a run follow each other without anything between, and differ in values that
-    stand in any place as they are: what the first two mean there, all of them mean.
-
-    Raises
-    ------
-    LookupError
-        When there are not many such nodes.
+    stand in any place as they are: what two samples mean there, all of them mean.
     """
-    end = max(text.rfind(form.end), 0)
-    # Back to a line like the last one: a point and its geometry are one sample.
-    *lines, line = text[max(end - _MAX_SAMPLE, 0) : end].split(form.between)
-    last, _ = _pattern(form, line)
-    count = next((n for n, each in enumerate([*lines[:0:-1], line]) if re.fullmatch(last, each)))
-    sample = form.between.join(["", *lines[len(lines) - count :], line])
-    shape, values = _pattern(form, sample)
-    width = len(values) + 1
-    parts = re.split(shape, text)
+    width = shape.groups + 1
+    parts = shape.split(text)
     *before, tail = parts[::width]
     starts = [n for n, each in enumerate(before) if each or not n]
-    if len(before) < _MANY * max(len(starts), 1) or width == 1 or tail != text[end:]:
-        raise LookupError(shape)
-    # Texts that lie side by side are looked up faster than those of the parts.
-    told = form.unescape
-    columns = [told("\n".join(parts[index::width])).split("\n") for index in range(1, width)]
+    if len(before) < _MANY * max(len(starts), 1):
+        return "", 0, []
     short = "".join(f"{before[n]}{sample}{sample}" for n in starts) + tail
-    return short, len(starts), [(is_subject, told(value)) for is_subject, value in values], columns
+    return short, len(starts), [parts[n::width] for n in range(1, width)]
 
 
-def _pattern(form: _Form, sample: str) -> tuple[str, list[tuple[bool, str]]]:
-    """What nodes like a sample match, a group for each value; whether it is a subject, and it."""
-    values: list[tuple[bool, str]] = []
-    shape, place, own = "", 0, 0
-    for found in re.finditer(form.value, sample):
-        begin, stop = found.span(found.lastindex or 0)
-        value, is_subject = sample[begin:stop], found.lastindex == 1
-        kind = next((k for k in (_IRI, _NUMBER) if re.fullmatch(k, value)), form.text)
-        again = is_subject and own and values[own - 1][1] == value
-        shape += re.escape(sample[place:begin]) + (f"(?:\\{own})" if again else kind)
-        place = stop
-        if not again:
-            values.append((is_subject, value))
-            own = len(values) if is_subject else own
-    return shape + re.escape(sample[place:]), values
+def _graph(
+    rest: list[tuple[str, str, Any]], point: Group, runs: int, columns: list[list[str]]
+) -> Graph | None:
+    """The graph of triples with points in place of their samples; None where those differ."""
+    samples = [each for each in rest if each[0].startswith(_PLACE)]
+    rest = [each for each in rest if not each[0].startswith(_PLACE)]
+    one = [(s.value, p.value, o) for s, p, o in triples([point])]
+    # With one of their class that is told otherwise, only the parser knows their order.
+    classes = {o for _, p, o in one if p == TYPE}
+    if samples != one * 2 * runs or any(p == TYPE and o in classes for _, p, o in rest):
+        return None
+    others, values = {s for s, _, _ in rest}, iter(columns)
+    graph = Graph()
+    graph.add((s, p, o.value) for s, p, o in rest)
+    for nodes in point:
+        subjects = next(values)
+        if len(set(subjects)) < len(subjects) or not others.isdisjoint(subjects):
+            return None
+        for predicate, value in nodes.columns:
+            if isinstance(value, ox.NamedNode | ox.Literal):
+                pairs = dict.fromkeys(subjects, value.value)
+            else:
+                pairs = dict(zip(subjects, next(values), strict=True))
+            graph.merge(Graph({predicate.value: pairs}))
+    return graph

@@ -25,6 +25,7 @@ from geofield import schema
 from geofield.formats.rdf.describe import Description
 from geofield.formats.rdf.features import POINT_DECIMALS, column_terms, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map
+from geofield.formats.rdf.names import Names
 from geofield.formats.rdf.namespaces import expand, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
@@ -46,7 +47,9 @@ class StudyDescription(Description):
             yield from super().product("obstacles")
         elif self.points:
             for chunk in self.dataset.point_chunks():
-                yield from self._points(chunk)
+                points = study_points(chunk, self.names)
+                yield _members(_TRAJECTORY, points[0].subjects)
+                yield points
 
     def layer(self, layer: LayerMap) -> Iterator[Group]:
         """Obstacles in both vocabularies; points stand in a file of their own."""
@@ -84,21 +87,21 @@ class StudyDescription(Description):
         """The study has none."""
         return iter(())
 
-    def _points(self, frame: Any) -> Iterator[Group]:
-        layer = layer_map(schema.TRACK_POINTS.name)
-        iris = row_iris(layer, frame, self.names)
-        rounded = frame.assign(
-            **{name: frame[name].astype(float).round(POINT_DECIMALS) for name in ("lat", "lon")}
-        )
-        places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
-        columns: list[Column] = [
-            (node("rdf:type"), node(layer.study_cls)),
-            *_study_columns(layer, rounded),
-            (node("gml:pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
-            (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
-        ]
-        yield _members(_TRAJECTORY, iris)
-        yield (Nodes(iris, columns),)
+
+def study_points(frame: Any, names: Names) -> Group:
+    """Track points in the study's vocabulary."""
+    layer = layer_map(schema.TRACK_POINTS.name)
+    rounded = frame.assign(
+        **{name: frame[name].astype(float).round(POINT_DECIMALS) for name in ("lat", "lon")}
+    )
+    places = zip(rounded["lat"].tolist(), rounded["lon"].tolist(), strict=True)
+    columns: list[Column] = [
+        (node("rdf:type"), node(layer.study_cls)),
+        *_study_columns(layer, rounded),
+        (node("gml:pos"), Texts([f"{lat!r}, {lon!r}" for lat, lon in places], "xsd:string")),
+        (node("gf:segmentNo"), Texts(map(str, frame["segment_no"].tolist()), "xsd:int")),
+    ]
+    return (Nodes(row_iris(layer, frame, names), columns),)
 
 
 def _members(root: str, members: Texts) -> Group:
