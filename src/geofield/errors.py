@@ -6,6 +6,9 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from math import isfinite, isinf, isnan
 from numbers import Real
 from typing import Any, get_args
@@ -60,6 +63,14 @@ def refuse_other(
         raise error(f"`{name}` must be a {wanted.__name__}, not {type(value).__name__}.", hint=hint)
 
 
+def refuse_unknown(
+    error: type[GeofieldError], what: str, value: object, choices: Collection[str]
+) -> None:
+    """Refuse a value that is none of some choices; `what` it would be is told."""
+    if value not in choices:
+        raise error(f"Unknown {what} {value!r}.", hint=f"Choose one of {', '.join(choices)}.")
+
+
 def refuse_no_number(
     error: type[GeofieldError],
     wanted: str = "",
@@ -95,6 +106,15 @@ def is_number(value: Any) -> bool:
 def is_truth(value: object) -> bool:
     """Whether a value is true or false, of Python or an array's."""
     return isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", None) == "b"
+
+
+@contextmanager
+def listening() -> Iterator[list[warnings.WarningMessage]]:
+    """Hear geofield's own warnings of a block, and no others; nobody else hears any."""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", GeofieldWarning)
+        yield heard
 
 
 def _is_written(value: object) -> bool:

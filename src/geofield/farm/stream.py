@@ -10,11 +10,18 @@ from typing import Any
 
 import pandas as pd
 
-from geofield.errors import FieldWarning, FormatError, GeofieldError, ImageryError, refuse_other
+from geofield.errors import (
+    FieldWarning,
+    FormatError,
+    GeofieldError,
+    ImageryError,
+    listening,
+    refuse_other,
+)
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
 from geofield.farm.standing import own_obstacles
-from geofield.farm.work import Job, in_words, listening, plan_place, told
+from geofield.farm.work import Job, in_words, plan_place, told
 from geofield.imagery import Imagery
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.earlier import drew_outline, with_said_tracks
-from geofield.errors import FieldError, FieldWarning, GeofieldWarning
+from geofield.errors import FieldError, FieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_further
@@ -231,17 +230,7 @@ def parcel_of(place: Place) -> Field:
 
 def told(place: Place, heard: Sequence[warnings.WarningMessage]) -> str:
     """What the stages had to tell of a place, each thing once."""
-    words = [str(each.message) for each in heard if issubclass(each.category, GeofieldWarning)]
-    return "; ".join(dict.fromkeys([*place.notes, *words]))
-
-
-@contextmanager
-def listening() -> Iterator[list[warnings.WarningMessage]]:
-    """Hear the warnings of a block, and nobody else does."""
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", GeofieldWarning)
-        yield heard
+    return "; ".join(dict.fromkeys([*place.notes, *(str(each.message) for each in heard)]))
 
 
 def in_words(error: BaseException) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from geofield.errors import (
     SettingsError,
     refuse_no_number,
     refuse_other,
+    refuse_unknown,
 )
 from geofield.field.diffusion import diffused
 from geofield.field.outline import straight_outline
@@ -217,10 +218,7 @@ def _check(
     method: str, regions: Sequence[int], further: Places, holes: str | None, smooth: str
 ) -> None:
     """Refuse choices that do not exist or do not go together."""
-    if method not in FIELD:
-        raise SettingsError(
-            f"Unknown field method {method!r}.", hint=f"Methods: {', '.join(FIELD)}."
-        )
+    refuse_unknown(SettingsError, "field method", method, FIELD)
     for number in regions:
         refuse_no_number(SettingsError, "of a region that is listed", whole=True, regions=number)
     if regions and method != "study":
@@ -231,10 +229,9 @@ def _check(
         raise SettingsError(
             f"Further points belong to method auto, not {method}.", hint="Use method auto."
         )
-    if holes not in (None, "fill", "keep"):
-        raise SettingsError(f"Unknown choice {holes!r} for holes.", hint="Use fill or keep.")
-    if smooth not in ("none", "diffusion"):
-        raise SettingsError(f"Unknown smoothing {smooth!r}.", hint="Use none or diffusion.")
+    if holes is not None:
+        refuse_unknown(SettingsError, "choice for holes", holes, ("fill", "keep"))
+    refuse_unknown(SettingsError, "smoothing", smooth, ("none", "diffusion"))
 
 
 def _check_places(

@@ -20,6 +20,7 @@ from geofield.errors import (
     FormatWarning,
     GeofieldError,
     SeveralFieldsError,
+    listening,
 )
 from geofield.formats.clear_way import DRIVEN, WITHIN, driven_through, leaving
 from geofield.formats.format import Format
@@ -105,8 +106,7 @@ def _of_content(
 ) -> list[Finding]:
     """What there is to say of what a file holds."""
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FormatWarning)
+        with listening() as heard:
             dataset = read()
             fields = _fields(dataset, place)
     except EmptyFileError:
@@ -119,7 +119,7 @@ def _of_content(
         return [] if broken else [Finding("error", place.name, str(error))]
     findings = [
         Finding("warning", place.name, str(each.message).removeprefix(f"{place.name}: "))
-        for each in caught
+        for each in heard
         if issubclass(each.category, FormatWarning)
     ]
     with_segments = "segments" in found.layers

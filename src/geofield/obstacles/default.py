@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.errors import ObstacleError, ObstacleWarning, refuse_unknown
 from geofield.learned import network
 from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
@@ -111,8 +111,7 @@ def detect_by_default(
     ObstacleError
         For an unknown polarity.
     """
-    if polarity not in ("dark", "bright", "both"):
-        raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark, bright or both.")
+    refuse_unknown(ObstacleError, "polarity", polarity, ("dark", "bright", "both"))
     turn = Turn.upright(picture.grid)
     picture = turned(picture, turn)
     resolution = picture.grid.ground_resolution_m

@@ -9,7 +9,14 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.errors import FieldError, ImageryError, ObstacleError, refuse_no_number, refuse_other
+from geofield.errors import (
+    FieldError,
+    ImageryError,
+    ObstacleError,
+    refuse_no_number,
+    refuse_other,
+    refuse_unknown,
+)
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, Strategy, method
 from geofield.model.circles import Circles, checked_range
@@ -135,10 +142,7 @@ def detect_obstacles(
         raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
     if not 0 <= min_share <= 1:
         raise ObstacleError(f"The share of settings {min_share:g} is outside 0 to 1.")
-    if strategy not in STRATEGIES:
-        raise ObstacleError(
-            f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STRATEGIES)}."
-        )
+    refuse_unknown(ObstacleError, "strategy", strategy, STRATEGIES)
     refuse_other(scene, Picture, "scene", OPEN_IT, ImageryError)
     refuse_other(field, Field | None, "field", MAKE_ONE, FieldError)
     usual_m = RADIUS_M if strategy == "auto" else STUDY_RADIUS_M

@@ -9,7 +9,6 @@ from __future__ import annotations
 import secrets
 import tempfile
 import threading
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from geofield.crs import ground_scale_of
-from geofield.errors import ChangedError, FormatError, GeofieldError, GeofieldWarning
+from geofield.errors import ChangedError, FormatError, GeofieldError, listening
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
 from geofield.plan import Plan, read_plan
@@ -212,9 +211,8 @@ class Desk:
         with (
             self.lock,
             tempfile.TemporaryDirectory(prefix="geofield-") as place,
-            warnings.catch_warnings(record=True) as caught,
+            listening() as heard,
         ):
-            warnings.simplefilter("always", GeofieldWarning)
             dataset = self.session.plan.to_dataset()
             if self._picture_path is not None and format_named(name).pictured:
                 scene = picture_beside(self.path)
@@ -225,10 +223,9 @@ class Desk:
             written = write_dataset(
                 dataset, folder, [name], stem=stem, overwrite=True, inputs=[self.path]
             )
-        told = [str(one.message) for one in caught if issubclass(one.category, GeofieldWarning)]
         within = Path(*folder.parts[-2:])
         made = dict.fromkeys(str(within / path.relative_to(folder).parts[0]) for path in written)
-        return {"files": list(made), "notes": told}
+        return {"files": list(made), "notes": [str(one.message) for one in heard]}
 
     def _exports(self) -> tuple[Path, str]:
         """The folder of exports, one for each plan as their names are the same, and their stem."""

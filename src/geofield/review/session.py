@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geofield.earlier import is_planned
-from geofield.errors import GeofieldWarning
+from geofield.errors import GeofieldWarning, listening
 from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
@@ -139,12 +139,8 @@ class Session:
 
 def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
     """A plan with the tracks that follow from its field, obstacles and settings."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", GeofieldWarning)
-        settings = plan.settings or Settings()
-        after = run_tracks(plan, settings=settings)
-    notes = dict.fromkeys(
-        str(each.message) for each in caught if issubclass(each.category, GeofieldWarning)
-    )
+    with listening() as heard:
+        after = run_tracks(plan, settings=plan.settings or Settings())
+    notes = dict.fromkeys(str(each.message) for each in heard)
     kept = after.evidence.track_edits.in_words()
     return Step(after, command, (*notes, kept) if kept else tuple(notes))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from geofield.errors import SettingsError, refuse_no_number
+from geofield.errors import SettingsError, refuse_no_number, refuse_unknown
 
 Climate = Literal["temperate", "dry", "lush", "bare"]
 CLIMATES: tuple[Climate, ...] = ("temperate", "dry", "lush", "bare")
@@ -64,5 +64,5 @@ class SimulationSettings:
             raise SettingsError("The resolution must be above zero and finite.")
         if self.obstacles is not None and self.obstacles < 0:
             raise SettingsError(f"{self.obstacles} obstacles are fewer than none.")
-        if self.climate is not None and self.climate not in CLIMATES:
-            raise SettingsError(f"Unknown climate {self.climate!r}.", hint=f"Use {CLIMATES}.")
+        if self.climate is not None:
+            refuse_unknown(SettingsError, "climate", self.climate, CLIMATES)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, refuse_unknown
 from geofield.study.edges import as_unit, gradient
 
 Polarity = Literal["dark", "bright"]
@@ -152,7 +152,8 @@ def accumulate(
     list of float64 arrays, shape (rows, cols)
         One accumulator for each of the weights. Votes that leave the picture are dropped.
     """
-    sign = _sign(polarity)
+    refuse_unknown(ObstacleError, "polarity", polarity, get_args(Polarity))
+    sign = 1.0 if polarity == "bright" else -1.0
     rows, cols = edges.shape
     # With a margin as wide as the largest radius no vote needs to be asked where it falls.
     margin = int(np.ceil(radii_px[-1])) + 1
@@ -187,11 +188,3 @@ def _step(
     out += start
     out += 0.5
     np.floor(out, out=out)
-
-
-def _sign(polarity: Polarity) -> float:
-    if polarity == "bright":
-        return 1.0
-    if polarity == "dark":
-        return -1.0
-    raise ObstacleError(f"Unknown polarity {polarity!r}.", hint="Choose dark or bright.")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.errors import ObstacleError
+from geofield.errors import ObstacleError, refuse_unknown
 
 EdgeMethod = Literal["sobel", "prewitt", "roberts", "canny"]
 EDGE_METHODS: tuple[EdgeMethod, ...] = get_args(EdgeMethod)
@@ -63,6 +63,7 @@ def gradient(
     gx, gy : float64 arrays of the same shape
         Positive where the picture gets brighter to the right and downwards.
     """
+    refuse_unknown(ObstacleError, "edge method", method, EDGE_METHODS)
     grey = as_unit(image)
     if method in ("sobel", "prewitt"):
         side = np.array([1.0, 2.0, 1.0]) / 4 if method == "sobel" else np.full(3, 1 / 3)
@@ -75,14 +76,10 @@ def gradient(
         here, right = padded[:-1, :-1], padded[:-1, 1:]
         below, diagonal = padded[1:, :-1], padded[1:, 1:]
         return (diagonal - here) / 2, (below - right) / 2
-    if method == "canny":
-        sigma = CANNY_SIGMA_PX
-        gx = ndimage.gaussian_filter(grey, sigma, order=(0, 1), mode="nearest")
-        gy = ndimage.gaussian_filter(grey, sigma, order=(1, 0), mode="nearest")
-        return cast("NDArray[np.float64]", gx), cast("NDArray[np.float64]", gy)
-    raise ObstacleError(
-        f"Unknown edge method {method!r}.", hint=f"Choose one of {', '.join(EDGE_METHODS)}."
-    )
+    sigma = CANNY_SIGMA_PX
+    gx = ndimage.gaussian_filter(grey, sigma, order=(0, 1), mode="nearest")
+    gy = ndimage.gaussian_filter(grey, sigma, order=(1, 0), mode="nearest")
+    return cast("NDArray[np.float64]", gx), cast("NDArray[np.float64]", gy)
 
 
 def _separable(

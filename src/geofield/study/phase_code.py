@@ -14,7 +14,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.errors import ObstacleError, ObstacleWarning, refuse_unknown
 from geofield.model.circles import Circles, checked_range
 from geofield.study.accumulator import (
     EdgePixels,
@@ -76,10 +76,7 @@ def find_circles(
     low, high = checked_range(radius_px)
     if not 0 <= sensitivity <= 1:
         raise ObstacleError(f"The sensitivity {sensitivity:g} is outside 0 to 1.")
-    if method not in CIRCLE_METHODS:
-        raise ObstacleError(
-            f"Unknown circle method {method!r}.", hint=f"Choose {' or '.join(CIRCLE_METHODS)}."
-        )
+    refuse_unknown(ObstacleError, "circle method", method, CIRCLE_METHODS)
     if warn and (low <= 5 or high >= 3 * low):
         warnings.warn(
             f"Radii of {low:g} to {high:g} px are outside the range the circular Hough "

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from geofield.errors import ObstacleError, is_truth
+from geofield.errors import ObstacleError, is_truth, refuse_unknown
 from geofield.model.circles import Circles, inside
 from geofield.study.accumulator import Polarity
 from geofield.study.checks import first_of_duplicates
@@ -143,10 +143,7 @@ def run_strategy(
     ObstacleError
         For an unknown strategy or method, or an impossible range.
     """
-    if strategy not in STUDY_STRATEGIES:
-        raise ObstacleError(
-            f"Unknown strategy {strategy!r}.", hint=f"Choose one of {', '.join(STUDY_STRATEGIES)}."
-        )
+    refuse_unknown(ObstacleError, "strategy", strategy, STUDY_STRATEGIES)
     plan: list[tuple[EdgeMethod, float | None]] = []
     for method in _edge_methods(strategy, methods):
         if strategy in ("single", "max_of_all"):
@@ -185,10 +182,7 @@ def _edge_methods(
     if not chosen or (one and len(chosen) != 1):
         raise ObstacleError(f"Strategy {strategy!r} needs {'one' if one else 'an'} edge method.")
     for method in chosen:
-        if method not in EDGE_METHODS:
-            raise ObstacleError(
-                f"Unknown edge method {method!r}.", hint=f"Choose from {', '.join(EDGE_METHODS)}."
-            )
+        refuse_unknown(ObstacleError, "edge method", method, EDGE_METHODS)
     return chosen
 
 

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from geofield.errors import TrackError
+from geofield.errors import TrackError, refuse_unknown
 from geofield.tracks.clip import SNAP_M
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import Edges
@@ -132,10 +132,7 @@ def track_positions(
     the far side; ``spread``: the spacing shrinks evenly until strips fill the field exactly, those
     of a given width from border to border.
     """
-    if last_strip not in LAST_STRIPS:
-        raise TrackError(
-            f"Unknown last_strip {last_strip!r}.", hint=f"Choose one of {', '.join(LAST_STRIPS)}."
-        )
+    refuse_unknown(TrackError, "last_strip", last_strip, LAST_STRIPS)
     half = (width_m or spacing_m) / 2.0
     # Of passes that overlap by more than half, none beyond those that reach the borders: their
     # machine would drive outside for nothing. What was asked for stays.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import geopandas as gpd
 import numpy as np
@@ -15,7 +15,13 @@ from shapely import Polygon
 from shapely.ops import substring
 
 from geofield import schema
-from geofield.errors import TrackError, TrackWarning, refuse_no_number, refuse_other
+from geofield.errors import (
+    TrackError,
+    TrackWarning,
+    refuse_no_number,
+    refuse_other,
+    refuse_unknown,
+)
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
@@ -152,12 +158,8 @@ def _on_the_ground(
 
 
 def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
-    if pattern not in PATTERNS:
-        raise TrackError(
-            f"Unknown pattern {pattern!r}.", hint=f"Choose one of {', '.join(PATTERNS)}."
-        )
-    if curve not in ("dubins", "reeds_shepp"):
-        raise TrackError(f"Unknown curve {curve!r}.", hint="Choose dubins or reeds_shepp.")
+    refuse_unknown(TrackError, "pattern", pattern, PATTERNS)
+    refuse_unknown(TrackError, "curve", curve, get_args(Curve))
     refuse_no_number(TrackError, "0 or more tracks", whole=True, skip=skip)
     refuse_no_number(TrackError, "0 or more metres", margin_m=margin_m)
     if skip < 0:
