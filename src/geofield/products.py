@@ -28,7 +28,6 @@ PLAN_FILE = "field.gpkg"
 SCENE_FILE = "scene.tif"
 MAP_FILE = "map.png"
 REPORT_FILE = "report.json"
-PROJECT_FILE = "field.qgz"
 
 
 def write_products(

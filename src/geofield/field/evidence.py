@@ -35,11 +35,7 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
     Brightness, red against green, yellow against blue and, where there is near infrared,
     the vegetation index, each spread over about the range of brightness.
     """
-    if scene.is_colour:
-        bands = (scene.bands[scene.roles.index(role)] for role in ("red", "green", "blue"))
-        red, green, blue = (block_mean(band, factor) for band in bands)
-    else:
-        red = green = blue = block_mean(scene.grey, factor)
+    red, green, blue = (block_mean(band, factor) for band in scene.rgb_bands)
     layers = [0.298 * red + 0.587 * green + 0.114 * blue]
     if scene.is_colour:
         layers += [red - green, 0.5 * (red + green) - blue]

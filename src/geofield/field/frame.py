@@ -70,11 +70,6 @@ class Frame:
             return None
         return covered(shapely.get_coordinates(self.shown), self.shape) > 0
 
-    @property
-    def area_px(self) -> float:
-        """Of what is shown."""
-        return self.shape[0] * self.shape[1] if self.shown is None else self.shown.area
-
     def near(self, points: FloatArray, near_px: float) -> BoolArray:
         """Which points lie on it."""
         if self.shown is not None:

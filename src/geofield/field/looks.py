@@ -187,11 +187,7 @@ def seen(scene: Scene, network: Network, times: int = 1) -> Seen:
     def kept(band: NDArray[np.generic]) -> FloatArray:
         return _resized(np.asarray(band, np.float32), (columns, rows))
 
-    if scene.is_colour:
-        colours = [scene.bands[scene.roles.index(role)] for role in ("red", "green", "blue")]
-        rgb = np.stack([kept(band) for band in colours])
-    else:
-        rgb = np.repeat(kept(scene.grey)[None], 3, axis=0)
+    rgb = np.stack([kept(band) for band in scene.rgb_bands])
     nir = None if scene.nir is None else kept(scene.nir)
     return Seen(rgb, nir, kept(scene.valid) > 0.5, scale, network, times)
 

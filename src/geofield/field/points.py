@@ -16,6 +16,7 @@ from shapely import Polygon
 from geofield.errors import FieldError
 
 Points = Sequence[tuple[float, float]]
+Some = tuple[tuple[float, float], ...]
 
 #: How near an outline keeps to the border it was found at where a point needs it, pixels.
 EXACT_PX = 1.0
@@ -33,6 +34,12 @@ def obeys(
     for x, y in exclude:
         good &= ~shapely.intersects_xy(polygons, x, y)
     return np.asarray(good)
+
+
+def without_last(include: Some, exclude: Some) -> list[tuple[Some, Some]]:
+    """Points that belong and that do not, less the last one; of which kind it was is not known."""
+    shorter = [(include, exclude[:-1])] if exclude else []
+    return [*shorter, (include[:-1], exclude)] if include else shorter
 
 
 def drawn(

@@ -28,7 +28,7 @@ from geofield.field.learned import Learned, shipped
 from geofield.field.likely import Likely, likeliest
 from geofield.field.looks import Seen, seen
 from geofield.field.mend import forced, mended
-from geofield.field.points import obeys
+from geofield.field.points import obeys, without_last
 from geofield.field.ranking import Figures
 from geofield.field.said import Said
 from geofield.field.segmentation import part_at
@@ -144,7 +144,7 @@ class WindowSearch:
         asked = include, exclude
         if asked in self.answered:
             return self.answered[asked]
-        shorter = _shorter(*asked)
+        shorter = without_last(*asked)
         found = best_first(self._found(*asked, self._before(shorter)))
         taken = likeliest(found, self.learned.ranking) if found else None
         if taken is not None:
@@ -238,12 +238,6 @@ class WindowSearch:
     def _measured(self, polygon: Polygon, holes: BoolArray) -> Held:
         mask = covered(ring(polygon), self.frame.shape)
         return Held(polygon, holes, mask, measure(self.layers, polygon, self.frame))
-
-
-def _shorter(include: Points, exclude: Points) -> list[tuple[Points, Points]]:
-    """The points without the last one; which kind that was is not known."""
-    shorter = [(include, exclude[:-1])] if exclude else []
-    return [*shorter, (include[:-1], exclude)] if include else shorter
 
 
 def best_first(found: Mapping[Polygon, Candidate]) -> list[Candidate]:

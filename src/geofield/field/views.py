@@ -21,7 +21,7 @@ from geofield.field.learned import Learned, shipped
 from geofield.field.looks import Seen, seen
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
-from geofield.field.points import Points
+from geofield.field.points import Points, without_last
 from geofield.field.search import WindowSearch, search_field
 from geofield.field.segmentation import part_at
 from geofield.grid import Grid
@@ -112,8 +112,7 @@ class FieldSearch:
         points = include, exclude
         if points in self.levels:
             return self.levels[points]
-        shorter = [(include, exclude[:-1])] if exclude else []
-        shorter += [(include[:-1], exclude)] if include else []
+        shorter = without_last(include, exclude)
         known = [one for one in shorter if one in self.levels]
         level = self._level(scene, *(known or shorter)[0]) if shorter else 0
         last = len(self._parts(scene)) - 1
