@@ -161,8 +161,9 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     def outputs(
         self, result: engine.Result, values: Any, context: Any, feedback: Any
     ) -> dict[str, Any]:
-        """What the command made."""
-        raise NotImplementedError
+        """What the command made: the plan in the GeoPackage OUTPUT, unless it says otherwise."""
+        path = self.parameterAsString(values, "OUTPUT", context)
+        return {"OUTPUT": path, **self.plan_outputs(path, values, context)}
 
     # -- parts that several use --------------------------------------------------------------
 
@@ -247,10 +248,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
 
     def plan_path(self, values: Any, context: Any) -> str:
         """The GeoPackage of the plan; edits that are not saved are refused."""
-        layer = self.parameterAsVectorLayer(values, "PLAN", context)
-        if layer is None:
-            raise engine.EngineError(tr("Choose a layer of a plan."))
-        path = path_of(layer)
+        path = path_of(self.parameterAsVectorLayer(values, "PLAN", context))
         if not path:
             raise engine.EngineError(tr("Choose a layer of a plan."))
         self.refuse_unsaved_plan(path, context)
@@ -268,11 +266,6 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         self.addParameter(
             QgsProcessingParameterFileDestination("OUTPUT", tr("Plan"), "GeoPackage (*.gpkg)")
         )
-
-    def geopackage_outputs(self, values: Any, context: Any) -> dict[str, Any]:
-        """That plan, loaded."""
-        path = self.parameterAsString(values, "OUTPUT", context)
-        return {"OUTPUT": path, **self.plan_outputs(path, values, context)}
 
     def plan_outputs(self, plan: str | Path, values: Any, context: Any) -> dict[str, Any]:
         """The layers of a plan, and their loading."""

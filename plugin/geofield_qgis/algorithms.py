@@ -142,10 +142,6 @@ class OutlineAlgorithm(GeofieldAlgorithm):
         words += self.source_words("BOUNDARY", "--boundary", values, context, feedback, folder)
         return words, environment
 
-    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
-        """See GeofieldAlgorithm."""
-        return self.geopackage_outputs(values, context)
-
 
 class ObstaclesAlgorithm(GeofieldAlgorithm):
     """The obstacles in a field whose outline is known."""
@@ -166,10 +162,6 @@ class ObstaclesAlgorithm(GeofieldAlgorithm):
         output = self.parameterAsString(values, "OUTPUT", context)
         # What the dialog shows holds.
         return [*words, self.plan_path(values, context), "-o", output, "--defaults"], environment
-
-    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
-        """See GeofieldAlgorithm."""
-        return self.geopackage_outputs(values, context)
 
 
 class TracksAlgorithm(GeofieldAlgorithm):

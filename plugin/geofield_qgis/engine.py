@@ -112,13 +112,8 @@ def engine_version(command: str) -> str:
     """The version of a command, asked once for each state of its file."""
     key = (command, Path(command).stat().st_mtime)
     if key not in _VERSIONS:
-        process = QProcess()
-        process.setProcessEnvironment(clean_environment())
-        process.start(command, ["--version"])
-        done = process.waitForStarted(30_000) and process.waitForFinished(60_000)
-        words = bytes(process.readAllStandardOutput()).decode("utf-8", "replace").split()
-        if not done or process.exitCode() != 0 or not words:
-            process.kill()
+        words = answer_of(command, ["--version"])
+        if not words:
             raise EngineError(
                 tr(
                     "The engine {command} does not start: repair it under "
@@ -127,6 +122,18 @@ def engine_version(command: str) -> str:
             )
         _VERSIONS[key] = words[-1]
     return _VERSIONS[key]
+
+
+def answer_of(command: str, words: list[str], wait_ms: int = 60_000) -> list[str]:
+    """What a short command answers, word by word; nothing where it fails."""
+    process = QProcess()
+    process.setProcessEnvironment(clean_environment())
+    process.start(command, words)
+    if not process.waitForStarted(wait_ms) or not process.waitForFinished(wait_ms):
+        process.kill()
+        return []
+    answer = bytes(process.readAllStandardOutput()).decode("utf-8", "replace").split()
+    return answer if process.exitCode() == 0 else []
 
 
 def clean_environment(extra: dict[str, str] | None = None) -> QProcessEnvironment:

@@ -68,10 +68,6 @@ class ImportAlgorithm(GeofieldAlgorithm):
         files = self.parameterAsFileList(values, "FILES", context)
         return [*files, "-o", self.parameterAsString(values, "OUTPUT", context)], {}
 
-    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
-        """See GeofieldAlgorithm."""
-        return self.geopackage_outputs(values, context)
-
 
 class ValidateAlgorithm(GeofieldAlgorithm):
     """Products checked against their formats."""

@@ -165,14 +165,8 @@ class Installer(QObject):
 
 
 def _version(command: str) -> tuple[int, ...]:
-    process = QProcess()
-    process.setProcessEnvironment(engine.clean_environment())
-    process.start(command, ["-c", "import sys, venv; print(*sys.version_info[:2])"])
-    if not process.waitForStarted(5000) or not process.waitForFinished(20_000):
-        process.kill()
-        return ()
-    text = bytes(process.readAllStandardOutput()).decode("ascii", "replace").split()
-    return tuple(int(each) for each in text) if process.exitCode() == 0 else ()
+    asked = ["-c", "import sys, venv; print(*sys.version_info[:2])"]
+    return tuple(int(each) for each in engine.answer_of(command, asked, wait_ms=20_000))
 
 
 def remove() -> None:
