@@ -22,11 +22,11 @@ from geofield.model.obstacles import ObstacleShapes
 from geofield.model.own_values import with_own_values
 from geofield.model.segment_values import values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits, parts_of
-from geofield.model.tracks import Tracks, points_per_segment
+from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import among, as_text
 from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
 from geofield.tracks.shapes import Edges
-from geofield.tracks.tables import BY_HAND, cause_in_words
+from geofield.tracks.tables import BY_HAND, cause_in_words, line_columns
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -319,25 +319,13 @@ def _joined(tracks: Tracks, rows: Sequence[Any], gaps: Sequence[Any]) -> Tracks:
         "cause": causes,
         "obstacle_no": lowest,
     }
-    every, first = np.unique(np.array(numbers, dtype=np.int64), return_index=True)
-    count = np.diff(np.append(first, len(numbers)))
-    points = points_per_segment(np.asarray(length_m, np.float64), tracks.step_m)
-    line_columns = {
-        "track_no": every,
-        "heading_deg": [
-            _heading(lines[at], lines[at + n - 1], crs) for at, n in zip(first, count, strict=True)
-        ],
-        "segment_count": count,
-        "gap_count": count - 1,
-        "point_count": np.add.reduceat(points, first) if len(first) else points,
-        "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
-    }
-    whole = [
-        shapely.MultiLineString(lines[at : at + n]) for at, n in zip(first, count, strict=True)
-    ]
+    of_lines, first = line_columns(np.array(numbers, dtype=np.int64), length_m, tracks.step_m)
+    each = [lines[at:to] for at, to in pairwise([*first, len(lines)])]
+    of_lines["heading_deg"] = [_heading(some[0], some[-1], crs) for some in each]
+    whole = [shapely.MultiLineString(some) for some in each]
     return replace(
         tracks,
-        lines=together(tracks.lines, table(schema.TRACKS, line_columns, whole), ["track_no"]),
+        lines=together(tracks.lines, table(schema.TRACKS, of_lines, whole), ["track_no"]),
         segments=together(tracks.segments, segments, ["track_no", "segment_no"]),
         gaps=together(tracks.gaps, table(schema.GAPS, gap_columns, ways), ["track_no", "gap_no"]),
     )

@@ -61,15 +61,7 @@ class Strips:
         """Places of the tracks across an area, one of them at `first_m` if that is given."""
         near, far = float(edges.va.min()), float(edges.va.max())
         first_m = near + self.first_m if first_m is None else first_m
-        positions = track_positions(
-            near,
-            far,
-            self.spacing_m,
-            first_m=first_m,
-            last_strip=self.last_strip,
-            width_m=self.width_m,
-        )
-        return on_the_border(positions, edges)
+        return on_the_border(self._positions(near, far, first_m), edges)
 
     def refuse_beyond(self, across_m: float) -> None:
         """Refuse an offset that lies beyond a field so wide across the tracks."""
@@ -82,15 +74,13 @@ class Strips:
 
     def count(self, width_m: float) -> int:
         """How many tracks an area needs that is so wide across them; one if none fits."""
-        positions = track_positions(
-            0.0,
-            width_m,
-            self.spacing_m,
-            first_m=self.first_m,
-            last_strip=self.last_strip,
-            width_m=self.width_m,
+        return max(1, len(self._positions(0.0, width_m, self.first_m)))
+
+    def _positions(self, near_m: float, far_m: float, first_m: float) -> FloatArray:
+        strip, width_m = self.last_strip, self.width_m
+        return track_positions(
+            near_m, far_m, self.spacing_m, first_m=first_m, last_strip=strip, width_m=width_m
         )
-        return max(1, len(positions))
 
 
 def on_the_border(positions: FloatArray, edges: Edges) -> FloatArray:

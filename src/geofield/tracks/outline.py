@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import authority_name, is_metric, parse_crs
-from geofield.errors import CRSError, TrackError
+from geofield.errors import CRSError, TrackError, refuse_no_number
 
 #: A place given for a field is not farther from it, metres.
 NEAR_M = 20_000.0
@@ -42,6 +42,20 @@ def refuse_no_shape(polygon: Any) -> None:
             f"The field must be a shapely polygon, not {type(polygon).__name__}.",
             hint="Give a shapely polygon with its CRS, or a geofield Field.",
         )
+
+
+def refuse_no_length(*, none_too: bool = False, **lengths_m: Any) -> None:
+    """Refuse arguments, by their names, that are no lengths; `none_too` lets 0 pass.
+
+    Raises
+    ------
+    TrackError
+    """
+    least = "0 or more metres" if none_too else "more than 0 metres"
+    refuse_no_number(TrackError, least, **lengths_m)
+    for name, value in lengths_m.items():
+        if value < 0.0 or (value == 0.0 and not none_too):
+            raise TrackError(f"{name} is {value!r}; it must be a number, {least}.")
 
 
 def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:

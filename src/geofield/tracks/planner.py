@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale
-from geofield.errors import CRSMismatchError, TrackError, TrackWarning, is_number
+from geofield.errors import CRSMismatchError, TrackError, TrackWarning
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.frame import along_frame
@@ -35,7 +35,13 @@ from geofield.tracks.headland import (
 )
 from geofield.tracks.layout import LastStrip, Strips
 from geofield.tracks.losses import obstacle_losses
-from geofield.tracks.outline import clean_outline, metric, place_near, refuse_no_shape
+from geofield.tracks.outline import (
+    clean_outline,
+    metric,
+    place_near,
+    refuse_no_length,
+    refuse_no_shape,
+)
 from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
 from geofield.tracks.tables import (
     BY_HAND,
@@ -148,10 +154,10 @@ def plan_tracks(
     refuse_no_shape(polygon)
     metric_crs = metric(crs)
     wide_m = spacing_m if width_m is None else width_m
-    _check_lengths(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
+    refuse_no_length(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
     limits = {"min_segment_m": min_segment_m, "straight_tolerance_m": straight_tolerance_m}
     limits |= {"offset_m": 0.0 if offset_m is None else offset_m}
-    _check_lengths(**limits, headland_m=headland_m, clearance_m=clearance_m, none_too=True)
+    refuse_no_length(**limits, headland_m=headland_m, clearance_m=clearance_m, none_too=True)
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
@@ -255,14 +261,6 @@ def clip_shapes(
         owner = np.arange(circles, circles + len(shapes.polygons))
         edges = join_edges(edges, polygon_edges(shapes.polygons, frame, owner))
     return clip_tracks(positions, edges, discs, min_length_m=min_segment_m)
-
-
-def _check_lengths(*, none_too: bool = False, **lengths_m: float) -> None:
-    for name, value in lengths_m.items():
-        known = is_number(value) and np.isfinite(value)
-        if not known or value < 0.0 or (value == 0.0 and not none_too):
-            least = "0 or more" if none_too else "more than 0"
-            raise TrackError(f"{name} is {value!r}; it must be a number, {least} metres.")
 
 
 def _nothing_left(min_segment_m: float) -> str:

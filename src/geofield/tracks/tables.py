@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import shapely
@@ -55,21 +56,24 @@ def line_table(
     crs: CRS,
 ) -> Rows:
     """Layer `tracks`: one row for each track with at least one segment."""
+    columns, first = line_columns(track_no, length_m, step_m)
+    columns["heading_deg"] = np.full(len(first), heading_deg)
+    return Rows(schema.TRACKS, columns, _multi_lines(ends, first), crs)
+
+
+def line_columns(
+    track_no: IntArray, length_m: FloatArray, step_m: float
+) -> tuple[dict[str, Any], IntArray]:
+    """What segments, in the order of their tracks, tell of these; and the first one of each."""
     numbers, first, count = np.unique(track_no, return_index=True, return_counts=True)
     points = points_per_segment(length_m, step_m)
-    return Rows(
-        schema.TRACKS,
-        {
-            "track_no": numbers,
-            "heading_deg": np.full(len(numbers), heading_deg),
-            "segment_count": count,
-            "gap_count": count - 1,
-            "point_count": np.add.reduceat(points, first) if len(first) else points,
-            "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
-        },
-        _multi_lines(ends, first),
-        crs,
-    )
+    return {
+        "track_no": numbers,
+        "segment_count": count,
+        "gap_count": count - 1,
+        "point_count": np.add.reduceat(points, first) if len(first) else points,
+        "length_m": np.add.reduceat(length_m, first) if len(first) else length_m,
+    }, first
 
 
 def gap_table(

@@ -25,11 +25,11 @@ from geofield.errors import (
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.outline import place_near
+from geofield.tracks.outline import place_near, refuse_no_length
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
-from geofield.tracks.route.turns import Curve, Turn, plan_turns, straight_ways
+from geofield.tracks.route.turns import Curve, Turn, as_line, plan_turns, straight_ways
 from geofield.tracks.shapes import IntArray
 from geofield.wording import counted
 
@@ -161,17 +161,13 @@ def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
     refuse_unknown(TrackError, "pattern", pattern, PATTERNS)
     refuse_unknown(TrackError, "curve", curve, get_args(Curve))
     refuse_no_number(TrackError, "0 or more tracks", whole=True, skip=skip)
-    refuse_no_number(TrackError, "0 or more metres", margin_m=margin_m)
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
-    if margin_m < 0.0:
-        raise TrackError(f"margin_m is {margin_m}; it must be 0 or more metres.")
+    refuse_no_length(none_too=True, margin_m=margin_m)
 
 
 def _check_radius(radius_m: float, bounds: tuple[float, ...], margin_m: float) -> None:
-    refuse_no_number(TrackError, "more than 0 metres", turning_radius_m=radius_m)
-    if radius_m <= 0.0:
-        raise TrackError(f"turning_radius_m is {radius_m}; it must be more than 0 metres.")
+    refuse_no_length(turning_radius_m=radius_m)
     size = float(np.hypot(bounds[2] - bounds[0], bounds[3] - bounds[1])) + 2.0 * margin_m
     if 2.0 * radius_m > size:
         raise TrackError(
@@ -234,7 +230,7 @@ def _tables(
     count = len(rows) + len(turns)
     geometry = np.empty(count, dtype=object)
     geometry[0::2] = _shortened(driven, late * scale, (whole - early) * scale)
-    lines = [shapely.LineString(_two(turn.places) * scale) for turn in turns]
+    lines = [as_line(turn.places * scale) for turn in turns]
     geometry[1::2] = lines
     length = np.empty(count)
     length[0::2] = work_m
@@ -321,7 +317,3 @@ def _sides(exits: FloatArray, entries: FloatArray) -> list[str]:
         "left" if value > 1e-6 else "right" if value < -1e-6 else "straight"
         for value in across.tolist()
     ]
-
-
-def _two(places: FloatArray) -> FloatArray:
-    return places if len(places) > 1 else np.repeat(places, 2, axis=0)

@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from geofield.tracks.frame import FloatArray
@@ -147,7 +146,7 @@ def _single_curves(
             break
         pairs = zip(rows.tolist(), word.tolist(), strict=True)
         places = [machine.trace(exits[row], words, row, w) for row, w in pairs]
-        lines = np.array([_line(each) for each in places], dtype=object)
+        lines = np.array([as_line(each) for each in places], dtype=object)
         clear = ~passage.hits(lines)
         inside = clear & shapely.covers(passage.open_shell, lines)
         near = clear & shapely.covers(wider, lines)
@@ -189,7 +188,7 @@ def _through(poses: FloatArray, machine: _Machine) -> Turn | None:
     pieces = words.length[np.arange(len(best)), best] * machine.radius_m
     parts = [machine.trace(poses[k], words, k, word) for k, word in enumerate(best.tolist())]
     places = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
-    if not machine.passage.fits(np.array([_line(places)], dtype=object))[0]:
+    if not machine.passage.fits(np.array([as_line(places)], dtype=object))[0]:
         return None
     reverse = float(-pieces[pieces < 0].sum())
     kind = "reeds_shepp" if reverse > 0.0 else "dubins"
@@ -274,6 +273,6 @@ def _length(places: FloatArray) -> float:
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
 
 
-def _line(places: NDArray[np.float64]) -> BaseGeometry:
+def as_line(places: FloatArray) -> BaseGeometry:
     """A line, also of one place: shapely wants two."""
     return shapely.LineString(places if len(places) > 1 else np.repeat(places, 2, axis=0))
