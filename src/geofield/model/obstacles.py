@@ -63,9 +63,13 @@ def circle_polygons(
 
     Centres are in the metric CRS, radii metres on the ground.
     """
+    return plain_circles(x, y, np.asarray(radius_m, float) * ground_scale(crs, x, y))
+
+
+def plain_circles(x: ArrayLike, y: ArrayLike, radius: ArrayLike) -> NDArray[np.object_]:
+    """The same of circles whose radii are in units of their CRS, too."""
     points = shapely.points(np.asarray(x, float), np.asarray(y, float))
-    radius = np.asarray(radius_m, float) * ground_scale(crs, x, y)
-    circles = shapely.buffer(points, radius, quad_segs=QUARTER_SEGMENTS)
+    circles = shapely.buffer(points, np.asarray(radius, float), quad_segs=QUARTER_SEGMENTS)
     # Counter-clockwise, as files hold them: a plan read back is then the same.
     return np.atleast_1d(shapely.orient_polygons(circles))
 

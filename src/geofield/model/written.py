@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
 from geofield.crs import LONLAT, reproject, transformer
-from geofield.model.obstacles import QUARTER_SEGMENTS, circle_polygons, floats, still_round
+from geofield.model.obstacles import circle_polygons, floats, plain_circles, still_round
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -141,7 +141,7 @@ def plain(geometry: Any) -> list[PlainShape]:
     ]
     rows = np.flatnonzero(still_round(geometry, fitted[:, 2]))
     # Some are round enough to be driven around as circles, but were drawn as they are.
-    rows = rows[same_shapes(_circles(fitted[rows]), geometry[rows], SAME_M / 2)]
+    rows = rows[same_shapes(plain_circles(*fitted[rows].T), geometry[rows], SAME_M / 2)]
     for row, (x, y, radius) in zip(rows, fitted[rows].round(_DECIMALS).tolist(), strict=True):
         result[row] = (x, y, radius)
     return result
@@ -157,20 +157,12 @@ def fitted_circles(geometry: Any) -> NDArray[np.float64]:
     return np.column_stack([centre, np.bincount(row, away, minlength=len(geometry)) / count])
 
 
-def _circles(circles: NDArray[np.float64]) -> NDArray[np.object_]:
-    """Polygons of circles, all in units of their CRS."""
-    points = shapely.points(circles[:, :2])
-    return np.asarray(
-        shapely.orient_polygons(shapely.buffer(points, circles[:, 2], quad_segs=QUARTER_SEGMENTS))
-    )
-
-
 def shapes_of_plain(shapes: Sequence[PlainShape]) -> NDArray[np.object_]:
     """The polygons of plain shapes."""
     result = np.empty(len(shapes), dtype=object)
     round_ones = [i for i, shape in enumerate(shapes) if not isinstance(shape, str)]
     if round_ones:
-        result[round_ones] = _circles(np.array([shapes[i] for i in round_ones], dtype=float))
+        result[round_ones] = plain_circles(*np.array([shapes[i] for i in round_ones], float).T)
     for i, shape in enumerate(shapes):
         if isinstance(shape, str):
             result[i] = shapely.from_wkt(shape)

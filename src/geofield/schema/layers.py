@@ -181,8 +181,8 @@ ROUTE = Layer(
         Column("kind", "str", "Kind", "kind", values=("work", "turn", "drive")),
         # Of work: with or against the segment's own direction.
         Column("direction", "str", "Direction", "direction", values=("forward", "backward")),
-        Column("track_no", "int", "Track", "track_no"),
-        Column("segment_no", "int", "Segment", "segment_no"),
+        _TRACK_NO,
+        _SEGMENT_NO,
         _LENGTH,
         Column("start_m", "float", "Driven before", "start_m", "m"),
     ),
