@@ -74,6 +74,14 @@ def plain_circles(x: ArrayLike, y: ArrayLike, radius: ArrayLike) -> NDArray[np.o
     return np.atleast_1d(shapely.orient_polygons(circles))
 
 
+def polygons_around(circles: FloatArray, quarter: int) -> NDArray[np.object_]:
+    """Polygons that hold circles (n, 3: centre, radius), of so many sides to a quarter."""
+    # Their corners lie so far out that their sides keep clear of the circles.
+    radius = circles[:, 2] / np.cos(np.pi / (4 * quarter))
+    places = shapely.points(circles[:, :2])
+    return np.asarray(shapely.buffer(places, radius, quad_segs=quarter), dtype=object)
+
+
 def from_circles_px(
     x_px: ArrayLike,
     y_px: ArrayLike,

@@ -18,7 +18,7 @@ from shapely import Polygon
 
 from geofield import schema
 from geofield.crs import grid_north_deg
-from geofield.model.obstacles import ObstacleShapes
+from geofield.model.obstacles import ObstacleShapes, polygons_around
 from geofield.model.own_values import with_own_values
 from geofield.model.segment_values import values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits, parts_of
@@ -277,11 +277,7 @@ def _shapes(shapes: ObstacleShapes | None) -> Any:
     """What stands there, circles as polygons around them."""
     if shapes is None:
         return np.empty(0, dtype=object)
-    x, y, radius = shapes.circles.T
-    around = radius / np.cos(np.pi / (4 * _SIDES))
-    return np.concatenate(
-        [shapely.buffer(shapely.points(x, y), around, quad_segs=_SIDES), shapes.polygons]
-    )
+    return np.concatenate([polygons_around(shapes.circles, _SIDES), shapes.polygons])
 
 
 def _cut(line: Any, free: Any) -> list[Any]:

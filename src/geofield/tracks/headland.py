@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield import schema
 from geofield.errors import TrackError
-from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
+from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, polygons_around
 from geofield.model.rows import Rows
 from geofield.model.track_statistics import MITRE_LIMIT, SHARED_EDGE_M
 
@@ -165,10 +165,6 @@ def _blocked(shapes: ObstacleShapes, rings: BaseGeometry) -> BaseGeometry:
     places = np.asarray(shapely.points(shapes.circles[:, :2]), dtype=object)
     radius = shapes.circles[:, 2]
     met = shapely.dwithin(rings, places, radius)  # type: ignore[call-overload]
-    discs = shapely.buffer(
-        places[met],
-        radius[met] / np.cos(np.pi / (8 * QUARTER_SEGMENTS)),
-        quad_segs=2 * QUARTER_SEGMENTS,
-    )
+    discs = polygons_around(shapes.circles[met], 2 * QUARTER_SEGMENTS)
     other = shapes.polygons[shapely.intersects(rings, shapes.polygons)]
     return shapely.union_all(np.concatenate((discs, other)))

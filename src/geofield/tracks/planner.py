@@ -42,7 +42,7 @@ from geofield.tracks.outline import (
     refuse_no_length,
     refuse_no_shape,
 )
-from geofield.tracks.shapes import FIELD, Edges, discs_in_frame, join_edges, polygon_edges
+from geofield.tracks.shapes import FIELD, Discs, Edges, join_edges, polygon_edges
 from geofield.tracks.tables import (
     BY_HAND,
     gap_table,
@@ -256,7 +256,7 @@ def clip_shapes(
     """
     circles = len(shapes.circles)
     x, y, radius = shapes.circles.T
-    discs = discs_in_frame(x, y, radius, np.arange(circles), frame)
+    discs = Discs(*frame.to_frame(x, y), radius / frame.scale, np.arange(circles))
     if len(shapes.polygons):
         owner = np.arange(circles, circles + len(shapes.polygons))
         edges = join_edges(edges, polygon_edges(shapes.polygons, frame, owner))

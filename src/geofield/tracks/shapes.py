@@ -105,12 +105,3 @@ def join_edges(first: Edges, second: Edges) -> Edges:
             for name in ("ua", "va", "ub", "vb", "turn", "owner")
         )
     )
-
-
-def discs_in_frame(
-    x: FloatArray, y: FloatArray, radius: FloatArray, owner: IntArray, frame: TrackFrame
-) -> Discs:
-    """Carry circles of the metric CRS, radii in its units, into the frame."""
-    u, v = frame.to_frame(x, y)
-    radius_m = np.asarray(radius, dtype=np.float64) / frame.scale
-    return Discs(u, v, radius_m, np.asarray(owner, dtype=np.int64))

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes
+from geofield.model.obstacles import QUARTER_SEGMENTS, ObstacleShapes, polygons_around
 from geofield.tracks.frame import FloatArray
 
 TOUCH_M = 2e-3
@@ -110,11 +110,9 @@ class Passage:
         each = np.array(
             [*round_ones, *shapely.buffer(solid, -TOUCH_M, join_style="mitre")], dtype=object
         )
-        # Corners of a circle's polygon lie so far out that its edges keep clear of the circle.
-        out = (radius + _AROUND_M) / np.cos(np.pi / (4 * _QUARTER_CORNERS))
         around = np.array(
             [
-                *shapely.buffer(circles, out, quad_segs=_QUARTER_CORNERS),
+                *polygons_around(np.add(shapes.circles, (0, 0, _AROUND_M)), _QUARTER_CORNERS),
                 *shapely.buffer(solid, _AROUND_M, join_style="mitre"),
             ],
             dtype=object,
