@@ -17,7 +17,6 @@ import shapely
 from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
 from shapely.affinity import translate
 
-import geofield as gf
 from geofield.crs import ground_scale_of
 from geofield.simulate import SimulatedField
 from geofield_command import run_geofield
@@ -363,28 +362,6 @@ def test_a_row_copied_in_place_is_no_further_obstacle(folder: Path) -> None:
     assert after["radius_m"][2] == 7.0
     assert after["mine"][[1, 2]].tolist() == ["seen", "as it was"]
     assert "Rows copied in place" not in geofield("tracks", file, "-o", file)
-
-
-def test_a_word_on_one_obstacle_is_none_on_those_merged_with_it(folder: Path) -> None:
-    """Rows dissolved into one that was rejected: all were driven through, without a word."""
-    file = folder / "out/field.gpkg"
-    before = rows(plan_in(folder))
-    a, b = (before.geometry[number] for number in (1, 2))
-    whole = shapely.union_all([a, b, shapely.LineString([a.centroid, b.centroid]).buffer(0.5)])
-    for others, shape, words in (
-        (before.index != 1, shapely.MultiPolygon(list(before.geometry)), "counts as it was"),
-        (before.index == 2, whole, "all of it is driven around"),
-    ):
-        merged = folder / f"{words}.gpkg"
-        merged.write_bytes(file.read_bytes())
-
-        table = before.reset_index(drop=True)
-        table.loc[at(table, 1), ["status", "geometry"]] = ["rejected", shape]
-        rewritten(merged, "obstacles", lambda _, rest=table[~others]: rest)
-        assert words in geofield("tracks", merged, "-o", merged)
-        after = rows(gf.read_plan(merged))
-        driven = after.geometry[after["status"] != "rejected"].union_all()
-        assert driven.buffer(0.01).covers(before.geometry[others].union_all())
 
 
 def test_numbers_that_none_can_have(folder: Path) -> None:

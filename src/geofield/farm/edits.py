@@ -34,7 +34,7 @@ from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
-from geofield.formats.gpkg_read import parts_apart
+from geofield.model.merged_rows import parts_apart
 from geofield.plan import Plan
 from geofield.wording import counted, some_of
 

@@ -19,6 +19,8 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
 from geofield.model import Dataset
+from geofield.model.evidence import Evidence
+from geofield.model.merged_rows import parts_apart
 from geofield.strangers import database, is_geopackage
 
 if TYPE_CHECKING:
@@ -55,6 +57,11 @@ def read(path: Path) -> Dataset:
         if name in known and name != schema.TRACK_POINTS.name:
             frame = _exact(known[name], read_vector(path, name), path)
             tables[name] = _own_table(known[name], frame, crs, path)
+    if schema.OBSTACLES.name in tables:
+        written = Evidence.from_json(record.provenance.evidence).written
+        tables[schema.OBSTACLES.name] = parts_apart(
+            tables[schema.OBSTACLES.name], None if written is None else written.by_number
+        )
     field = tables.get(schema.FIELD.name)
     several = field is not None and len(field) > 1
     for name in layers:
@@ -185,8 +192,6 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             FormatWarning,
             stacklevel=3,
         )
-    if of is schema.OBSTACLES:
-        frame = parts_apart(frame)
     if of is schema.HEADLAND_TRACKS:
         frame = _passes_by_offset(frame)
     return schema.conform(of, frame, extras=True)
@@ -228,17 +233,6 @@ def _passes_by_offset(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     if "segment_no" in frame.columns:
         return frame
     return frame.assign(segment_no=frame.groupby("pass_no").cumcount() + 1)
-
-
-def parts_apart(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """Obstacles of several parts as several obstacles; the further parts have the number still.
-
-    What they are of is known by it: a size in the row is that of the whole, and none to draw
-    the part by.
-    """
-    if not (shapely.get_num_geometries(frame.geometry.to_numpy()) > 1).any():
-        return frame
-    return frame.explode(index_parts=False, ignore_index=True)
 
 
 def own_layers(connection: sqlite3.Connection, of: str = "main") -> set[str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from geofield.errors import FormatError
+from geofield.errors import FormatError, FormatWarning
 from geofield.schema.columns import ColumnType, Layer
 
 if TYPE_CHECKING:
@@ -95,8 +96,8 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
             if whole.dtype.kind == "i" and not whole.isna().any():
                 data[column.name] = whole.to_numpy(dtype="int64")
             else:
-                rounded = whole.round().astype("Int64").to_list()
-                data[column.name] = [None if pd.isna(v) else int(v) for v in rounded]
+                whole = _whole_numbers(of, column.name, whole)
+                data[column.name] = [None if pd.isna(v) else int(v) for v in whole.to_list()]
         elif column.type == "float":
             data[column.name] = series.to_numpy(dtype="float64", na_value=np.nan)
         elif column.type == "date":
@@ -108,3 +109,20 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
         result[name] = frame[name].array
     result = result.sort_values(list(of.key), kind="stable", na_position="last")
     return result.reset_index(drop=True)
+
+
+def _whole_numbers(of: Layer, name: str, numbers: pd.Series[Any]) -> pd.Series[Any]:
+    """A column without numbers that are not whole, as means are, which is told."""
+    import numpy as np
+
+    plain = numbers.to_numpy(dtype="float64", na_value=np.nan)
+    with np.errstate(invalid="ignore"):
+        strange = ~np.isnan(plain) & ~(np.abs(plain - np.round(plain)) < 1e-6)
+    if strange.any():
+        what = f"{name} {plain[strange][0]:g}"
+        warnings.warn(
+            f"Layer {of.name!r}: {what} is no whole number and counts as none.",
+            FormatWarning,
+            stacklevel=4,
+        )
+    return numbers.mask(strange).round().astype("Int64")
