@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from math import isfinite, isinf, isnan
+from math import isfinite, isinf, isnan, nan
 from numbers import Real
 from typing import Any, get_args
 
@@ -101,6 +101,11 @@ def is_number(value: Any) -> bool:
         if getattr(value, "ndim", None) != 0 or kind not in ("i", "u", "f"):
             return False
     return not is_truth(value) and not isnan(value)
+
+
+def plain_number(value: Any) -> float:
+    """A number as a float; not a number for true and false, which nobody means as 1 and 0."""
+    return nan if is_truth(value) else float(value)
 
 
 def is_truth(value: object) -> bool:

@@ -71,8 +71,8 @@ def undissolved(
     if not len(rows) or np.isin(before, now).all():
         return rows, ids
     unit = 1.0 if written.crs.is_projected else 1.0 / _M_PER_DEGREE
-    parts, row = shapely.get_parts(rows.geometry.to_numpy(), return_index=True)
-    pairs = _Pairs.of(parts, row, written, SAME_M * unit)
+    (parts, row), apart = _Parts.of(rows), _Parts.of(written)
+    pairs = _Pairs.of(parts, row, apart, SAME_M * unit)
     gone, mine = ~np.isin(before, now)[pairs.written], now[pairs.row] == before[pairs.written]
     merged = _merged(pairs, row)[pairs.row]
     alone = ~merged & gone
@@ -80,7 +80,7 @@ def undissolved(
     found = alone | (merged & gone)
     if found.any():
         found |= merged & mine & np.isin(pairs.row, pairs.row[found])
-        back = _as_written(rows, written, pairs.only(found), mine[found], alone[found])
+        back = _as_written(rows, written, apart, pairs.only(found), mine[found], alone[found])
         rest = np.setdiff1d(np.flatnonzero(np.isin(row, pairs.row[found])), pairs.part[found])
         left = _where_it_lies(of, rows.iloc[row[rest]].set_geometry(parts[rest]), fields)
         whole = rows.drop(index=np.unique(pairs.row[found]))
@@ -93,6 +93,17 @@ def undissolved(
     return _driven_around(rows, written[~np.isin(before, _names(of, rows))], _OUT_M * unit), ids
 
 
+class _Parts(NamedTuple):
+    """The single shapes of a table, and the rows that they are of."""
+
+    shapes: NDArray[np.object_]
+    row: _At
+
+    @classmethod
+    def of(cls, table: gpd.GeoDataFrame) -> _Parts:
+        return cls(*shapely.get_parts(table.geometry.to_numpy(), return_index=True))
+
+
 class _Pairs(NamedTuple):
     """Parts of rows that are just as parts of rows were written."""
 
@@ -102,8 +113,8 @@ class _Pairs(NamedTuple):
     written: _At
 
     @classmethod
-    def of(cls, parts: Any, row: _At, written: gpd.GeoDataFrame, tolerance: float) -> _Pairs:
-        known, of_row = shapely.get_parts(written.geometry.to_numpy(), return_index=True)
+    def of(cls, parts: Any, row: _At, written: _Parts, tolerance: float) -> _Pairs:
+        known, of_row = written
         tree = shapely.STRtree(shapely.centroid(known))
         part, one = tree.query(shapely.centroid(parts), "dwithin", 10 * tolerance)
         same = same_shapes(parts[part], known[one], tolerance)
@@ -154,8 +165,9 @@ def _alone(
 
 
 def _as_written(
-    rows: gpd.GeoDataFrame, written: gpd.GeoDataFrame, pairs: _Pairs, mine: _Mask, alone: _Mask
-) -> gpd.GeoDataFrame:
+    rows: gpd.GeoDataFrame, written: gpd.GeoDataFrame, apart: _Parts, pairs: _Pairs,
+    mine: _Mask, alone: _Mask,
+) -> gpd.GeoDataFrame:  # fmt: skip
     """The rows that were found, each once; with what now stands in those that say it themselves."""
     at, first = np.unique(pairs.written, return_index=True)
     back = written.iloc[at].reset_index(drop=True)
@@ -166,7 +178,7 @@ def _as_written(
         back[name] = said[name].where(holds, before) if holds.any() else before
     # Of a track perhaps some parts alone are there.
     shapes = back.geometry.to_numpy().copy()
-    known, of_row = shapely.get_parts(written.geometry.to_numpy(), return_index=True)
+    known, of_row = apart
     there = np.unique(pairs.one)
     for i in np.flatnonzero(np.bincount(of_row[there])[at] < np.bincount(of_row)[at]):
         shapes[i] = shapely.multilinestrings(known[there[of_row[there] == at[i]]])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import ObstacleError, is_truth
+from geofield.errors import ObstacleError, plain_number
 
 FloatArray = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tupl
         If the range is empty, inverted, not finite or not above ``floor``.
     """
     try:
-        low, high = (float("nan") if is_truth(value) else float(value) for value in radius_px)
+        low, high = map(plain_number, radius_px)
     except (TypeError, ValueError):
         raise ObstacleError(
             f"A radius range is two numbers; {radius_px!r} is none.", hint="For example (2, 9)."

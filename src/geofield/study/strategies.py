@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from geofield.errors import ObstacleError, is_truth, refuse_unknown
+from geofield.errors import ObstacleError, plain_number, refuse_unknown
 from geofield.model.circles import Circles, inside
 from geofield.study.accumulator import Polarity
 from geofield.study.checks import first_of_duplicates
@@ -216,7 +216,7 @@ def thresholds(span: ThresholdRange) -> NDArray[np.float64]:
         For a step that is not above zero, or a stop below the start.
     """
     try:
-        start, stop, step = (float("nan") if is_truth(value) else float(value) for value in span)
+        start, stop, step = map(plain_number, span)
     except (TypeError, ValueError):
         raise ObstacleError(
             f"The thresholds {span!r} are no range.", hint="Give start, stop and step."
