@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 import shapely
 from affine import Affine
+from click.testing import CliRunner
 from pydantic import ValidationError
 
 import geofield as gf
-from geofield.errors import GeofieldError
-from geofield.farm.limits import Limits
+from geofield.cli.main import cli
+from geofield.cli.options import stage_options
+from geofield.errors import GeofieldError, TrackError
+from geofield.farm.limits import Limits, Watch
+from geofield.farm.marks import Marks
+from geofield.farm.store import Store
 from geofield.simulate import SimulatedField, SimulationSettings
 
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
@@ -168,3 +175,69 @@ def test_fields_and_grids_are_made_with_the_name_of_a_crs() -> None:
     shape = shapely.box(500000, 3900000, 500200, 3900100)
     assert gf.Field(shape, "EPSG:32636").crs.to_epsg() == 32636
     assert gf.Grid(3, 3, Affine(1, 0, 500000, 0, -1, 3900000), UTM).crs.to_epsg() == 32636
+
+
+def options() -> list[tuple[list[str], click.Option]]:
+    """All options of all commands that take numbers with a point."""
+    context = click.Context(cli)
+    waiting = [([name], cli.get_command(context, name)) for name in cli.list_commands(context)]
+    found: list[tuple[list[str], click.Option]] = []
+    for path, command in waiting:
+        if isinstance(command, click.Group):
+            waiting += [([*path, name], each) for name, each in command.commands.items()]
+        for each in command.params if command is not None else ():
+            kinds = each.type.types if isinstance(each.type, click.Tuple) else [each.type]
+            if isinstance(each, click.Option) and any(
+                isinstance(kind, click.types.FloatParamType) for kind in kinds
+            ):
+                found.append((path, each))
+    return found
+
+
+@click.command()
+@stage_options("imagery", "field", "obstacles", "tracks", "export")
+def staged(settings: gf.Settings, **_: Any) -> None:
+    """A command of all settings, and of nothing else."""
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_the_option_that_was_typed_is_named(value: str) -> None:
+    """They named an argument of Python, or a table of the settings file."""
+    every = options()
+    assert {"--size-m", "--distance", "--time-limit", "--spacing", "--radius", "--lat"} <= {
+        each.opts[0] for _, each in every
+    }
+    for path, each in every:
+        is_setting = "__" in str(each.name)
+        words = [each.opts[0], *[value] * each.nargs]
+        done = CliRunner().invoke(
+            staged if is_setting else cli, words if is_setting else [*path, *words]
+        )
+        error = done.exception
+        told = error.message if isinstance(error, GeofieldError) else done.output
+        assert each.opts[0] in told, (path, told)
+
+
+def test_settings_that_need_another_option_name_it() -> None:
+    error = CliRunner().invoke(staged, ["--overlap", "3"]).exception
+    assert isinstance(error, GeofieldError)
+    assert "(--width)" in error.message
+    error = (
+        CliRunner().invoke(staged, ["--include-lonlat", "nan", "--radius", "3", "2e9"]).exception
+    )
+    assert isinstance(error, GeofieldError)
+    assert "--include-lonlat: write a position as LON,LAT" in error.message
+    assert "--radius: input should be less than or equal to 1000 (given: 2" in error.message
+    assert "Did you mean" not in error.message
+
+
+def test_a_limit_of_all_times_is_none() -> None:
+    """The operating system refused such an alarm, in a traceback."""
+    with Watch(Limits(time_s=1e30), Marks(Store("."), 0)).watching() as watch:
+        watch._alarm(1e30)
+        assert 0 < signal.getitimer(signal.ITIMER_REAL)[0] < 1e9
+
+
+def test_a_headland_without_an_area_is_none(simulated: SimulatedField) -> None:
+    with pytest.raises(TrackError, match="A headland of 1e-30 m is too narrow to be one"):
+        gf.plan_tracks(simulated.field, spacing_m=30, headland_m=1e-30)

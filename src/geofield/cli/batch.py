@@ -14,7 +14,7 @@ from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.interrupts import two_interrupts
-from geofield.cli.options import acknowledge_option, stage_options, tell_idle
+from geofield.cli.options import Number, acknowledge_option, stage_options, tell_idle
 from geofield.cli.place_options import place_options, places_of
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
@@ -78,7 +78,7 @@ Examples (the first one on the project's own sample):
 @click.option(
     "--time-limit",
     "time_limit_s",
-    type=click.FloatRange(0, min_open=True),
+    type=Number(0, min_open=True),
     default=600.0,
     show_default=True,
     help="Of one field, seconds.",
@@ -86,7 +86,7 @@ Examples (the first one on the project's own sample):
 @click.option(
     "--memory-limit",
     "memory_limit_mb",
-    type=click.FloatRange(0, min_open=True),
+    type=Number(0, min_open=True),
     default=4000.0,
     show_default=True,
     help="Of a worker, megabytes.",

@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.files import FILE, OLD_FILE
+from geofield.cli.options import Number
 from geofield.errors import ObstacleError
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ Examples (on the project's own sample):
 @click.option(
     "--distance",
     "distance_m",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     default=6.0,
     show_default=True,
     help="Distance between centres within which a detection is a hit, metres.",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -17,6 +18,7 @@ import click
 from pydantic.fields import FieldInfo
 
 from geofield.cli.console import say, say_note
+from geofield.errors import SettingsError
 from geofield.settings import (
     LonLat,
     Settings,
@@ -75,6 +77,17 @@ class Degrees(click.FloatRange):
         return super().convert(angle, param, ctx)
 
 
+class Number(click.FloatRange):
+    """A number between two others, which not a number and what has no end are not."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number as a float."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return number
+
+
 class NearestChoice(click.Choice[str]):
     """A choice whose refusal names the nearest one."""
 
@@ -107,7 +120,11 @@ def settings_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def with_settings(*, settings_file: str | None, **values: Any) -> Any:
-        settings = load_settings(settings_file, section_values(values))
+        said = section_values(values)
+        try:
+            settings = load_settings(settings_file, said)
+        except SettingsError as error:
+            raise SettingsError(_by_option(error.message, said), hint=error.hint) from None
         own = {name: value for name, value in values.items() if SEPARATOR not in name}
         return command(settings=settings, **own)
 
@@ -178,6 +195,19 @@ def tell_idle(
             say_note(f"{option_named(name, fields[name])} changes nothing {why}.")
     for sentence in idle(settings, said):
         say_note(sentence)
+
+
+def _by_option(message: str, said: Mapping[str, Mapping[str, Any]]) -> str:
+    """A message in which settings that were said as options have the names of these."""
+    for section, values in said.items():
+        fields = Settings.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
+        for name in values:
+            option = option_named(name, fields[name])
+            message = re.sub(rf"\b{section}\.{name}\b(\.\d+)*", option, message)
+        # What it says of another one of the section, that one is to be typed, too.
+        for name in fields:
+            message = message.replace(f"({name})", f"({option_named(name, fields[name])})")
+    return message
 
 
 def _as_typed(value: Any) -> str:

@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import FOLDER, claim_folder
+from geofield.cli.options import Number
 from geofield.simulate import CLIMATES, SimulatedField, SimulationSettings, simulate_fields
 from geofield.staging import staged_folder
 from geofield.wording import counted
@@ -45,7 +46,7 @@ Examples:
     "resolution_m",
     default=0.6,
     show_default=True,
-    type=click.FloatRange(0.05, 5),
+    type=Number(0.05, 5),
     help="Metres per pixel.",
 )
 @click.option(
@@ -71,14 +72,14 @@ Examples:
     "--lat",
     default=35.075373,
     show_default=True,
-    type=click.FloatRange(-80, 84),
+    type=Number(-80, 84),
     help="Latitude of the pictures' centre.",
 )
 @click.option(
     "--lon",
     default=33.531142,
     show_default=True,
-    type=click.FloatRange(-180, 180),
+    type=Number(-180, 180),
     help="Longitude of the pictures' centre.",
 )
 @click.option("--out", required=True, type=FOLDER, help="Folder to write.")

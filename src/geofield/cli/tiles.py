@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from geofield.cli.console import echo_json, progress_bar, say_note
 from geofield.cli.files import FOLDER, OLD_FILE, claim_file, output_option
-from geofield.cli.options import Degrees, acknowledge_option, stage_options
+from geofield.cli.options import Degrees, Number, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
@@ -66,7 +66,7 @@ Examples (the first one on the project's own sample):
 @click.option(
     "--resolution",
     "resolution_m",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     default=0.6,
     show_default=True,
     help="Wanted metres per pixel on the ground, when no zoom is given.",
@@ -76,7 +76,7 @@ Examples (the first one on the project's own sample):
 )
 @click.option(
     "--size-m",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     help="Side of the square, metres on the ground.",
 )
 @click.option("--whole-tiles", is_flag=True, help="Keep the touched tiles whole.")

@@ -19,6 +19,8 @@ from geofield.errors import SettingsError, refuse_no_number
 from geofield.farm.marks import Marks
 
 _EVERY_S = 0.2
+#: Three years: no alarm of the operating system is set for much more.
+_LONG_S = 1e8
 #: Exit status of a worker that ended itself.
 OVER_LIMIT = 70
 
@@ -62,7 +64,7 @@ class Watch:
         """The operating system's own alarm, for code that lets no thread run."""
         if self._limits.time_s is not None and hasattr(signal, "setitimer"):
             late = 0.0 if seconds is None else 1.5 * seconds + 5.0
-            signal.setitimer(signal.ITIMER_REAL, late)
+            signal.setitimer(signal.ITIMER_REAL, min(late, _LONG_S))
 
     def _look(self) -> None:
         while not self._done.wait(_EVERY_S):

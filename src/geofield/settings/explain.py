@@ -40,7 +40,8 @@ def explained(error: ValidationError) -> str:
             if section in HOMES:
                 near = f"It belongs to {HOMES[section]}"
         elif not whole and problem["type"] in ("literal_error", "value_error"):
-            choices = re.findall(r"'([^']+)'", message) or get_args(DirectionName)
+            named = get_args(DirectionName) if "direction" in problem["loc"] else ()
+            choices = re.findall(r"'([^']+)'", message) or named
             near = nearest(str(problem.get("input")), choices)
         words = "; ".join([*given, *([near.strip()] if near else [])])
         lines.append(

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PositiveFloat
 
 from geofield.methods import Strategy
-from geofield.settings.section import NonNegative, Section
+from geofield.settings.section import NonNegative, Radius, Reach, Section
 
 
 class ObstacleSettings(Section):
@@ -16,12 +16,12 @@ class ObstacleSettings(Section):
     strategy: Strategy = Field(
         "auto", description="How obstacles are found: auto, or a way of the study."
     )
-    radius_m: tuple[PositiveFloat, PositiveFloat] | None = Field(
+    radius_m: tuple[Radius, Radius] | None = Field(
         None,
         description="Smallest and largest crown radius, metres; 1 to 15 with auto, 2 to 9 with "
         "the study's strategies by default.",
     )
-    buffer_m: NonNegative = Field(1.5, description="Safety margin around each obstacle, metres.")
+    buffer_m: Reach = Field(1.5, description="Safety margin around each obstacle, metres.")
     cost_missed: PositiveFloat = Field(
         30.0,
         description="auto: what driving into a thing costs, against a look at one place of the "

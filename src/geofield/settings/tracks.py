@@ -15,7 +15,7 @@ from pydantic import (
     model_validator,
 )
 
-from geofield.settings.section import NonNegative, Section
+from geofield.settings.section import NonNegative, Reach, Section
 
 DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_turns"]
 
@@ -92,7 +92,7 @@ class TrackSettings(Section):
     )
     headland_holes: bool = Field(False, description="A headland around the field's holes too.")
     min_segment_m: NonNegative = Field(0.0, description="Shorter segments are not driven, metres.")
-    clearance_m: NonNegative = Field(
+    clearance_m: Reach = Field(
         0.0, description="Distance to keep from obstacles, on top of their margin, metres."
     )
     straight_tolerance_m: PositiveFloat = Field(
@@ -171,6 +171,7 @@ def said_over(earlier: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, 
 def _number(value: Any) -> float | None:
     """A number, or None for what is none: its own check says so."""
     try:
-        return None if value is None else float(value)
+        number = math.nan if value is None else float(value)
     except (TypeError, ValueError):
         return None
+    return number if math.isfinite(number) else None

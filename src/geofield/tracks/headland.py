@@ -68,10 +68,21 @@ def main_area(
 def headland_table(
     outline: Polygon, inner: BaseGeometry, width_m: float, *, crs: CRS, scale: float
 ) -> Rows:
-    """Layer `headland`: the field less its main area, one row."""
+    """Layer `headland`: the field less its main area, one row.
+
+    Raises
+    ------
+    TrackError
+        When it has no area.
+    """
     # Along a hole they share an edge: without the grid a spike would be left there.
     strip = shapely.difference(outline, inner, grid_size=SHARED_EDGE_M)
     parts = [p for p in shapely.get_parts(strip) if isinstance(p, Polygon) and p.area > 0.0]
+    if not parts:
+        raise TrackError(
+            f"A headland of {width_m:g} m is too narrow to be one.",
+            hint="Choose a wider headland, or none: --headland 0.",
+        )
     return Rows(
         schema.HEADLAND,
         {
