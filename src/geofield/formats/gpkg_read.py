@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sqlite3
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import shapely
@@ -22,12 +23,15 @@ from geofield.model import Dataset
 from geofield.model.evidence import Evidence
 from geofield.model.merged_rows import parts_apart
 from geofield.strangers import database, is_geopackage
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
 #: Track points that are read at a time.
 BATCH_ROWS = 200_000
+#: What is farther from the field is no part of its plan.
+_FAR_M = 100_000.0
 #: Tables that some readers list as layers without geometry.
 _NOT_LAYERS = ("layer_styles", "qgis_projects")
 
@@ -64,6 +68,8 @@ def read(path: Path) -> Dataset:
         )
     field = tables.get(schema.FIELD.name)
     several = field is not None and len(field) > 1
+    if field is not None and not several:
+        _refuse_far(tables, field, path)
     for name in layers:
         if name not in known and not (several and name == schema.PLACES.name):
             warnings.warn(
@@ -83,6 +89,24 @@ def read(path: Path) -> Dataset:
         _scene(record, path),
         PointsInFile(path, crs) if has_points else None,
     )
+
+
+def _refuse_far(
+    tables: Mapping[str, gpd.GeoDataFrame], field: gpd.GeoDataFrame, path: Path
+) -> None:
+    """Refuse shapes that are no place near the field, as degrees are in a layer of metres."""
+    box = shapely.box(*field.total_bounds)
+    for name, table in tables.items():
+        away = shapely.distance(shapely.envelope(table.geometry.to_numpy()), box)
+        far = np.flatnonzero(~(away < _FAR_M))
+        if len(field) and len(far):
+            x, y = shapely.get_coordinates(table.geometry.iloc[far[0]])[0]
+            raise FormatError(
+                f"{path.name}: {counted(len(far), 'row')} of layer {name!r} lie nowhere near the "
+                f"field, as at x {x:.6g}, y {y:.6g} of {table.crs.name}.",
+                hint="Perhaps these are coordinates of another CRS: save the layer anew in that of "
+                "the other layers, or delete such rows.",
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,8 @@ from geofield.model.obstacles import (
     floats,
     still_round,
 )
-from geofield.model.written import fitted_circles, same_shapes
+from geofield.model.written import WrittenRow, fitted_circles, same_shapes, shapes_of_plain
+from geofield.wording import some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -118,6 +120,40 @@ def widened(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     shapes[thin] = strips(shapes[thin], half_m[thin], CRS(obstacles.crs))
     radius[line] = np.nan
     return obstacles.assign(radius_m=radius).set_geometry(shapes, crs=obstacles.crs)
+
+
+def as_areas(obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> gpd.GeoDataFrame:
+    """A table in which borders of areas that were written are these areas again, which is told.
+
+    As a strip such a line would leave a way through the middle of the tree.
+
+    Parameters
+    ----------
+    obstacles : GeoDataFrame
+        Layer `obstacles`, with shapes of any kind.
+    record : mapping of int to WrittenRow
+        What was written, by number.
+    """
+    shapes = np.array(obstacles.geometry.array, dtype=object)
+    lines = np.flatnonzero(shapely.get_dimensions(shapes) == 1)
+    if not len(lines):
+        return obstacles
+    numbers = floats(obstacles, "obstacle_no")[lines]
+    lines = lines[np.isin(numbers, list(record))]
+    known = [record[int(number)] for number in numbers[np.isin(numbers, list(record))]]
+    areas = shapes_of_plain([row.shape for row in known])
+    same = same_shapes(shapely.boundary(areas), shapes[lines])
+    if not same.any():
+        return obstacles
+    shapes[lines[same]] = areas[same]
+    names = [str(row.obstacle_no) for row, is_one in zip(known, same, strict=True) if is_one]
+    warnings.warn(
+        f"The borders of obstacles became lines ({some_of(names, 20)}): each is the area that it "
+        "was.",
+        FormatWarning,
+        stacklevel=3,
+    )
+    return obstacles.set_geometry(shapes, crs=obstacles.crs)
 
 
 def strips(lines: NDArray[np.object_], half_m: ArrayLike, crs: CRS) -> NDArray[np.object_]:

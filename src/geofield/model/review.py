@@ -32,7 +32,7 @@ from geofield.model.obstacles import (
     next_number,
     still_round,
 )
-from geofield.model.resized import circles, differ, grown, shape_now, widened
+from geofield.model.resized import as_areas, circles, differ, grown, shape_now, widened
 from geofield.model.written import (
     MOVED_M,
     PlainShape,
@@ -46,6 +46,10 @@ from geofield.model.written import (
 
 if TYPE_CHECKING:
     import geopandas as gpd
+
+
+#: No obstacle in a field is larger, metres.
+_MOST_M = 10_000.0
 
 
 def reconcile(
@@ -86,9 +90,10 @@ def reconcile(
     Raises
     ------
     ObstacleError
-        When a radius or safety margin is negative or infinite.
+        When a radius or safety margin is negative, or larger than any field.
     """
-    table = _with_shapes(obstacles)
+    areas = obstacles if written is None else as_areas(obstacles, written.by_number)
+    table = _with_shapes(areas)
     record = (from_earlier_version(table) if written is None else written).by_number
     table = without_copies(unmerged(table, record), record)
     rows = _Rows.of(table)
@@ -244,7 +249,7 @@ def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> N
 def _refuse_sizes(rows: _Rows) -> None:
     for name in ("radius_m", "buffer_m"):
         values = rows.at[name]
-        for row in np.flatnonzero(np.isinf(values) | (values < 0)).tolist():
+        for row in np.flatnonzero((values > _MOST_M) | (values < 0)).tolist():
             raise ObstacleError(
                 f"{rows.name_of(row)}: {name} is {values[row]:g}.",
                 hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",

@@ -139,7 +139,8 @@ def plain(geometry: Any) -> list[PlainShape]:
     result: list[PlainShape] = [
         str(text) for text in shapely.to_wkt(geometry, rounding_precision=_DECIMALS)
     ]
-    rows = np.flatnonzero(still_round(geometry, fitted[:, 2]))
+    # Of nothing but its centre a circle would be empty.
+    rows = np.flatnonzero(still_round(geometry, fitted[:, 2]) & (fitted[:, 2] > SAME_M))
     # Some are round enough to be driven around as circles, but were drawn as they are.
     rows = rows[same_shapes(plain_circles(*fitted[rows].T), geometry[rows], SAME_M / 2)]
     for row, (x, y, radius) in zip(rows, fitted[rows].round(_DECIMALS).tolist(), strict=True):

@@ -1,0 +1,72 @@
+"""Obstacles as other programs leave them by a slip: told or refused, and never driven through."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import geopandas as gpd
+import pandas as pd
+import pytest
+import shapely
+from changed_plans import Frame, at, geofield, plan_in, rewritten, rows
+
+from geofield.errors import FormatWarning
+from geofield.model.review import reconcile
+from geofield_command import run_geofield
+
+
+def test_borders_that_became_lines_are_the_areas_that_they_were(folder: Path) -> None:
+    """As "polygons to lines" leaves them: strips, with a way through the middle of a tree."""
+    plan = plan_in(folder)
+    before = rows(plan)
+    fence = shapely.LineString(before.geometry[2].exterior.coords[:20])
+    lines = [shapely.LineString(shape.exterior.coords) for shape in before.geometry]
+    table = before.set_geometry([lines[0], fence, *lines[2:]], crs=before.crs)
+    with pytest.warns(FormatWarning, match=r"borders of obstacles became lines \(1, 3, 4"):
+        after = reconcile(table, plan.evidence.written, plan.grid)[0].set_index("obstacle_no")
+    kept = before.index != 2
+    assert after.geometry[kept].geom_equals_exact(before.geometry[kept], 1e-3).all()
+    assert after["status"][kept].equals(before["status"][kept])
+    assert after.geometry[2].disjoint(before.geometry[2].centroid)
+
+
+def test_degrees_in_a_layer_of_metres_are_refused(folder: Path) -> None:
+    """The trees were gone to the equator, and the command ended in a traceback."""
+    file = folder / "out/field.gpkg"
+
+    def degrees(table: Frame) -> Frame:
+        return table.set_geometry(table.geometry.to_crs("EPSG:4326").to_numpy(), crs=None).set_crs(
+            table.crs, allow_override=True
+        )
+
+    rewritten(file, "obstacles", degrees)
+    done = run_geofield("tracks", file, "-o", file)
+    assert done.returncode == 1
+    assert "11 rows of layer 'obstacles' lie nowhere near the field, as at x 33." in done.stderr
+
+
+def test_a_radius_larger_than_any_field_is_refused_with_its_obstacle(folder: Path) -> None:
+    """Pieces of track were counted instead."""
+    file = folder / "out/field.gpkg"
+
+    def typed(table: Frame) -> Frame:
+        return table.assign(radius_m=table["radius_m"].mask(at(table, 3), 1e9))
+
+    rewritten(file, "obstacles", typed)
+    done = run_geofield("tracks", file, "-o", file)
+    assert (done.returncode, "Obstacle 3: radius_m is 1e+09." in done.stderr) == (1, True)
+
+
+def test_a_circle_of_nearly_no_size_may_be_drawn(folder: Path) -> None:
+    """Its record was an empty shape: a traceback with every command."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    dot = before.geometry[1].centroid.buffer(1e-5)
+
+    def draw(table: Frame) -> Frame:
+        return pd.concat([table, gpd.GeoDataFrame(geometry=[dot], crs=table.crs)])
+
+    rewritten(file, "obstacles", draw)
+    geofield("tracks", file, "-o", file)
+    geofield("tracks", file, "-o", file)
+    assert len(rows(plan_in(folder))) == len(before) + 1
