@@ -710,3 +710,30 @@ def test_a_moved_track_without_its_number_stands_for_the_one_that_was_there(fold
     rewritten(file, "segments", moved)
     edits = plan_in(folder).track_edits
     assert [one.track_no for one in edits.edits if one.drawn] == [6]
+
+
+@pytest.mark.filterwarnings("ignore:field.gpkg. layer:geofield.errors.FormatWarning")
+@pytest.mark.parametrize("layer", ["tracks", "segments"])
+@pytest.mark.parametrize("numbered", [True, False])
+def test_a_drawn_track_that_crossed_others_when_they_were_dissolved(
+    folder: Path, layer: str, numbered: bool
+) -> None:
+    """A dissolve cuts lines where they cross: the others counted as shortened or taken away."""
+    file = folder / "out/field.gpkg"
+    middle = plan_in(folder).field.polygon.representative_point()
+    drawn = shapely.LineString([(middle.x - 40, middle.y - 20), (middle.x + 40, middle.y + 20)])
+
+    def dissolved(table: Frame) -> Frame:
+        many = table.geom_type.iloc[0] == "MultiLineString"
+        shape = shapely.MultiLineString([drawn]) if many else drawn
+        more = gpd.GeoDataFrame(geometry=[shape], crs=table.crs)
+        whole = pd.concat([table, more]).dissolve().reset_index(drop=True)
+        return whole if numbered else whole[["geometry"]]
+
+    rewritten(file, layer, dissolved)
+    edits = plan_in(folder).track_edits.edits
+    assert [one.track_no for one in edits if one.away] == []
+    said = [one for one in edits if one.drawn]
+    assert len(said) == len(edits) == 1
+    lines = shapely.get_parts(shapely.from_wkt(said[0].drawn))
+    assert min(shapely.hausdorff_distance(lines, drawn)) < 0.01

@@ -45,7 +45,7 @@ def known_by_shape(
     if not lost.any() or not written.rows:
         return rows
     lines, row = shapely.get_parts(shapely.force_2d(shapes[lost]), return_index=True)
-    row = np.flatnonzero(lost)[row]
+    lines, row = _rejoined(lines, np.flatnonzero(lost)[row], _lines_of(written)[1])
     near_m = _NEAR * written.spacing_m if unnumbered else 0.0
     number, lines = _numbered(lines, numbers[row], written, near_m)
     if unnumbered and not number.any():
@@ -107,13 +107,43 @@ def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDat
     )
 
 
+def _lines_of(written: TracksWritten) -> tuple[list[int], NDArray[np.object_]]:
+    """The segments that were written, and the numbers of their tracks."""
+    every = [(no, one) for no, some in written.segments.items() for one in some]
+    lines = np.array([*(shapely.LineString(one) for _, one in every), None], object)[:-1]
+    return [no for no, _ in every], lines
+
+
+def _rejoined(
+    lines: NDArray[np.object_], row: NDArray[np.intp], before: NDArray[np.object_]
+) -> tuple[NDArray[np.object_], NDArray[np.intp]]:
+    """Lines without the cuts that a dissolve makes where one that was drawn crosses others."""
+    line, other = shapely.STRtree(before).query(lines, "dwithin", SAME_M)
+    on = shapely.covered_by(lines[line], shapely.buffer(before[other], SAME_M))
+    of = np.full(len(lines), -1)
+    of[line[on]] = other[on]
+    group = np.unique(np.column_stack([row, of]), axis=0, return_inverse=True)[1].ravel()
+    cut = (of >= 0) & (np.bincount(group)[group] > 1)
+    if not cut.any():
+        return lines, row
+    again = cut | ((of < 0) & np.isin(row, row[cut]))
+    joined, rows = [lines[~again]], [row[~again]]
+    for one in np.unique(group[again]):
+        whole = shapely.line_merge(shapely.multilinestrings(lines[group == one]), directed=True)
+        of_one = of[group == one][0]
+        if of_one >= 0 and shapely.hausdorff_distance(whole, before[of_one]) <= SAME_M:
+            whole = before[of_one]  # without the vertices where it was cut
+        joined.append(shapely.get_parts(whole))
+        rows.append(np.full(len(joined[-1]), row[group == one][0]))
+    return np.concatenate(joined), np.concatenate(rows)
+
+
 def _numbered(
     lines: NDArray[np.object_], numbers: NDArray[np.int64], written: TracksWritten, near_m: float
 ) -> tuple[NDArray[np.int64], NDArray[np.object_]]:
     """Numbers of lines, and the lines in the direction in which they were written."""
     numbers, lines = numbers.copy(), lines.copy()
-    every: Any = [(no, one) for no, some in written.segments.items() for one in some]
-    before = np.array([*map(shapely.LineString, (one for _, one in every)), None], object)[:-1]
+    names, before = _lines_of(written)
     line, other = shapely.STRtree(before).query(lines, "dwithin", max(near_m, SAME_M))
     same = shapely.equals_exact(lines[line], before[other], SAME_M)
     same |= shapely.equals_exact(shapely.reverse(lines[line]), before[other], SAME_M)
@@ -127,7 +157,7 @@ def _numbered(
             continue
         found.add(line[at])
         taken.add(other[at])
-        numbers[line[at]] = every[other[at]][0]
+        numbers[line[at]] = names[other[at]]
         if same[at]:
             lines[line[at]] = before[other[at]]
     return numbers, lines
