@@ -44,7 +44,7 @@ def with_points(settings: Settings, previous: Plan | None) -> Settings:
 
 
 def with_said_tracks(settings: Settings, previous: Plan | None) -> tuple[Settings, tuple[str, ...]]:
-    """Settings with those of the tracks that a person set on an earlier plan's page.
+    """Settings with those of the tracks that a person set for an earlier plan.
 
     What is said now, by a caller, a file or the environment, holds. Both are told in words.
     """
@@ -55,9 +55,9 @@ def with_said_tracks(settings: Settings, previous: Plan | None) -> tuple[Setting
     settings = as_before(settings, previous.settings, "tracks", only=names)
     now, known = settings.tracks, still_said(previous, settings)
     kept = [_said(then, name) for name in known if getattr(asked, name) != getattr(then, name)]
-    told = [f"as set on the review page: {', '.join(kept)}"] if kept else []
+    told = [f"as set for this field: {', '.join(kept)}"] if kept else []
     told += [
-        f"{_said(now, name)} as said now, no longer {_said(then, name)} as set on the review page"
+        f"{_said(now, name)} as said now, no longer {_said(then, name)} as set for this field"
         for name in names
         if name not in known
     ]
@@ -65,7 +65,7 @@ def with_said_tracks(settings: Settings, previous: Plan | None) -> tuple[Setting
 
 
 def still_said(plan: Plan, settings: Settings) -> tuple[str, ...]:
-    """The settings of the tracks that a person set on a plan's page, and that are so in others."""
+    """The settings of the tracks that a person set for a plan, and that are so in others."""
     if plan.settings is None:
         return ()
     then, now = dict(plan.settings.tracks), dict(settings.tracks)

@@ -14,6 +14,7 @@ import shapely
 from pyproj import CRS
 
 import geofield as gf
+from geofield.earlier import with_said_tracks
 from geofield.farm.edited_in_place import edited_in_place
 from geofield.farm.overview import write_overview
 from geofield.farm.put_back import put_back, take_in_place
@@ -130,6 +131,10 @@ def test_settings_said_of_a_reviewed_plan_where_it_lies_are_taken_in(farm: Path,
     assert plan.tracks.spacing_m == 6.0
     assert gf.read_plan(file) == plan
     assert not list(edited_in_place(store))
+    # As those of the page did: what the command had said gave way when all is planned anew.
+    settings, told = with_said_tracks(Settings(tracks={"spacing_m": 12.0}), plan)
+    assert (settings.tracks.direction, settings.tracks.spacing_m) == ("30", 12.0)
+    assert told == ("as set for this field: --direction 30",)
 
 
 def test_settings_of_the_farm_are_no_edit_of_a_reviewed_plan(farm: Path) -> None:

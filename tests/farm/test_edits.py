@@ -824,6 +824,6 @@ def test_settings_of_the_page_stand_when_the_farm_is_planned_again(folder: Path)
     assert tracks.heading_deg == pytest.approx(30.0, abs=0.01)
     assert (settings.headland_m, settings.spacing_m) == (10.0, 6.0)
     notes = farm.status.set_index("field_id")["notes"]
-    assert "as set on the review page: --direction 30, --headland 10" in notes["b"]
+    assert "as set for this field: --direction 30, --headland 10" in notes["b"]
     assert "--spacing 6 as said now, no longer --spacing 9" in notes["b"]
     assert not notes["a"]

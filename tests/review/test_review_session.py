@@ -353,7 +353,7 @@ def test_settings_of_the_page_stand_in_later_runs(plan_path: Path) -> None:
     assert again.settings is not None
     assert again.tracks.heading_deg == pytest.approx(90.3)
     assert (again.settings.tracks.headland_m, again.settings.tracks.spacing_m) == (8.0, 4.0)
-    assert "as set on the review page: --direction 90.3, --headland 8" in done.stderr
+    assert "as set for this field: --direction 90.3, --headland 8" in done.stderr
     assert "--spacing 4 as said now, no longer --spacing 6" in done.stderr
     # A word that a later command took back is none any more.
     assert set(again.evidence.said_tracks) == {"direction", "headland_m"}

@@ -148,6 +148,9 @@ def take_in_place(store: Store, field_id: str) -> None:
     settings = before.settings or plan.settings or Settings()
     said = settings_said(plan, settings_put(store).get(field_id, {}))
     tracks = settings.tracks.model_copy(update=said)
+    # Whatever they were said with, they are a person's word in every later run.
+    names = tuple(sorted({*plan.evidence.said_tracks, *said}))
+    plan = replace(plan, evidence=replace(plan.evidence, said_tracks=names))
     plan = run_tracks(plan, settings=settings.model_copy(update={"tracks": tracks}))
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
