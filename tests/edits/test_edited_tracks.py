@@ -737,3 +737,40 @@ def test_a_drawn_track_that_crossed_others_when_they_were_dissolved(
     assert len(said) == len(edits) == 1
     lines = shapely.get_parts(shapely.from_wkt(said[0].drawn))
     assert min(shapely.hausdorff_distance(lines, drawn)) < 0.01
+
+
+@pytest.mark.parametrize("layer", ["tracks", "segments"])
+def test_rows_copied_in_place_are_driven_once(folder: Path, layer: str) -> None:
+    """As of two people's copies in one layer: each track was driven twice."""
+    file = folder / "out/field.gpkg"
+    before = tracks_in(folder)
+    rewritten(file, layer, lambda table: pd.concat([table, table]))
+    told = geofield("tracks", file, "-o", file)
+    count = len(before.lines if layer == "tracks" else before.segments)
+    assert f"Layer {layer!r}: {count} rows are copied in place and count once" in told
+    after = tracks_in(folder)
+    assert not plan_in(folder).track_edits.edits
+    assert len(after.segments) == len(before.segments)
+
+
+def test_areas_among_the_tracks_are_refused(folder: Path) -> None:
+    """Their borders were driven."""
+    file = folder / "out/field.gpkg"
+    rewritten(file, "tracks", lambda table: table.set_geometry(table.buffer(2.0), crs=table.crs))
+    done = run_geofield("tracks", file, "-o", file)
+    assert done.returncode == 1
+    assert "layer 'tracks' holds MultiPolygon shapes; tracks are lines" in done.stderr
+
+
+def test_a_copy_without_settings_tells_which_spacing_it_gets(folder: Path) -> None:
+    """Tracks of 6 m came back at 2 m."""
+    file = folder / "out/field.gpkg"
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("DELETE FROM gpkg_metadata_reference")
+        connection.execute("DELETE FROM gpkg_metadata")
+    copy = folder / "copy.gpkg"
+    told = geofield("tracks", file, "-o", copy)
+    assert "Its settings are lost, too: the spacing is 2 m now, where --spacing says no" in told
+    assert "settings are lost" not in geofield(
+        "tracks", file, "--spacing", 6, "-o", copy, "--overwrite"
+    )

@@ -100,7 +100,7 @@ def tracks(
 
     (claim_file if output.suffix else claim_folder)(output)
     tell_unsaved(file.parent, (file.name,))
-    plan = _own_plan(file)
+    plan = _own_plan(file, settings)
     if plan is not None and not defaults:
         settings = continued(settings, plan.settings, "tracks")
     places = None if plan is not None else parcels_in(file, settings, crs)
@@ -147,7 +147,7 @@ def tracks(
         )
 
 
-def _own_plan(file: Path) -> Plan | None:
+def _own_plan(file: Path, settings: Settings) -> Plan | None:
     """The plan in a GeoPackage of geofield; None for any other file of polygons."""
     import pyogrio
 
@@ -169,9 +169,15 @@ def _own_plan(file: Path) -> Plan | None:
         return None
     plan = read_plan(file)
     if schema.TRACKS.name in layers and not own:
+        said = settings.tracks.model_fields_set
+        spacing = (
+            f" Its settings are lost, too: the spacing is {settings.tracks.spacing_m:g} m now, "
+            "where --spacing says no other."
+        )
         say_note(
             f"{file.name} has lost the record of what was written (as copies made by other "
             "programs do): its tracks are planned anew, whatever was changed of them."
+            f"{spacing if said.isdisjoint(('spacing_m', 'width_m', 'machine')) else ''}"
         )
     return plan
 

@@ -208,6 +208,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             stacklevel=3,
         )
         frame = frame[~absent]
+    _refuse_no_lines(of, frame, path)
     tell_lost_columns(of, frame, path)
     if of is schema.SEGMENTS and (frame.count_geometries() > 1).any():
         warnings.warn(
@@ -219,6 +220,18 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     if of is schema.HEADLAND_TRACKS:
         frame = _passes_by_offset(frame)
     return schema.conform(of, frame, extras=True)
+
+
+def _refuse_no_lines(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> None:
+    """Refuse points and areas among tracks: borders of areas would be driven."""
+    strange = shapely.get_dimensions(frame.geometry.to_numpy()) != 1
+    if of in (schema.TRACKS, schema.SEGMENTS) and strange.any():
+        raise FormatError(
+            f"{path.name}: layer {of.name!r} holds {frame.geom_type[strange].iloc[0]} shapes; "
+            "tracks are lines.",
+            hint="Draw them as lines, or delete such rows; `geofield undo` brings back the plan "
+            "before the last run.",
+        )
 
 
 def tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> None:

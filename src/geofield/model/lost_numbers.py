@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import ground_lengths_m
+from geofield.errors import FormatWarning
 from geofield.model.tracks_written import SAME_M, TracksWritten, track_numbers
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -37,6 +40,7 @@ def known_by_shape(
     """
     import pandas as pd
 
+    rows = _once(of, rows)
     numbers, shapes = np.array(track_numbers(rows)), rows.geometry.to_numpy()
     most = [len(written.segments.get(no, ())) if of is schema.TRACKS else 1 for no in numbers]
     lost = shapely.get_num_geometries(shapes) > np.maximum(most, 1)
@@ -66,6 +70,26 @@ def known_by_shape(
         {name: rows[name].array[row[first]] for name in names},
     )
     return schema.conform(of, pd.concat([rows[~lost], found]), extras=True)
+
+
+def _once(of: schema.Layer, rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The rows without copies that say and are the same, as of two files in one, which is told."""
+    import pandas as pd
+
+    shapes = pd.Series(shapely.to_wkb(rows.geometry.to_numpy()), rows.index)
+    if not shapes.duplicated().any():
+        return rows
+    said = rows[["track_no", *schema.own_columns(of, rows)]].astype("string").assign(shape=shapes)
+    copy = (said.duplicated() & rows["track_no"].notna()).to_numpy(bool)
+    if not copy.any():
+        return rows
+    warnings.warn(
+        f"Layer {of.name!r}: {counted(int(copy.sum()), 'row is', 'rows are')} copied in place and "
+        "count once.",
+        FormatWarning,
+        stacklevel=4,
+    )
+    return rows[~copy].reset_index(drop=True)
 
 
 def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
