@@ -98,6 +98,21 @@ def keeps_outline(previous: Plan) -> bool:
     return drew_outline(previous) or previous.field.method in _GIVEN
 
 
+def bars_points(previous: Plan) -> str | None:
+    """Why no further point changes an earlier plan's outline, in words; None where points may.
+
+    What was drawn or given is a person's word as a whole. What was chosen is one of the outlines
+    that were found, and a point is a later word on it.
+    """
+    if _drawn(previous):
+        return "was drawn by hand"
+    if previous.field.method == "boundary":
+        return "is a parcel of your own"
+    if _without_record(previous):
+        return "may be drawn by hand, for the file has lost the record of what was found"
+    return None
+
+
 def _drawn(previous: Plan) -> bool:
     return previous.outline_edited or previous.field.method == "drawn"
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from geofield import schema
 from geofield.earlier import (
+    bars_points,
     drew_outline,
     field_changes,
     keeps_outline,
@@ -174,7 +175,7 @@ def run_field(
     elif previous is not None and kept:
         if said:
             raise FieldError(
-                "The outline there was drawn by hand: it is kept, and no "
+                f"The outline there {bars_points(previous)}: it is kept, and no "
                 f"{'region' if regions else 'point'} changes it.",
                 hint="Move the outline itself, or --fresh to have it found again.",
             )
@@ -236,7 +237,7 @@ def _keeps(previous: Plan, boundary: Field | None, *, said: bool) -> bool:
     """Whether an earlier plan's outline stays: what was drawn stands above what was given."""
     if boundary is not None:
         return drew_outline(previous)
-    return keeps_outline(previous) and not (previous.field.method == "chosen" and said)
+    return bars_points(previous) is not None if said else keeps_outline(previous)
 
 
 def _seen(

@@ -6,6 +6,7 @@ import json
 import shutil
 import sqlite3
 from contextlib import closing, suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -369,6 +370,41 @@ def test_another_outline_is_chosen(doubtful_path: Path) -> None:
     assert desk.session.plan.field.polygon.equals(outlines[-1].polygon)
     with pytest.raises(GeofieldError, match="no outline 9"):
         desk.edit({"do": "choose", "no": 9})
+    desk.save()
+    saved = read_plan(doubtful_path)
+    assert (saved.field.method, saved.outline_edited) == ("chosen", False)
+    # A point is a later word on an outline that was found.
+    left, _, right, top = outlines[0].polygon.bounds
+    desk.edit({"do": "ground", "place": [(left + right) / 2 + 60, top + 3], "belongs": True})
+    assert desk.session.plan.field.method == "auto"
+
+
+@pytest.mark.parametrize(
+    ("method", "told"),
+    [
+        pytest.param("drawn", "drawn by hand", id="drawn"),
+        pytest.param("boundary", "a parcel of your own", id="parcel"),
+    ],
+)
+def test_a_click_at_the_ground_loses_no_outline_of_a_persons_own(
+    plan_path: Path, method: str, told: str
+) -> None:
+    """A corner moved by hand was back where the search had it after a click elsewhere."""
+    if method == "boundary":
+        plan = read_plan(plan_path)
+        given = replace(plan.field, method=method, quality=None, alternatives=())
+        save_plan(replace(plan, field=given), plan_path, read_from=plan_path)
+    desk = Desk(plan_path)
+    (x, y), *rest = desk.session.plan.field.polygon.exterior.coords[:-1]
+    if method == "drawn":
+        desk.edit({"do": "outline", "rings": [[[x + 5, y - 6], *rest]]})
+    before = desk.opening()
+    assert before["field"]["method"] == method
+    middle = desk.session.plan.field.polygon.centroid
+    place = [0.9 * x + 0.1 * middle.x, 0.9 * y + 0.1 * middle.y]
+    with pytest.raises(GeofieldError, match=told):
+        desk.edit({"do": "ground", "place": place, "belongs": False})
+    assert desk.opening() == before
 
 
 def test_what_was_saved_can_be_undone_also_after_a_kill(plan_path: Path) -> None:

@@ -20,6 +20,7 @@ from shapely import Polygon
 from geofield import schema
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import GeofieldError, SettingsError
+from geofield.model.evidence import outline_digest
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
 from geofield.settings import Settings, TrackSettings
 from geofield.settings.explain import explained
@@ -137,7 +138,11 @@ def set_outline(plan: Plan, command: Command) -> Plan:
 
 def choose(plan: Plan, command: Command) -> Plan:
     """One of the outlines that the search found: ``no``, 1 is the most likely."""
-    return replace(plan, field=plan.field.choose(_whole(command, "no")))
+    field = plan.field.choose(_whole(command, "no"))
+    # Chosen, not drawn: a further point is a later word on it.
+    return replace(
+        plan, field=field, evidence=replace(plan.evidence, outline=outline_digest(field.polygon))
+    )
 
 
 def set_tracks(plan: Plan, command: Command) -> Plan:

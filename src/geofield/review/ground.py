@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from geofield.crs import GEOD, LONLAT, transformer
+from geofield.earlier import bars_points
 from geofield.model.evidence import outline_digest
 from geofield.review.commands import Command, EditError, places_of
 from geofield.settings import Settings
@@ -41,7 +42,7 @@ class Ground:
         Raises
         ------
         EditError
-            Without a place.
+            Without a place, and where the outline is a person's own: a point would lose it.
         GeofieldError
             When the place lies outside the picture or contradicts an earlier one.
         """
@@ -49,6 +50,12 @@ class Ground:
             ((x, y),) = places_of([command["place"]])
         except KeyError:
             raise EditError("A place is two numbers, x and y.") from None
+        barred = bars_points(plan)
+        if barred is not None:
+            raise EditError(
+                f"The outline {barred}: no point changes it.",
+                hint="Correct it with Edit outline, or draw it anew.",
+            )
         # Searching needs the most libraries of all, and most sessions never do it.
         from geofield.field import extract_field, prepare_field
 

@@ -49,13 +49,13 @@ def _detected_from(plan: Plan) -> float | None:
 
 
 def field_of(plan: Plan) -> dict[str, Any]:
-    """The outline; of what a person drew nothing is in doubt but where the picture ends."""
+    """The outline; of a person's own nothing is in doubt but where the picture ends."""
     field = plan.field
-    drawn = plan.outline_edited or field.method in ("drawn", "boundary", "chosen")
-    quality = None if drawn else field.quality
+    method = "drawn" if plan.outline_edited else field.method
+    quality = None if method in ("drawn", "boundary", "chosen") else field.quality
     shown = outline_view(
         field.polygon,
-        method="drawn" if drawn else field.method,
+        method=method,
         certainty=None if quality is None else quality.score,
         doubts=plan.doubts,
         frame=plan.frame_lines,

@@ -122,7 +122,7 @@ const node = (tag, text) => Object.assign(document.createElement(tag), {textCont
 function showField() {
   const field = state.field;
   $("certainty").textContent = field.certainty !== null ? t("sure", {p: number(100 * field.certainty)})
-    : field.method === "drawn" ? t("drawn") : t("unknown");
+    : t(["drawn", "boundary", "chosen"].includes(field.method) ? field.method : "unknown");
   const doubts = [...field.doubts, ...state.doubts].map(told);
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
   const shown = JSON.stringify(field.rings);
