@@ -8,6 +8,7 @@ refused here, for every reader.
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -57,12 +58,21 @@ def is_geopackage(path: Path) -> bool:
         return file.read(72)[68:] in (b"GPKG", b"GP10", b"GP11")
 
 
+def unreadable(path: Path, error: Exception) -> FormatError:
+    """That a library cannot read a file, in its own words without what programmers may try."""
+    reason = re.split("[.;]+ It might help", str(error))[0].rstrip(".")
+    hint = "It is a folder: name a file in it." if path.is_dir() else "Is the file whole?"
+    return FormatError(f"{path} cannot be read: {reason}.", hint=hint)
+
+
 class _RootSeenError(Exception):
     """The prolog is over: no entity can be defined behind it."""
 
 
 def check_vector(path: Path | str) -> None:
-    """Refuse a vector file that only points elsewhere, whose XML defines entities, or a picture.
+    """Refuse a vector file that is empty or only points elsewhere, and a picture.
+
+    XML that defines entities is refused, too.
 
     Raises
     ------
@@ -77,6 +87,8 @@ def check_vector(path: Path | str) -> None:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
         raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
+    if not head:
+        raise FormatError(f"{file} is empty (0 bytes).", hint="Copy it again.")
     if head.startswith(PICTURES):
         raise FormatError(
             f"{file} is a picture; what is wanted here are shapes (polygons, points, lines).",

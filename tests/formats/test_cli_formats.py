@@ -137,6 +137,15 @@ def test_info_of_pictures_of_any_name_and_without_a_place(sample, tmp_path):
     facts = json.loads(run(info, local, "--json").stdout)
     assert "mine" in facts["CRS"]
     assert "centre" not in facts
+    nowhere = tmp_path / "nowhere.tif"
+    with (
+        pytest.warns(rasterio.errors.NotGeoreferencedWarning),
+        rasterio.open(nowhere, "w", **shape, crs="EPSG:32636"),
+    ):
+        pass
+    facts = json.loads(run(info, nowhere, "--json").stdout)
+    assert facts["position"] == "not recorded"
+    assert "centre" not in facts
     (tmp_path / "plain.txt").write_text("neither picture nor vector file")
     with pytest.raises(FormatError, match=r"format of .*plain.txt is not known"):
         run(info, tmp_path / "plain.txt")

@@ -137,7 +137,15 @@ def render(uri, png, width=900, height=700, scale=None, extent=None):
     job.start()
     job.waitForFinished()
     job.renderedImage().save(png)
-    return {"scale": settings.scale(), "errors": [error.message for error in job.errors()]}
+    placed = job.takeLabelingResults().labelsWithinRect(settings.visibleExtent())
+    labels = {}
+    for each in placed:
+        labels.setdefault(each.layerID, []).append(each.labelText)
+    return {
+        "scale": settings.scale(),
+        "errors": [error.message for error in job.errors()],
+        "labels": labels,
+    }
 
 
 def edit(path, changes):

@@ -155,6 +155,19 @@ def test_the_picture_is_the_stored_one(copy, qgis, tmp_path):
     assert np.corrcoef(ours.ravel(), stored.ravel())[0, 1] > 0.98
 
 
+def test_every_obstacle_is_found_by_its_number(product, qgis, tmp_path):
+    """What tracks run through had none in QGIS, and track numbers took the others' room."""
+    dataset = read_dataset(product / "field.gpkg")
+    obstacles = dataset.tables["obstacles"].copy()
+    obstacles.loc[obstacles.index[0], "status"] = "possible"
+    numbers = obstacles["obstacle_no"].astype(str).tolist()
+    assert {"possible", "rejected", "added"} <= set(obstacles["status"])
+    tables = {**dataset.tables, "obstacles": obstacles}
+    write_dataset(dataclasses.replace(dataset, tables=tables), tmp_path, ["gpkg"])
+    shown = qgis("render", uri=str(tmp_path / "field.qgz"), png=str(tmp_path / "shown.png"))
+    assert sorted(shown["labels"]["geofield_obstacles"]) == sorted(numbers)
+
+
 def at(picture, x_m, y_m, extent):
     west, south, east, north = extent
     row = int((north - (Y0 + y_m)) / (north - south) * picture.shape[0])

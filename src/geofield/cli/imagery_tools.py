@@ -220,10 +220,12 @@ def area_of(path: Path) -> Where:
     """The ground that a vector file covers."""
     import shapely
 
+    from geofield.finite import refuse_nowhere
     from geofield.formats.foreign import read_vector
     from geofield.imagery import Where
 
     table = read_vector(path)
+    refuse_nowhere(table.geometry.to_numpy(), path.name)
     if table.crs is None:
         raise ImageryError(f"The area {path} does not name its coordinate reference system.")
     shape = shapely.union_all(table.to_crs("EPSG:4326").geometry.to_numpy())

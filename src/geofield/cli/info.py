@@ -131,7 +131,11 @@ def _picture(file: Path) -> dict[str, Any]:
             "CRS": str(picture.crs) if picture.crs else "not recorded",
         }
         tags = {key: value for key, value in picture.tags().items() if key != "AREA_OR_POINT"}
-        if picture.crs:
+        if picture.transform.is_identity:
+            # Pixels counted as metres would be a place, in the ocean.
+            points = len(picture.gcps[0])
+            facts["position"] = f"{points} ground control points" if points else "not recorded"
+        elif picture.crs:
             # What has no place on the earth is shown without one.
             with suppress(CRSError, GridError):
                 grid = Grid(picture.width, picture.height, picture.transform, picture.crs.to_wkt())

@@ -14,9 +14,10 @@ from geofield.crs import is_metric
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
+from geofield.finite import refuse_nowhere
 from geofield.model.scene import Scene
 from geofield.staging import cannot_write
-from geofield.strangers import check_vector
+from geofield.strangers import check_vector, unreadable
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -66,7 +67,9 @@ def read_obstacles(
                 hint="Give one of points, boxes or polygons.",
             )
     except pyogrio.errors.DataSourceError as error:
-        raise ObstacleError(f"{path.name} cannot be read: {error}.") from None
+        told = unreadable(path, error)
+        raise ObstacleError(told.message, hint=told.hint) from None
+    refuse_nowhere(frame.geometry.to_numpy(), path.name)
     if frame.crs is None:
         raise CRSError(f"{path.name} has no CRS.", hint="Set it in QGIS: Set layer CRS.")
     if metric and len(frame) and not is_metric(frame.crs):

@@ -17,7 +17,7 @@ import shapely
 from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
 from geofield.formats.foreign import PARQUET
-from geofield.strangers import check_vector
+from geofield.strangers import check_vector, unreadable
 from geofield.wording import nearest
 
 CSV = (".csv", ".tsv", ".txt")
@@ -136,7 +136,7 @@ def _parquet(path: Path) -> RawPlaces:
     try:
         table = pq.read_table(path)
     except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from None
+        raise unreadable(path, error) from None
     geo = json.loads((table.schema.metadata or {}).get(b"geo", b"{}"))
     table = table.replace_schema_metadata(None)
     name = geo.get("primary_column")
@@ -181,7 +181,7 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
             )
         meta, table = pyogrio.read_arrow(path, layer=layer)
     except (DataSourceError, DataLayerError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from None
+        raise unreadable(path, error) from None
     except (UnicodeDecodeError, pa.ArrowInvalid) as error:
         raise FormatError(
             f"{path}: its text is not in the encoding it claims ({error}).",

@@ -21,6 +21,7 @@ from geofield.farm.layers import GEOMETRY
 from geofield.farm.place_files import CSV
 from geofield.farm.place_reader import read_table
 from geofield.farm.store import Store
+from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.foreign import layer_names, read_vector
 from geofield.formats.foreign_tables import (
@@ -88,6 +89,7 @@ def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> g
     if column_like(frame, NUMBER_COLUMNS) is None:
         frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
     empty = np.asarray(frame.geometry.isna() | frame.geometry.is_empty)
+    refuse_nowhere(frame.geometry.to_numpy(), path.name)
     rows = frame[~empty].explode()
     _understand_lengths(rows, path)
     rows = rows.reset_index(drop=True)

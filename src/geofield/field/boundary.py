@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from shapely import Polygon
 
 from geofield.crossings import in_words, mended
 from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transformer
-from geofield.errors import CRSError, FieldError
+from geofield.errors import CRSError, FieldError, FieldWarning
+from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
 from geofield.wording import counted, none_of
 
@@ -79,6 +81,7 @@ def field_from_boundary(
             "with longitudes.",
             hint=_EXCHANGE,
         )
+    rows = _somewhere(rows)
     if name is not None:
         chosen = _of_name(rows, own, name, lat, lon)
     elif lat is not None and lon is not None:
@@ -99,6 +102,25 @@ def _outlines(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         return polygons
     rings = rows[rows.geometry.is_ring]
     return rings.set_geometry([Polygon(line) for line in rings.geometry], crs=rows.crs)
+
+
+def _somewhere(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The parcels without those that are nowhere, which is told."""
+    good = finite(rows.geometry.to_numpy())
+    if good.all():
+        return rows
+    are = counted(int((~good).sum()), "polygon", "polygons")
+    if not good.any():
+        raise FieldError(
+            f"The boundary file holds {are}, with coordinates that are no finite numbers.",
+            hint=MEND_IT,
+        )
+    warnings.warn(
+        f"{are} of the boundary file with coordinates that are no finite numbers: left out.",
+        FieldWarning,
+        stacklevel=3,
+    )
+    return rows[good]
 
 
 def _of_name(

@@ -21,10 +21,11 @@ from shapely.errors import GEOSException
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
 from geofield.errors import EmptyFileError, FormatError, FormatWarning
+from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
-from geofield.strangers import check_vector
+from geofield.strangers import check_vector, unreadable
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
             hint="Save it as UTF-8 (a Shapefile with a .cpg file beside it).",
         ) from error
     except (*_DAMAGED, DataSourceError, DataLayerError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
+        raise unreadable(path, error) from error
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
     return frame
@@ -142,7 +143,7 @@ def layer_names(path: Path) -> list[str]:
     try:
         return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
     except DataSourceError as error:
-        raise FormatError(f"{path} cannot be read: {error}.", hint="Is the file whole?") from error
+        raise unreadable(path, error) from error
 
 
 def read_foreign(
@@ -165,6 +166,8 @@ def read_foreign(
     FormatError
         When there is nothing to use, the CRS is in doubt, or there are several fields.
     """
+    for each in layers:
+        refuse_nowhere(each.frame.geometry.to_numpy(), f"{path.name}: {each.name}")
     present = [
         RawLayer(each.name, _with_crs(_present(each.frame), f"{path.name}: {each.name}", crs))
         for each in layers
@@ -179,10 +182,11 @@ def read_foreign(
     notes: list[str] = []
     for each in present:
         frame = each.frame.to_crs(metric)
-        # Not a number fails this, too.
+        # Too far for the projection is infinite, and fails this, too.
         if not (np.abs(shapely.get_coordinates(frame.geometry.to_numpy())) < _FAR_M).all():
             raise FormatError(
-                f"{path.name}: {each.name} has coordinates that are no place near its field."
+                f"{path.name}: {each.name} has coordinates that are no place near its field.",
+                hint="Look at it in QGIS: is its CRS the right one, does a shape lie far off?",
             )
         layer = _own_layer(each)
         if layer is None:
@@ -255,8 +259,6 @@ def _metric_of(layers: list[RawLayer]) -> CRS:
     if own.is_geographic:
         places = unwrapped(np.array([shapely.geometrycollections(places)], dtype=object))
     west, south, east, north = shapely.total_bounds(places)
-    if not np.isfinite([west, south, east, north]).all():
-        raise FormatError(f"Layer {layers[0].name!r} has coordinates that are not numbers.")
     lon, lat = transformer(own, LONLAT).transform((west + east) / 2, (south + north) / 2)
     if own.is_geographic and (abs(south) > 90 or abs(north) > 90):
         raise FormatError(

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale, ground_scale_of
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
+from geofield.finite import MEND_IT
 from geofield.model.obstacles import (
     QUARTER_SEGMENTS,
     ObstacleShapes,
@@ -67,7 +68,7 @@ def obstacle_shapes(
         )
     frame, geometry = frame[~missing], shapely.force_2d(geometry[~missing])
     if not np.isfinite(shapely.get_coordinates(geometry)).all():
-        raise TrackError("An obstacle has coordinates that are not finite numbers.")
+        raise TrackError("An obstacle has coordinates that are not finite numbers.", hint=MEND_IT)
     broken = ~shapely.is_valid(geometry)
     if broken.any():
         few = "1 obstacle was not valid and has"

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import authority_name, is_metric, parse_crs
 from geofield.errors import CRSError, TrackError, refuse_no_number
+from geofield.finite import MEND_IT
 
 #: A place given for a field is not farther from it, metres.
 NEAR_M = 20_000.0
@@ -80,7 +81,9 @@ def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:
         polygon = shapely.force_2d(polygon)
         notes.append("Heights of the field's outline were dropped.")
     if not np.isfinite(shapely.get_coordinates(polygon)).all():
-        raise TrackError("The field's outline has coordinates that are not finite numbers.")
+        raise TrackError(
+            "The field's outline has coordinates that are not finite numbers.", hint=MEND_IT
+        )
     if not isinstance(polygon, Polygon | MultiPolygon):
         raise TrackError(
             f"The field's outline must be a polygon, not a {polygon.geom_type}.",

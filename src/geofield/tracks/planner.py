@@ -302,9 +302,10 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, s
     points = outline.area / (spacing * step)
     if points > MOST_POINTS:
         raise TrackError(
-            f"So short a step would give about {points:.1g} track points; "
-            f"{MOST_POINTS:,} are the most.",
-            hint=f"The shortest step here is {1.1 * outline.area / (spacing * MOST_POINTS):.2g} m.",
+            f"A spacing of {spacing:.3g} m with a track point every {step:.3g} m would give about "
+            f"{points:.1g} track points; {MOST_POINTS:,} are the most.",
+            hint="Widen the spacing, or set the points' distance (step) to at least "
+            f"{1.1 * outline.area / (spacing * MOST_POINTS):.2g} m.",
         )
 
 

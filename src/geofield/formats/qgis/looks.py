@@ -80,6 +80,23 @@ def _obstacle_rule(label: str, status: str) -> Rule:
     return Rule(label, "fill", lines, condition)
 
 
+#: Obstacles that tracks run through; one without a status was drawn, and is driven around.
+_RUN_THROUGH = "coalesce(\"status\", '') IN ('rejected', 'possible')"
+
+
+def _obstacle_label(colour: str, halo: str, condition: str, priority: int) -> Label:
+    return Label(
+        'to_string("obstacle_no")',
+        8,
+        colour,
+        halo,
+        geometry="point_on_surface($geometry)",
+        filter=condition,
+        max_scale=2500,
+        priority=priority,
+    )
+
+
 def field_rules(frame: str) -> tuple[Rule, ...]:
     """The rules of the layer `field`.
 
@@ -150,16 +167,10 @@ LOOKS: dict[str, Look] = {
             _obstacle_rule("Added by a person", "added"),
             _obstacle_rule("Rejected by a person", "rejected"),
         ),
+        # By their numbers a person speaks of them, of what tracks run through as well.
         (
-            Label(
-                'to_string("obstacle_no")',
-                8,
-                _WHITE,
-                "120,0,0,230",
-                geometry="point_on_surface($geometry)",
-                filter="\"status\" IS NULL OR \"status\" NOT IN ('rejected', 'possible')",
-                max_scale=2500,
-            ),
+            _obstacle_label(_WHITE, "120,0,0,230", f"NOT ({_RUN_THROUGH})", priority=9),
+            _obstacle_label(_DARK, _PAPER, _RUN_THROUGH, priority=8),
         ),
         max_scale=REGION_SCALE,
         tip='<b>Obstacle [% "obstacle_no" %]</b>: '

@@ -191,6 +191,8 @@ class Label:
         As of :class:`Rule`.
     above : bool
         Whether it stands above the point rather than on it.
+    priority : int
+        Which text gives way where two have no room, 0 to 10: the lower one.
     """
 
     expression: str
@@ -202,6 +204,7 @@ class Label:
     min_scale: int = 0
     max_scale: int = 0
     above: bool = False
+    priority: int = 5
 
 
 def rule_labels(labels: Sequence[Label], prefix: str) -> ET.Element:
@@ -220,7 +223,7 @@ def rule_labels(labels: Sequence[Label], prefix: str) -> ET.Element:
 
 
 def _label_settings(label: Label) -> ET.Element:
-    placement = {"placement": "1", "centroidWhole": "1"}
+    placement = {"placement": "1", "centroidWhole": "1", "priority": str(label.priority)}
     # QGIS counts the places around a point from the top left: 1 is above, 4 on it.
     placement |= {"quadOffset": "1" if label.above else "4", "yOffset": "0"}
     if label.above:
