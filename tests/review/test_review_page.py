@@ -273,6 +273,12 @@ def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(
     page.button("save")
     page.wait(lambda: "spacing_m: input should be a valid number" in page.text("message"))
     assert page.state()["can_redo"] is page.state()["edited"] is False
+    # The refusal went on standing beside a value that is right again.
+    box.clear()
+    box.send_keys("6.5", Keys.ENTER)
+    page.wait(lambda: page.text("message") == "", seconds=4)
+    assert page.text("figures").split(" · ")[1:2] == ["29 tracks"]
+    assert page.text("figures").endswith(" % covered")
 
 
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:

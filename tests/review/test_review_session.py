@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
 import shapely
 from click.testing import CliRunner
 
@@ -360,6 +361,20 @@ def test_settings_of_the_page_stand_in_later_runs(plan_path: Path) -> None:
     assert set(again.evidence.said_tracks) == {"direction", "headland_m"}
     turned = run_tracks(again, settings=with_values(again.settings, direction="10"))
     assert turned.evidence.said_tracks == ("headland_m",)
+
+
+def test_a_picture_of_another_place_is_told_and_not_shown(plan_path: Path, tmp_path: Path) -> None:
+    """The map ended where that picture did: an empty page, without field and without a word."""
+    away = tmp_path / "away.tif"
+    with rasterio.open(plan_path.with_name("scene.tif")) as here:
+        profile = {**here.profile, "driver": "GTiff", "crs": "EPSG:32610"}
+        with rasterio.open(away, "w", **profile) as there:
+            there.write(here.read())
+    shown = Desk(plan_path, away).opening()
+    assert shown["picture"] is None
+    assert "away.tif is of another place" in shown["brought_back"]
+    left, bottom, right, top = shown["bounds"]
+    assert shapely.box(left, bottom, right, top).contains(read_plan(plan_path).field.polygon)
 
 
 def test_another_outline_is_chosen(doubtful_path: Path) -> None:

@@ -15,6 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
+import shapely
+
 from geofield.crs import ground_scale_of
 from geofield.errors import ChangedError, FormatError, GeofieldError, listening
 from geofield.imagery.display import TiledPicture
@@ -81,11 +83,18 @@ class Desk:
             lost = "The picture of this plan is not beside it; --picture shows one."
             return None, lost if plan.field.imagery else None
         try:
-            return TiledPicture.open(path, plan.field.crs, plan.point), None
+            picture = TiledPicture.open(path, plan.field.crs, plan.point)
         except GeofieldError as error:
             if self._picture_given:
                 raise
             return None, f"The picture is not shown: {error}"
+        # The map ends where its picture does: on one of another place there would be no field.
+        if not shapely.box(*picture.bounds).intersects(plan.field.polygon):
+            return (
+                None,
+                f"The picture is not shown: {path.name} is of another place than this field.",
+            )
+        return picture, None
 
     def _read_plan(self) -> tuple[str, Plan]:
         """The version of the file, and the plan in it.

@@ -108,7 +108,7 @@ function showTracks(answer, moving = false) {
   const f = answer.figures;
   if (f.tracks === undefined) return;
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
-  $("figures").textContent = `${number(f.area_ha, 2)} ha · ${f.tracks} ${t("tracks")} · ${number(f.length_m / 1000, 2)} km · ${number(f.coverage_percent, 1)} %${unfit}`;
+  $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}`;
   const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} (${f.segments}), ${number(f.length_m)} m`],
     ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
     ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
@@ -205,11 +205,16 @@ async function make(command) {
     show({});
     return false;
   }
-  if ($("message").classList.contains("bad") && !state.unnoted) say("");
+  settled();
   speakOf(command, before);
   const fresh = state.obstacles.find(each => before.every(({no}) => no !== each.no));
   if (fresh) choose(fresh.no, false);
   return true;
+}
+
+// A refusal that no longer holds is not left standing.
+function settled() {
+  if ($("message").classList.contains("bad") && !state.unnoted) say("");
 }
 
 async function verdict(status) {
@@ -256,7 +261,9 @@ const unsaved = () => state.edited || Object.keys(typed()).length > 0;
 
 async function apply() {
   const settings = typed();
-  return !Object.keys(settings).length || make({do: "tracks", settings});
+  if (Object.keys(settings).length) return make({do: "tracks", settings});
+  settled();
+  return true;
 }
 
 // What is typed goes along, or nothing is done: the form says what counts.
@@ -337,7 +344,7 @@ async function start() {
     inTurn(apply);
   };
   $("export").onclick = () => applied(() => act(() => api.exportAs($("export-format").value),
-    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes].join(" "))));
+    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes].join("\n"))));
   $("save-as").onclick = async () => {
     const name = $("save-name").value.trim();
     if (!name) $("save-name").focus();
