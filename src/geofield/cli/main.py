@@ -33,7 +33,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "obstacles": ("geofield.cli.obstacles:obstacles", "Stage 3: find the obstacles in it."),
     "tracks": ("geofield.cli.tracks:tracks", "Stage 4: plan the tracks to drive."),
     "batch": ("geofield.cli.batch:batch", "Many fields: plan a whole farm, here or on a cluster."),
-    "farm": ("geofield.cli.farm:farm", "Look at a farm, or put a reviewed plan back into it."),
+    "farm": ("geofield.cli.farm:farm", "Take a plan out of a farm, or put it back reviewed."),
     "review": ("geofield.cli.review:review", "Correct a plan on a page in the browser."),
     "undo": ("geofield.cli.undo:undo", "Bring back the plan before the last run."),
     "live": ("geofield.cli.live:live", ""),  # for programs: not in the list that people see
