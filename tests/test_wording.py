@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import geopandas as gpd
 import pytest
+import shapely
 
 import geofield as gf
 import geofield.settings  # knows what its options are called
@@ -12,6 +15,7 @@ from geofield.wording import in_python
 from geofield_command import run_geofield
 
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
+PLAN = SAMPLE.with_suffix(".gpkg")
 
 
 @pytest.mark.parametrize(
@@ -37,3 +41,20 @@ def test_an_error_speaks_to_both() -> None:
     plan = SAMPLE.with_suffix(".gpkg")
     done = run_geofield("tracks", plan, "--spacing", 6000, "-o", "never.gpkg")
     assert "--spacing 3." in done.stderr
+
+
+def test_commands_count_in_words_and_give_no_figure_that_is_none(tmp_path: Path) -> None:
+    """They told of "1 obstacles", a status "nan", and a bias of "nan m (nan to nan)"."""
+    trees = gpd.GeoDataFrame(geometry=[shapely.Point(500_000, 5_300_000)], crs="EPSG:32633")
+    trees.to_file(tmp_path / "tree.gpkg")
+    done = run_geofield("import", tmp_path / "tree.gpkg", "-o", tmp_path / "plan.gpkg", check=True)
+    assert "1 obstacle in" in done.stderr
+    done = run_geofield("evaluate", PLAN, tmp_path / "tree.gpkg", check=True)
+    assert "0 hits of 21 detected and 1 true obstacle\n" in done.stderr
+    assert "radius bias  no figure" in done.stderr
+    assert "nan" not in done.stderr
+    edited = Path(shutil.copy(PLAN, tmp_path / "edited.gpkg"))
+    obstacles = gpd.read_file(edited, layer="obstacles")
+    obstacles.loc[obstacles.index[0], "status"] = None
+    obstacles.to_file(edited, layer="obstacles")
+    assert "  without a status: 1\n" in run_geofield("info", edited, check=True).stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.files import FILE, OLD_FILE
 from geofield.cli.options import Number
 from geofield.errors import ObstacleError
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.evaluation import Evaluation
@@ -117,7 +119,8 @@ def evaluate(
 
 def _tell(result: Evaluation) -> None:
     score = result.pooled
-    say(f"{score.hits} hits of {score.detected} detected and {score.truth} true obstacles")
+    hits, truth = counted(score.hits, "hit"), counted(score.truth, "true obstacle")
+    say(f"{hits} of {score.detected} detected and {truth}")
     others = result.false_kinds.get("other", 0)
     if others:
         say(
@@ -128,6 +131,9 @@ def _tell(result: Evaluation) -> None:
         low, high = score.interval.get(name, (float("nan"), float("nan")))
         unit = " m" if name == "radius_bias" else ""
         label = name.replace("_", " ")
+        if math.isnan(getattr(score, name)):
+            say(f"  {label:12s} no figure: nothing to take it from")
+            continue
         say(f"  {label:12s} {getattr(score, name):6.3f}{unit}  ({low:.3f} to {high:.3f})")
     lost = result.driving
     if lost is not None:

@@ -10,6 +10,7 @@ from geofield.cli.console import echo_json, say
 from geofield.cli.files import PATH, claim_file, output_option
 from geofield.cli.options import without_blanks
 from geofield.errors import FormatError
+from geofield.wording import counted
 
 
 @click.command(
@@ -73,5 +74,8 @@ def import_(
             }
         )
         return
-    found = ", ".join(f"{count} {layer}" for layer, count in counts.items())
+    names = {layer: layer.replace("_", " ").removesuffix("s") for layer in counts}
+    found = ", ".join(
+        counted(count, names[layer], layer.replace("_", " ")) for layer, count in counts.items()
+    )
     say(f"{dataset.name}: {found} in {output}")

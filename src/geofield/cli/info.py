@@ -98,7 +98,10 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
         facts["check"] = told
     statuses = dataset.table("obstacles")["status"].value_counts(dropna=False).sort_index()
     if len(statuses):
-        facts["obstacles"] = {str(key): int(count) for key, count in statuses.items()}
+        facts["obstacles"] = {
+            key if isinstance(key, str) else "without a status": int(count)
+            for key, count in statuses.items()
+        }
     provenance = dataset.provenance
     source = provenance.source
     origin = {

@@ -15,6 +15,7 @@ from geofield.errors import TrackError, TrackWarning
 from geofield.model import Dataset
 from geofield.model.obstacles import active
 from geofield.model.tracks import Tracks
+from geofield.wording import some_of
 
 #: Segments end exactly on a border: so far beyond it is no fault, metres.
 _HAIR_M = 0.05
@@ -101,7 +102,7 @@ def _in_the_way(dataset: Dataset, layer: str) -> list[str]:
     through = driven_through(dataset, layer)
     outside = leaving(dataset, layer).tolist() if layer in WITHIN else []
     if through:
-        named = _listed(name for _, name in through)
+        named = some_of(list(dict.fromkeys(name for _, name in through)), _MOST)
         words += [f"{_lines(dataset, layer, [row for row, _ in through])} through {named}"]
     if outside:
         words += [f"{_lines(dataset, layer, outside)} out of the field"]
@@ -114,13 +115,9 @@ def _lines(dataset: Dataset, layer: str, rows: Sequence[int]) -> str:
     if not numbers:
         return f"a {one} that was drawn runs"
     many = len(numbers) > 1
-    return f"{several if many else one} {_listed(map(str, numbers))} run{'s' * (not many)}"
-
-
-def _listed(words: Iterable[str]) -> str:
-    each = list(dict.fromkeys(words))
-    more = [f"{len(each) - _MOST} more"] if len(each) > _MOST else []
-    return ", ".join([*each[:_MOST], *more])
+    return (
+        f"{several if many else one} {some_of([*map(str, numbers)], _MOST)} run{'s' * (not many)}"
+    )
 
 
 def _obstacle(number: Any) -> str:
