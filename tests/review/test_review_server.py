@@ -269,7 +269,16 @@ def test_no_session_is_ended_from_the_page_whose_edits_lie_nowhere(
     status, answer = visitor.post("/api/stop", {})
     assert (status, "would be lost" in answer["message"]) == (422, True)
     assert visitor.post("/api/save", {"name": "mine"})[0] == 200
-    assert visitor.post("/api/stop", {}) == (200, {"stopped": True})
+    # It lies under the other name, and is noted nowhere.
+    assert visitor.post("/api/stop", {}) == (200, {"stopped": True, "noted": False})
+
+
+def test_who_ends_a_session_learns_that_what_was_not_saved_waits(visitor: Visitor) -> None:
+    """The page said that the session has ended, and left open whether the edits had."""
+    visitor.post("/api/take", {})
+    edit = {"do": "status", "no": 3, "status": "rejected"}
+    assert visitor.post("/api/edit", edit)[0] == 200
+    assert visitor.post("/api/stop", {}) == (200, {"stopped": True, "noted": True})
 
 
 def test_what_nobody_foresaw_is_told_in_words(

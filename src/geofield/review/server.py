@@ -174,8 +174,9 @@ class _Handler(BaseHTTPRequestHandler):
             return {"yours": shelf.take(tab, force=bool(value.get("force")))}
         if path == "/api/stop":
             shelf.refuse_loss()
+            noted = shelf.noted
             self.server.stop()
-            return {"stopped": True}
+            return {"stopped": True, "noted": noted}
         shelf.refuse_others(tab)
         if path == "/api/open":
             number = value.get("plan")

@@ -68,6 +68,12 @@ class Shelf:
             desk.refuse_loss()
 
     @property
+    def noted(self) -> bool:
+        """Whether edits that were not saved lie in notes, where the next session finds them."""
+        desks = self._desks.values()
+        return any(desk.session.edited and not desk.journal.refused for desk in desks)
+
+    @property
     def lost(self) -> bool:
         """Whether edits were neither saved nor noted when the session ended."""
         return any(desk.lost for desk in self._desks.values())

@@ -352,7 +352,7 @@ async function start() {
   };
   for (const dialog of document.querySelectorAll("dialog")) dialog.onclose = () => document.body.append($("message"));
   $("reload").onclick = reload;
-  $("stop").onclick = () => applied(() => act(() => api.stop(), () => { ended = true; $("menu").close(); say(t("stopped"), false, {text: t("close"), act: () => window.close()}); }));
+  $("stop").onclick = () => applied(() => act(() => api.stop(), ({noted}) => { ended = true; $("menu").close(); say(`${noted ? t("left_noted") : ""} ${t("stopped")}`.trim(), false, {text: t("close"), act: () => window.close()}); }));
   maps.map.on("pointermove", ({coordinate}) => {
     const [lon, lat] = maps.lonlat(coordinate);
     $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
