@@ -135,3 +135,19 @@ def test_what_matters_is_seen_on_a_small_screen(page: Page) -> None:
     page.driver.refresh()
     page.wait(lambda: page.run("return document.body.dataset.ready"))
     assert page.run(first) == "outline-h"
+
+
+def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page) -> None:
+    """Its number and status lay under the buttons that stay on top of the list."""
+    for _ in range(3):
+        # Who read on below comes back by a key, or by the buttons, which stay in view.
+        page.run("document.getElementById('panel').scrollTop = 1e6")
+        page.press("j")
+        time.sleep(0.3)
+        below, top, panel, bottom = page.run(
+            "const box = query => document.querySelector(query).getBoundingClientRect();"
+            "const row = box('#list [aria-current=true]');"
+            "return [box('#verdict').bottom, row.top, box('#panel').bottom, row.bottom];"
+        )
+        assert below - 1 <= top
+        assert bottom <= panel + 1
