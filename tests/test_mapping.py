@@ -82,8 +82,8 @@ def test_no_number_is_cut_or_lies_on_another() -> None:
     from geofield.mapping.labels import OBSTACLE_LOOK, TRACK_LOOK, Label, draw_labels
 
     image = Image.new("RGB", (200, 100))
-    labels = [Label(-4, 50, "128", OBSTACLE_LOOK), Label(199, 99, "7", OBSTACLE_LOOK)]
-    labels += [Label(80 + 4 * k, 40, str(k), TRACK_LOOK) for k in range(12)]
+    labels = [Label(((-4, 50),), "128", OBSTACLE_LOOK), Label(((199, 99),), "7", OBSTACLE_LOOK)]
+    labels += [Label(((80 + 4 * k, 40),), str(k), TRACK_LOOK) for k in range(12)]
     boxes = draw_labels(image, labels)
     assert len(labels) > len(boxes) > 4
     for number, (left, top, right, bottom) in enumerate(boxes):
@@ -94,6 +94,36 @@ def test_no_number_is_cut_or_lies_on_another() -> None:
             assert not (
                 left < other[2] and other[0] < right and top < other[3] and other[1] < bottom
             )
+
+
+def test_a_number_goes_to_its_next_place_where_another_lies() -> None:
+    """A rejected shadow over a possible tree had no number on the map, and was told by it."""
+    from geofield.mapping.labels import OBSTACLE_LOOK, Label, draw_labels
+
+    image = Image.new("RGB", (200, 100))
+    places = ((50.0, 40.0), (50.0, 60.0))
+    boxes = draw_labels(
+        image, [Label(places, str(number), OBSTACLE_LOOK) for number in (17, 32, 5)]
+    )
+    assert [(top + bottom) / 2 for _, top, _, bottom in boxes] == [40.0, 60.0]
+
+
+def test_overlapping_obstacles_have_a_number_each(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dataclasses import replace
+
+    from geofield.mapping import picture
+    from geofield.mapping.labels import OBSTACLE_LOOK, Box, draw_labels
+
+    assert plan.obstacles is not None
+    twice = plan.obstacles.iloc[[0, 0]].assign(obstacle_no=[17, 32])
+    boxes: list[Box] = []
+    monkeypatch.setattr(picture, "draw_labels", lambda *given: boxes.extend(draw_labels(*given)))
+    draw_map(replace(plan, obstacles=twice).to_dataset(), long_side_px=400)
+    # Those of tracks are lower.
+    heights = [bottom - top for _, top, _, bottom in boxes]
+    assert heights.count(OBSTACLE_LOOK.size_px + 4) == 2
 
 
 def test_tracks_show_on_white_ground(plan: Plan, simulated: SimulatedField) -> None:

@@ -26,18 +26,18 @@ TRACK_LOOK = Look(11, (20, 24, 28), (235, 238, 240))
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A number and the place of its middle, pixels."""
+    """A number and the places where its middle may lie, pixels, the best one first."""
 
-    x_px: float
-    y_px: float
+    places_px: tuple[tuple[float, float], ...]
     text: str
     look: Look
 
 
 def draw_labels(image: Image.Image, labels: Iterable[Label]) -> list[Box]:
-    """Write numbers into a picture, the first ones first; what would lie on one is left out.
+    """Write numbers into a picture, the first ones first, each where it lies on no other.
 
-    Returned is where they are: left, top, right, bottom in pixels.
+    One that has no such place is left out. Returned is where they are: left, top, right, bottom in
+    pixels.
     """
     draw = ImageDraw.Draw(image)
     taken: list[Box] = []
@@ -45,14 +45,15 @@ def draw_labels(image: Image.Image, labels: Iterable[Label]) -> list[Box]:
         look = each.look
         font = ImageFont.load_default(look.size_px)
         half, rise = font.getlength(each.text) / 2 + 3, look.size_px / 2 + 2
-        x = min(max(each.x_px, half), image.width - half)
-        y = min(max(each.y_px, rise), image.height - rise)
-        box = (x - half, y - rise, x + half, y + rise)
-        if any(_overlap(box, other) for other in taken):
-            continue
-        taken.append(box)
-        ink, rim = look.ink, look.around
-        draw.text((x, y), each.text, ink, font, "mm", stroke_width=2, stroke_fill=rim)
+        for x_px, y_px in each.places_px:
+            x = min(max(x_px, half), image.width - half)
+            y = min(max(y_px, rise), image.height - rise)
+            box = (x - half, y - rise, x + half, y + rise)
+            if not any(_overlap(box, other) for other in taken):
+                taken.append(box)
+                ink, rim = look.ink, look.around
+                draw.text((x, y), each.text, ink, font, "mm", stroke_width=2, stroke_fill=rim)
+                break
     return taken
 
 

@@ -174,18 +174,20 @@ class _Canvas:
     def numbers(self, obstacles: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> None:
         if len(obstacles) and len(obstacles) <= 150:
             for number, shape in zip(obstacles["obstacle_no"], obstacles.geometry, strict=True):
-                x0, _, x1, y1 = shape.bounds
-                corner = self.pixels(np.array([[(x0 + x1) / 2 + 0.38 * (x1 - x0), y1]]))[0]
-                self.label(corner, number, OBSTACLE_LOOK)
+                x0, y0, x1, y1 = shape.bounds
+                middle, aside = (x0 + x1) / 2, 0.38 * (x1 - x0)
+                # Of things that overlap each has its number at another corner.
+                corners = [(middle + aside * side, y) for y in (y1, y0) for side in (1, -1)]
+                self.label(self.pixels(np.array(corners)), number, OBSTACLE_LOOK)
         first = segments.drop_duplicates("track_no")
         step = max(1, math.ceil(len(first) / _MAX_LABELS))
         for number, shape in zip(first["track_no"][::step], first.geometry[::step], strict=True):
-            start = self.pixels(shapely.get_coordinates(shape)[:1])[0]
+            start = self.pixels(shapely.get_coordinates(shape)[:1])
             self.label(start, number, TRACK_LOOK)
 
-    def label(self, at: NDArray[np.float64], number: int, look: Look) -> None:
-        x, y = (at / _OVERSAMPLING).tolist()
-        self.labels.append(Label(x, y, str(number), look))
+    def label(self, places: NDArray[np.float64], number: int, look: Look) -> None:
+        at = tuple((float(x), float(y)) for x, y in places / _OVERSAMPLING)
+        self.labels.append(Label(at, str(number), look))
 
     def finish(self) -> Image.Image:
         image = self.image.reduce(_OVERSAMPLING)
