@@ -15,6 +15,9 @@ from typing import Any, get_args
 
 from geofield.wording import in_python
 
+#: As far as anything reaches in a field, metres: more is a slip, and overflows somewhere.
+FARTHEST_M = 1000.0
+
 
 class GeofieldError(Exception):
     """Base of every error that geofield raises on purpose.

@@ -242,8 +242,11 @@ def test_a_coarse_picture_warns(simulated):
     [
         ({"radius_m": (9, 2)}, "radius range"),
         ({"radius_m": (0, 2)}, "radius range"),
+        ({"radius_m": (2, 1e30)}, "largest radius"),
+        ({"radius_m": (2, 1001), "strategy": "consensus"}, "largest radius"),
         ({"strategy": "best"}, "strategy"),
         ({"buffer_m": -1}, "margin"),
+        ({"buffer_m": 1e30}, "margin"),
         ({"polarity": "grey"}, "polarity"),
         ({"min_confidence": 2}, "confidence"),
         ({"cost_missed": 0}, "cost"),

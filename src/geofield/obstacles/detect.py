@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.errors import (
+    FARTHEST_M,
     FieldError,
     ImageryError,
     ObstacleError,
@@ -83,10 +84,10 @@ def detect_obstacles(
     strategy : str
         One of :data:`STRATEGIES`.
     radius_m : (low, high)
-        Radii to look for, metres on the ground; 1 to 15 for ``auto``, 2 to 9 for the
-        study's strategies by default.
+        Radii to look for, metres on the ground, up to 1000; 1 to 15 for ``auto``, 2 to 9 for
+        the study's strategies by default.
     buffer_m : float
-        Safety margin added around each footprint, metres.
+        Safety margin added around each footprint, metres, up to 1000.
     polarity : {"dark", "bright", "both"}
         ``auto``: keep only crowns that are darker, or brighter, than their surroundings.
     cost_missed : float
@@ -138,8 +139,8 @@ def detect_obstacles(
     refuse_no_number(ObstacleError, "0 to 1", none_too=True, min_confidence=min_confidence)
     refuse_no_number(ObstacleError, "0 to 1", sensitivity=sensitivity, min_share=min_share)
     refuse_no_number(ObstacleError, none_too=True, threshold=threshold)
-    if not (np.isfinite(buffer_m) and buffer_m >= 0):
-        raise ObstacleError(f"The safety margin {buffer_m:g} m is negative or not finite.")
+    if not 0 <= buffer_m <= FARTHEST_M:
+        raise ObstacleError(f"The safety margin {buffer_m:g} m is outside 0 to {FARTHEST_M:g} m.")
     if not 0 <= min_share <= 1:
         raise ObstacleError(f"The share of settings {min_share:g} is outside 0 to 1.")
     refuse_unknown(ObstacleError, "strategy", strategy, STRATEGIES)
@@ -147,6 +148,8 @@ def detect_obstacles(
     refuse_other(field, Field | None, "field", MAKE_ONE, FieldError)
     usual_m = RADIUS_M if strategy == "auto" else STUDY_RADIUS_M
     low_m, high_m = checked_range(usual_m if radius_m is None else radius_m)
+    if high_m > FARTHEST_M:
+        raise ObstacleError(f"The largest radius, {high_m:g} m, is above {FARTHEST_M:g} m.")
     crs = scene.grid.metric_crs if field is None else field.crs
     detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m], "notes": []}
     if strategy == "auto":

@@ -15,13 +15,11 @@ from pydantic import (
 )
 
 from geofield import wording
-from geofield.errors import is_truth
+from geofield.errors import FARTHEST_M, is_truth
 
 NonNegative = Annotated[float, Field(ge=0)]
-#: As far as anything reaches in a field, metres: more is a slip, and overflows somewhere.
-_FAR_M = 1000.0
-Reach = Annotated[float, Field(ge=0, le=_FAR_M)]
-Radius = Annotated[float, Field(gt=0, le=_FAR_M)]
+Reach = Annotated[float, Field(ge=0, le=FARTHEST_M)]
+Radius = Annotated[float, Field(gt=0, le=FARTHEST_M)]
 
 
 def _lonlat(value: Any) -> Any:
