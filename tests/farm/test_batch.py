@@ -415,7 +415,7 @@ def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
         (("p.gpkg", "--id-column", "crop", "--out", "farm"), 1, "more than once"),
         (("p.gpkg", "google", "--out", "farm"), 1, "forbid"),
         (("p.gpkg", "--out", "thesis"), 1, "not empty"),
-        (("p.gpkg", "--spacing", "-1", "--out", "farm"), 2, "spacing_m"),
+        (("p.gpkg", "--spacing", "-1", "--out", "farm"), 2, "--spacing: input"),
         (("p.gpkg", "--out", "p.gpkg"), 1, "p.gpkg"),
         (("p.gpkg", "--scheduler", "x", "--workers", "2", "--out", "farm"), 2, "not both"),
         (("two.gpkg", "--out", "farm"), 1, "--layer"),
