@@ -47,7 +47,7 @@ two to six points, 170 fields).
 Certainty is told no better by what else can be asked: whether the answers from six other places in
 the ground, or from the picture mirrored, are the same ground, and whether those from ground beside
 it take it in. Bad outlines (below .8) are told from good ones (from .88 on) with an area under the
-curve of .873 to .881, .875 without (552 fields, folds left out).
+curve of .871 to .881, .875 without (552 fields, folds left out).
 """
 
 from __future__ import annotations
