@@ -165,9 +165,13 @@ def _alone(
 
 
 def _as_written(
-    rows: gpd.GeoDataFrame, written: gpd.GeoDataFrame, apart: _Parts, pairs: _Pairs,
-    mine: _Mask, alone: _Mask,
-) -> gpd.GeoDataFrame:  # fmt: skip
+    rows: gpd.GeoDataFrame,
+    written: gpd.GeoDataFrame,
+    apart: _Parts,
+    pairs: _Pairs,
+    mine: _Mask,
+    alone: _Mask,
+) -> gpd.GeoDataFrame:
     """The rows that were found, each once; with what now stands in those that say it themselves."""
     at, first = np.unique(pairs.written, return_index=True)
     back = written.iloc[at].reset_index(drop=True)

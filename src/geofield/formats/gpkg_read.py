@@ -95,15 +95,18 @@ def _refuse_far(
     tables: Mapping[str, gpd.GeoDataFrame], field: gpd.GeoDataFrame, path: Path
 ) -> None:
     """Refuse shapes that are no place near the field, as degrees are in a layer of metres."""
+    if field.empty:
+        return
     box = shapely.box(*field.total_bounds)
     for name, table in tables.items():
         away = shapely.distance(shapely.envelope(table.geometry.to_numpy()), box)
         far = np.flatnonzero(~(away < _FAR_M))
-        if len(field) and len(far):
+        if len(far):
             x, y = shapely.get_coordinates(table.geometry.iloc[far[0]])[0]
             raise FormatError(
-                f"{path.name}: {counted(len(far), 'row')} of layer {name!r} lie nowhere near the "
-                f"field, as at x {x:.6g}, y {y:.6g} of {table.crs.name}.",
+                f"{path.name}: {counted(len(far), 'row')} of layer {name!r} "
+                f"lie{'s' * (len(far) == 1)} nowhere near the field, "
+                f"as at x {x:.6g}, y {y:.6g} of {table.crs.name}.",
                 hint="Perhaps these are coordinates of another CRS: save the layer anew in that of "
                 "the other layers, or delete such rows.",
             )

@@ -138,9 +138,9 @@ def as_areas(obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> g
     lines = np.flatnonzero(shapely.get_dimensions(shapes) == 1)
     if not len(lines):
         return obstacles
-    numbers = floats(obstacles, "obstacle_no")[lines]
-    lines = lines[np.isin(numbers, list(record))]
-    known = [record[int(number)] for number in numbers[np.isin(numbers, list(record))]]
+    numbers = floats(obstacles, "obstacle_no")
+    lines = lines[np.isin(numbers[lines], list(record))]
+    known = [record[int(number)] for number in numbers[lines]]
     areas = shapes_of_plain([row.shape for row in known])
     same = same_shapes(shapely.boundary(areas), shapes[lines])
     if not same.any():

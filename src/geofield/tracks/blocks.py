@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale, ground_scale_of
 from geofield.errors import CRSMismatchError, TrackError, TrackWarning
-from geofield.finite import MEND_IT
+from geofield.finite import MEND_IT, finite
 from geofield.model.obstacles import (
     QUARTER_SEGMENTS,
     ObstacleShapes,
@@ -67,7 +67,7 @@ def obstacle_shapes(
             f"{'was' if missing.sum() == 1 else 'were'} left out."
         )
     frame, geometry = frame[~missing], shapely.force_2d(geometry[~missing])
-    if not np.isfinite(shapely.get_coordinates(geometry)).all():
+    if not finite(geometry).all():
         raise TrackError("An obstacle has coordinates that are not finite numbers.", hint=MEND_IT)
     broken = ~shapely.is_valid(geometry)
     if broken.any():
