@@ -79,11 +79,25 @@ def test_a_first_correction_moves_a_side_and_details_give_way_at_a_point_too():
     assert min(one.symmetric_difference(SQUARE).area for one in first) > 80 * 3, "no mere strip"
     later = mended(SQUARE, [seed, beyond], [(20.0, 20.0), (20.0, 140.0)], FRAME)
     assert min(one.symmetric_difference(SQUARE).area for one in later) < 20
-    # Sides that move beyond the point would cross others: it gives way at once.
+    # Sides that move beyond the point would cross others: it gives way or bends at once.
     beside = [(124.0, y) for y in (50.0, 65.0, 95.0, 110.0)]
     only = mended(SQUARE, [seed, beyond], beside, FRAME)
-    assert len(only) == 1
-    assert obeys(only[0], [seed, beyond], beside)
+    assert only
+    assert all(obeys(one, [seed, beyond], beside) for one in only)
+    assert max(one.symmetric_difference(SQUARE).area for one in only) < 80 * 8
+
+
+def test_a_side_is_bent_at_a_point_where_a_person_is_at_details():
+    seed, beyond = (80.0, 80.0), (124.0, 80.0)
+    truth = SQUARE.union(shapely.Polygon([(120, 40), (128, 80), (120, 120)]))
+    away = [(20.0, 20.0), (20.0, 140.0)]
+    best = max(overlap(one, truth) for one in mended(SQUARE, [seed, beyond], away, FRAME))
+    assert best > 0.99
+    # With fewer points a whole side is meant, and near its end it is turned.
+    first = mended(SQUARE, [seed, beyond], [], FRAME)
+    assert max(overlap(one, truth) for one in first) < 0.98
+    corner = mended(SQUARE, [seed, (124.0, 42.0)], away, FRAME)
+    assert all(len(one.exterior.coords) != 6 for one in corner)
 
 
 def test_an_outline_is_drawn_as_exactly_as_its_points_need():
