@@ -5,9 +5,11 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
+import click
 import pytest
 
 from geofield.errors import SettingsError
@@ -19,6 +21,7 @@ from geofield.settings import (
     as_before,
     from_mapping,
     load_settings,
+    option_named,
     with_values,
 )
 from geofield.settings.sections import MODELS
@@ -227,18 +230,21 @@ def test_no_function_has_another_default_than_the_settings() -> None:
     assert met > 40
 
 
-def test_no_option_has_a_default_of_its_own() -> None:
-    import click
-
+def every_command() -> Iterator[click.Command]:
     from geofield.cli.main import cli
 
-    known, met = defaults(), 0
     waiting: list[click.Command] = [cli]
     for command in waiting:
         if isinstance(command, click.Group):
             context = click.Context(command)
             found = (command.get_command(context, name) for name in command.list_commands(context))
             waiting += [each for each in found if each is not None]
+        yield command
+
+
+def test_no_option_has_a_default_of_its_own() -> None:
+    known, met = defaults(), 0
+    for command in every_command():
         unsaid = command.make_context("it", [], resilient_parsing=True).params
         for option, value in unsaid.items():
             name = option.rpartition("__")[2]
@@ -248,9 +254,19 @@ def test_no_option_has_a_default_of_its_own() -> None:
     assert met > 150
 
 
-def test_fetching_has_the_defaults_of_the_settings_and_of_the_command() -> None:
-    import click
+def test_a_refusal_names_the_option_that_stands_for_a_setting() -> None:
+    met = 0
+    for command in every_command():
+        for parameter in command.params:
+            section, separator, name = str(parameter.name).partition("__")
+            if separator:
+                met += 1
+                field = MODELS[section].model_fields[name]
+                assert option_named(name, field) in parameter.opts, f"{command.name}: {name}"
+    assert met > 100
 
+
+def test_fetching_has_the_defaults_of_the_settings_and_of_the_command() -> None:
     from geofield.cli.main import cli
     from geofield.imagery import FetchOptions, Where
 

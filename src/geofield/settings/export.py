@@ -42,6 +42,8 @@ class ExportSettings(Section):
     """What is written."""
 
     formats: Annotated[tuple[FormatName, ...], BeforeValidator(words)] = Field(
-        ("gpkg", "geojson", "shapefile", "rdf"), description="Formats of the products."
+        ("gpkg", "geojson", "shapefile", "rdf"),
+        description="Formats of the products.",
+        json_schema_extra={"option": "--format"},
     )
     points: bool = Field(False, description="Track points in linked data, too: most of its bytes.")
