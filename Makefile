@@ -57,6 +57,8 @@ lock:  ## refresh the locked dependencies from pyproject.toml (needs uv)
 	  -o requirements/run.txt --custom-compile-command "make lock"
 	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \
 	  --group dev -o requirements/dev.txt --custom-compile-command "make lock"
+	uv pip compile -q --universal --python-version 3.11 --generate-hashes pyproject.toml \
+	  --resolution lowest-direct --extra plot -o requirements/oldest.txt --custom-compile-command "make lock"
 
 plugin: $(VENV)/dev.stamp  ## build the QGIS plugin's zip and the engine's wheel into dist/
 	$(BIN)/python plugin/describe.py

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -72,3 +74,17 @@ def test_they_are_renewed_with_the_plan(maps: Path) -> None:
     after = (maps / "map.svg").read_text(encoding="utf-8")
     assert after != before
     assert f"{len(gf.read_plan(plan).tracks.lines)} tracks" in after
+
+
+def test_without_its_library_it_is_refused_before_the_work(sample: Path, tmp_path: Path) -> None:
+    without = "import sys; sys.modules['matplotlib'] = None; from geofield.cli import main; main()"
+    place = ("--lat", "35.075373", "--lon", "33.531142", "--out", "out")
+    asked = ("run", sample / "field_1.tif", *place, "--format", "gpkg", "--format", "map-pdf")
+    done = subprocess.run(
+        [sys.executable, "-c", without, *asked],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "Map on a page for print (PDF) needs matplotlib." in done.stderr
+    assert "pip install 'geofield[plot]'" in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -93,14 +93,17 @@ def run(
     """
     from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import known_outline, with_said_tracks
+    from geofield.formats import format_named
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
     from geofield.windows import showing
 
     parcel, lat, lon = parcel_and_point(boundary, boundary_layer, boundary_name, lat, lon)
+    # What cannot be is said at once, not after the work.
+    for each in settings.export.formats:
+        format_named(each).refuse_undrawn()
     claim_folder(out)
     if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
-        # Said at once, not after the work.
         raise OutputExistsError(
             f"{out} is not empty.",
             hint="Choose another --out, or --overwrite: reviewed obstacles are then kept.",

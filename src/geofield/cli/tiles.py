@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _OF_TILES = ("zoom", "resolution_m", "whole_tiles", "missing", "layer")
 
 
-class ZoomType(click.ParamType[Any]):
+class ZoomType(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
     """A zoom, or the words max and fit."""
 
     name = "zoom"

@@ -273,6 +273,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("map.svg",),
         _MAP,
         "geofield.mapping.plot:write_svg",
+        drawn_by="matplotlib",
     ),
     _shown(
         "map-pdf",
@@ -280,6 +281,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("map.pdf",),
         _MAP,
         "geofield.mapping.plot:write_pdf",
+        drawn_by="matplotlib",
     ),
     Format(
         "report",

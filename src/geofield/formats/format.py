@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, Literal
@@ -92,6 +93,8 @@ class Format:
         not written.
     pictured : bool
         Whether it shows the picture of a plan.
+    drawn_by : str or None
+        A library that draws it and is not installed with geofield: it comes with the extra `plot`.
     validator : str or None
         ``module:function`` with the signature ``check(path) -> Iterable[Finding]``: the rules
         of the format itself. A `FormatError` is a finding, too.
@@ -116,9 +119,29 @@ class Format:
     steers: bool = False
     several: str | None = None
     pictured: bool = False
+    drawn_by: str | None = None
+
+    def refuse_undrawn(self) -> None:
+        """Refuse what nothing here draws, before any work is done.
+
+        Raises
+        ------
+        FormatError
+        """
+        if self.drawn_by is not None and find_spec(self.drawn_by) is None:
+            raise FormatError(
+                f"{self.title} needs {self.drawn_by}.", hint="pip install 'geofield[plot]'"
+            )
 
     def load_writer(self) -> Writer:
-        """The writer, imported."""
+        """The writer, imported.
+
+        Raises
+        ------
+        FormatError
+            When a library that it draws with is not installed.
+        """
+        self.refuse_undrawn()
         return resolve_name(self.writer)  # type: ignore[no-any-return]
 
     def load_reader(self) -> Reader:

@@ -38,7 +38,8 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
     GeofieldError
         When matplotlib is not installed.
     """
-    _needed()
+    if find_spec("matplotlib") is None:
+        raise GeofieldError("Drawing this needs matplotlib.", hint="pip install 'geofield[plot]'")
     from matplotlib import patheffects
     from matplotlib.lines import Line2D
 
@@ -112,7 +113,6 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
         from geofield.imagery import read_scene
 
         scene = read_scene(dataset.scene_path)
-    _needed()
     import matplotlib as mpl
     from matplotlib.figure import Figure
     from matplotlib.text import Text
@@ -191,9 +191,3 @@ def _north(dataset: Dataset) -> str:
         return "north is up"
     side = "left" if turned_deg > 0 else "right"
     return f"true north {abs(turned_deg):.1f}\N{DEGREE SIGN} to the {side} of up"
-
-
-def _needed() -> None:
-    """Refuse in words where matplotlib is not installed."""
-    if find_spec("matplotlib") is None:
-        raise GeofieldError("Drawing this needs matplotlib.", hint="pip install 'geofield[plot]'")
