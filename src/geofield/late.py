@@ -18,8 +18,13 @@ def late_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     def get(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        try:
+            module = import_module(f".{home[name]}", package)
+        except AttributeError as error:
+            # Python would say that the package has no such name, and hide why.
+            raise ImportError(f"{package}.{home[name]} does not load: {error}") from error
         # Kept, so that a submodule of the same name never stands before it.
-        value = getattr(import_module(f".{home[name]}", package), name)
+        value = getattr(module, name)
         setattr(sys.modules[package], name, value)
         return value
 
