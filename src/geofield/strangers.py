@@ -11,9 +11,9 @@ from __future__ import annotations
 import re
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
@@ -102,45 +102,59 @@ def check_vector(path: Path | str) -> None:
                 hint="Give the data itself, for instance saved from QGIS as a GeoPackage.",
             )
     if b"<" in head[:200] and file.suffix.lower() in (".xml", ".gml", ".kml", ".gpx", ".osm"):
-        check_prolog(head, file.name)
+        # One that is not well-formed, or in an unknown encoding, is told of by its reader.
+        with suppress(_RootSeenError, expat.ExpatError, LookupError, ValueError):
+            _Prolog(file.name).parser.Parse(head, False)
 
 
-def check_prolog(head: bytes, name: str) -> None:
-    """Refuse XML that defines entities or names an external document type.
+class XmlGuard:
+    """An expat parser that builds nothing: it refuses XML that is hostile.
 
-    `head` reaches as far as the root element at least; `name` is for messages.
-
-    Raises
-    ------
-    FormatError
+    That is XML that defines entities, names an external document type, or is nested deeper than
+    an honest document is. Who allows more, or less, overrides what is called.
     """
 
-    def refuse(reason: str) -> NoReturn:
-        raise FormatError(f"{name}: {reason}.", hint=_HINT)
+    max_depth = MAX_DEPTH
 
-    def entity(entity_name: str, *_: object) -> None:
-        refuse(f"it defines the XML entity {entity_name!r:.40}")
+    def __init__(self, name: str) -> None:
+        self.name, self.depth = name, 0
+        self.parser = parser = expat.ParserCreate(namespace_separator="")
+        parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
+        parser.buffer_text = True
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.EntityDeclHandler = self.entity
+        parser.StartDoctypeDeclHandler = self.doctype
 
-    def doctype(_: str, system: str | None, public: str | None, internal: bool) -> None:
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        """An element begins."""
+        self.depth += 1
+        if self.depth > self.max_depth:
+            self.refuse(f"its elements are nested deeper than {self.max_depth}")
+
+    def end(self, tag: str) -> None:
+        """An element ends."""
+        self.depth -= 1
+
+    def doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
+        """A document type is named."""
         if system or public:
-            refuse(f"it names an external document type ({(system or public)!r:.80})")
+            self.refuse(f"it names an external document type ({(system or public)!r:.80})")
 
-    def root(*_: object) -> NoReturn:
+    def entity(self, name: str, is_parameter: bool, value: str | None, *_: Any) -> None:
+        """An entity is defined; one of another file has no value, and is never asked for."""
+        self.refuse(f"it defines the XML entity {name!r:.40}")
+
+    def refuse(self, reason: str) -> NoReturn:
+        """Raise what is told."""
+        raise FormatError(f"{self.name}: {reason}.", hint=_HINT)
+
+
+class _Prolog(XmlGuard):
+    """The same of what stands before the root element."""
+
+    def start(self, *_: object) -> NoReturn:
         raise _RootSeenError
-
-    parser = expat.ParserCreate()
-    parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
-    parser.EntityDeclHandler = entity
-    parser.StartDoctypeDeclHandler = doctype
-    parser.StartElementHandler = root
-    try:
-        parser.Parse(head, False)
-    except _RootSeenError:
-        return
-    except expat.ExpatError:
-        return  # not well-formed: its reader says where
-    except (LookupError, ValueError):
-        return  # an encoding that Python does not know: the reader says so
 
 
 def parse_xml(body: bytes, name: str) -> ET.Element:
@@ -153,32 +167,9 @@ def parse_xml(body: bytes, name: str) -> ET.Element:
     xml.etree.ElementTree.ParseError
         Not well-formed; also for an encoding that is not known.
     """
-    check_prolog(body, name)
-    parser = ET.XMLParser(target=_Nested(name))  # noqa: S314  no entities are left
+    with suppress(expat.ExpatError, LookupError, ValueError):  # told below
+        XmlGuard(name).parser.Parse(body, True)
     try:
-        parser.feed(body)
-        root: ET.Element = parser.close()
+        return ET.fromstring(body)  # noqa: S314  no entities are left
     except (LookupError, ValueError) as error:
         raise ET.ParseError(str(error)) from None
-    return root
-
-
-class _Nested(ET.TreeBuilder):
-    """Builds the tree of a document, but no deeper than an honest one is."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__()
-        self._name = name
-        self._depth = 0
-
-    def start(self, tag: str, attrs: dict[str, str], /) -> ET.Element:
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise FormatError(
-                f"{self._name}: its elements are nested deeper than {MAX_DEPTH}.", hint=_HINT
-            )
-        return super().start(tag, attrs)
-
-    def end(self, tag: str, /) -> ET.Element:
-        self._depth -= 1
-        return super().end(tag)

@@ -16,9 +16,8 @@ from xml.parsers import expat
 from geofield.errors import FormatError
 from geofield.formats.rdf.names import NOT_IN_IRI
 from geofield.formats.rdf.namespaces import RDF
+from geofield.strangers import XmlGuard
 
-#: Elements inside elements; an honest file needs about 4, generous nesting 20.
-MAX_DEPTH = 100
 #: Entities such as ``<!ENTITY owl "http://www.w3.org/2002/07/owl#">``, as Protege writes them.
 MAX_ENTITIES = 100
 MAX_ENTITY_CHARACTERS = 256
@@ -70,52 +69,27 @@ def check_json(text: str, name: str) -> None:
 
 def check_xml(file: IO[bytes], name: str) -> None:
     """Refuse RDF/XML that is hostile or not well-formed; names file, line and reason."""
-    parser = _XmlGuard(name).parser
+    guard = _RdfGuard(name)
     try:
-        parser.ParseFile(file)
+        guard.parser.ParseFile(file)
     except expat.ExpatError as error:
-        reason = f"it is not well-formed XML ({expat.ErrorString(error.code)})"
-        raise _refused(name, error.lineno, reason) from error
+        guard.refuse(f"it is not well-formed XML ({expat.ErrorString(error.code)})")
     except (LookupError, ValueError) as error:
-        raise _refused(name, 1, f"its encoding is not known ({error})") from error
+        guard.refuse(f"its encoding is not known ({error})")
 
 
-def _refused(name: str, line: int, reason: str) -> FormatError:
-    return FormatError(
-        f"{name}, line {line}: {reason}.",
-        hint="Nothing was read from it. Ask its maker for plain RDF/XML.",
-    )
+class _RdfGuard(XmlGuard):
+    """Small entities are honest here, deep nesting is not; IRIs hold nothing that is dropped."""
 
+    #: An honest file needs about 4, generous nesting 20.
+    max_depth = 100
+    entities = 0
 
-class _XmlGuard:
-    """An expat parser that only counts."""
-
-    def __init__(self, file_name: str) -> None:
-        self.file_name, self.depth, self.entities = file_name, 0, 0
-        parser = expat.ParserCreate(namespace_separator="")
-        parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
-        parser.buffer_text = True
-        parser.StartElementHandler = self.start
-        parser.EndElementHandler = self.end
-        parser.EntityDeclHandler = self.entity
-        parser.StartDoctypeDeclHandler = self.doctype
-        parser.ExternalEntityRefHandler = self.external
-        self.parser = parser
-
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            self.refuse(f"elements are nested deeper than {MAX_DEPTH}")
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        super().start(tag, attributes)
         for attribute, value in attributes.items():
             if attribute in _IRI_ATTRIBUTES and NOT_IN_IRI.search(value):
                 self.refuse(f"the IRI {value[:120]!r} {_FORBIDDEN}")
-
-    def end(self, name: str) -> None:
-        self.depth -= 1
-
-    def doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
-        if system or public:
-            self.refuse(f"it names an external document type ({(system or public)!r:.80})")
 
     def entity(self, name: str, is_parameter: bool, value: str | None, *_: Any) -> None:
         self.entities += 1
@@ -126,11 +100,11 @@ class _XmlGuard:
         if self.entities > MAX_ENTITIES or len(value) > MAX_ENTITY_CHARACTERS:
             self.refuse(f"it defines too many or too long entities ({name!r:.40})")
 
-    def external(self, *_: Any) -> int:
-        self.refuse("it refers to an external entity")
-
     def refuse(self, reason: str) -> NoReturn:
-        raise _refused(self.file_name, self.parser.CurrentLineNumber, reason)
+        raise FormatError(
+            f"{self.name}, line {self.parser.CurrentLineNumber}: {reason}.",
+            hint="Nothing was read from it. Ask its maker for plain RDF/XML.",
+        )
 
 
 def _unescaped(text: str) -> str:
