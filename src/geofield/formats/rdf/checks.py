@@ -56,7 +56,7 @@ def _double_numbers(graph: Graph) -> Iterator[Problem]:
             if None not in key[1:] and seen.setdefault(tuple(key), iri) != iri:
                 message = f"Has the same {title} number {key[-1]} as <{seen[tuple(key)]}>."
                 hint = "Give each its own number."
-                yield Problem(message, f"<{iri}>", None, hint, "unique-number")
+                yield Problem(f"<{iri}>", "unique-number", message, hint)
 
 
 def _owners(graph: Graph, layer: str, iris: list[str]) -> list[str | None]:
@@ -82,7 +82,7 @@ def _dangling(graph: Graph) -> Iterator[Problem]:
         for iri, target in dict.fromkeys(graph.pairs(name)):
             if target not in present[cls]:
                 message = f"Points to <{target}>, which is no {cls} of this file."
-                yield Problem(message, f"<{iri}>", rule="dangling-link")
+                yield Problem(f"<{iri}>", "dangling-link", message)
 
 
 def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Problem]:
@@ -91,7 +91,7 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
         shape, crs = geometry_of(text, iri)
     except FormatError as error:
         message = error.message.split(">: ", 1)[-1]
-        yield Problem(message, f"<{iri}>", None, error.hint or "", "wkt")
+        yield Problem(f"<{iri}>", "wkt", message, error.hint or "")
         return
     box = _lonlat_bounds(shape, crs)
     if box is not None:
@@ -101,10 +101,10 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
         pair = "{:g} {:g}".format(*shapely.get_coordinates(shape)[0])
         message = f"Its coordinates are not longitudes and latitudes on earth ({pair})."
         hint = "Are they metres, or latitude before longitude?"
-        yield Problem(message, f"<{iri}>", None, hint, "lonlat-range")
+        yield Problem(f"<{iri}>", "lonlat-range", message, hint)
     elif not shapely.is_valid(shape):
         message = f"Its shape is not valid: {shapely.is_valid_reason(shape)}."
-        yield Problem(message, f"<{iri}>", rule="valid-shape")
+        yield Problem(f"<{iri}>", "valid-shape", message)
 
 
 def _lonlat_bounds(shape: Any, crs: CRS) -> Bounds | None:
@@ -128,14 +128,14 @@ def _positions(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
             words = "has latitude and longitude swapped" if swapped else "is not at its position"
             message = f"Its geometry {words} (lat {lat}, long {lon})."
             rule = "swapped-axes" if swapped else "position"
-            yield Problem(message, f"<{iri}>", None, _AXES if swapped else "", rule)
+            yield Problem(f"<{iri}>", rule, message, _AXES if swapped else "")
         for other in graph.values(iri, "geo:hasGeometry"):
             # A field has one for each of its surveys: these need not be one place.
             mine = "/survey/" not in other or other.startswith(default)
             if mine and other in bounds and not _same(box, bounds[other]):
                 message = f"Its geometries <{default}> and <{other}> are not the same place."
                 hint = "Check CRS and axis order of the second."
-                yield Problem(message, f"<{iri}>", None, hint, "geometries-agree")
+                yield Problem(f"<{iri}>", "geometries-agree", message, hint)
 
 
 def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
@@ -153,9 +153,9 @@ def _places(graph: Graph, bounds: dict[str, Bounds]) -> Iterator[Problem]:
             continue
         if _near(homes[0], box[1], box[0], _FAR_DEG):
             message = "Has latitude and longitude swapped."
-            yield Problem(message, f"<{iri}>", None, _AXES, "swapped-axes")
+            yield Problem(f"<{iri}>", "swapped-axes", message, _AXES)
         else:
-            yield Problem("Lies far outside its field.", f"<{iri}>", rule="far-outside")
+            yield Problem(f"<{iri}>", "far-outside", "Lies far outside its field.")
 
 
 def _near(box: Bounds, lon: float, lat: float, margin: float) -> bool:

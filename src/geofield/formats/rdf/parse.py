@@ -54,29 +54,14 @@ def parse(path: Path) -> Iterator[ox.Quad]:
         raise FormatError(f"{path.name} cannot be read: {error}.") from error
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, order=True, slots=True)
 class Problem:
     """What a validator found wrong with a subject: an IRI in angle brackets, or the file.
 
-    `line` is where the subject is described first, `hint` what to do about it, `rule` for
-    programs: a shape's constraint and property, or a check.
+    `rule` is a shape's constraint and property, or a check; `hint` what to do about it.
     """
 
+    subject: str
+    rule: str
     message: str
-    subject: str = ""
-    line: int | None = None
     hint: str = ""
-    rule: str = ""
-
-    @property
-    def place(self) -> str:
-        """The line and the subject."""
-        return ", ".join(filter(None, (f"line {self.line}" if self.line else "", self.subject)))
-
-    @property
-    def words(self) -> str:
-        """The message as a sentence, and what to do."""
-        return f"{self.message[:1].upper()}{self.message[1:]} {self.hint}".strip()
-
-    def __str__(self) -> str:
-        return f"{self.place}: {self.words}" if self.place else self.words

@@ -50,7 +50,7 @@ def shape_problems(quads: Iterable[ox.Quad]) -> Iterator[Problem]:
         for subject in subjects:
             if not subject.startswith("<"):
                 hint = "Name it, or it cannot be merged with other data."
-                yield Problem("It has no IRI.", subject, hint=hint, rule="nodeKind")
+                yield Problem(subject, "nodeKind", "It has no IRI.", hint)
         for path, tests, message in properties:
             some = path[0] in graph.columns
             told = [(s, graph.values(s, *path) if some else []) for s in subjects]
@@ -141,7 +141,7 @@ def _problem(subject: str, path: tuple[str, ...], name: str, value: Any, rule: s
         "hasValue": f"Its {what} is not the one expected.",
     }
     message = words.get(name, f"Its {what} is {_typed(value)}.")
-    return Problem(message, subject, hint=rule, rule=f"{name} {term}")
+    return Problem(subject, f"{name} {term}", message, rule)
 
 
 def _typed(value: Any) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from geofield.errors import FormatError
@@ -22,49 +22,53 @@ _GEOFIELD = f'xmlns:gf="{GF}"'.encode()
 _PREFIX = re.compile(r"@?prefix\s+([\w-]*):\s*<([^>]*)>", re.IGNORECASE)
 
 
-def validate(path: Path) -> list[Problem]:
+def check(path: Path) -> Iterator[Finding]:
     """Everything that is wrong with a file, in the order of its lines.
 
-    A file that is hostile or not valid in its syntax has one problem: nothing more can be said
+    A file that is hostile or not valid in its syntax has one finding: nothing more can be said
     of it.
     """
-    path = Path(path)
     try:
         quads = list(parse(path))
     except FormatError as error:
         line = re.search(r"line (\d+)", error.message)
         message = error.message.split(": ", 1)[-1]
-        place = int(line[1]) if line else None
-        return [Problem(message, path.name, place, error.hint or "", "syntax")]
+        syntax = Problem(path.name, "syntax", message, error.hint or "")
+        yield _told(syntax, int(line[1]) if line else None)
+        return
     graph = Graph.of(quads)
     known = [iri for layer in layer_maps() for iri in layer.known_as]
     if not quads and _GEOFIELD in path.read_bytes()[:20_000]:
-        return []  # one of a plan's three files: it has no obstacles, or no tracks
+        return  # one of a plan's three files: it has no obstacles, or no tracks
     if not graph.of_type(*known):
-        return [Problem("It holds no field, obstacle or track.", path.name, rule="empty")]
-    return _located({*shape_problems(quads), *check_graph(graph)}, path)
+        yield _told(Problem(path.name, "empty", "It holds no field, obstacle or track."))
+        return
+    problems = {*shape_problems(quads), *check_graph(graph)}
+    lines = _lines({problem.subject for problem in problems}, path)
+    for problem in sorted(problems, key=lambda each: (lines[each.subject] or math.inf, each)):
+        yield _told(problem, lines[problem.subject])
 
 
-def check(path: Path) -> Iterator[Finding]:
-    """The problems of a file as findings: what `geofield validate` shows."""
-    for problem in validate(path):
-        yield Finding("error", problem.place, problem.words)
+def _told(problem: Problem, line: int | None = None) -> Finding:
+    """The line and the subject, the message as a sentence, and what to do."""
+    where = f"line {line}, {problem.subject}" if line else problem.subject
+    words = f"{problem.message[:1].upper()}{problem.message[1:]} {problem.hint}".strip()
+    return Finding("error", where, words)
 
 
-def _located(problems: set[Problem], path: Path) -> list[Problem]:
-    """The line at which each problem's subject is described first."""
-    text = path.read_text(encoding="utf-8", errors="replace") if problems else ""
+def _lines(subjects: set[str], path: Path) -> dict[str, int | None]:
+    """The line at which each subject is described first."""
+    text = path.read_text(encoding="utf-8", errors="replace") if subjects else ""
     base = _BASE.search(text[:20_000])
     prefixes = _PREFIX.findall(text[:20_000])
     lines: dict[str, int | None] = {}
-    for subject in {problem.subject for problem in problems}:
+    for subject in subjects:
         iri = subject.removeprefix("<").removesuffix(">")
         names = [iri, *(f"{p}:{iri[len(n) :]}" for p, n in prefixes if iri.startswith(n))]
         if base and base[1] and iri.startswith(base[1]):
             names.insert(0, iri[len(base[1]) :])
         lines[subject] = next(filter(None, (_line_of(name, text) for name in names)), None)
-    placed = [replace(p, line=p.line or lines[p.subject]) for p in problems]
-    return sorted(placed, key=lambda p: (p.line is None, p.line or 0, p.subject, p.rule, p.message))
+    return lines
 
 
 def _line_of(name: str, text: str) -> int | None:
