@@ -179,24 +179,23 @@ def active(obstacles: gpd.GeoDataFrame, *, careful: bool = False) -> gpd.GeoData
     return obstacles[~status.isin(idle).to_numpy(bool)]
 
 
-def next_number(obstacles: gpd.GeoDataFrame) -> int:
-    """The next free obstacle number of a table."""
-    numbers = obstacles["obstacle_no"].to_numpy(dtype="float64", na_value=np.nan)
-    return int(np.nanmax(numbers, initial=0)) + 1
+def next_number(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> int:
+    """The next free number of a table's rows."""
+    return int(np.nanmax(floats(table, column), initial=0)) + 1
 
 
-def numbered(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+def numbered(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> gpd.GeoDataFrame:
     """The table with the next free numbers in rows without one; 1, 2, ... where all have none."""
     import pandas as pd
 
-    if "obstacle_no" not in obstacles.columns:
-        return obstacles.assign(obstacle_no=pd.array(range(1, len(obstacles) + 1), dtype="Int64"))
-    numbers = floats(obstacles, "obstacle_no").copy()
+    if column not in table.columns:
+        return table.assign(**{column: pd.array(range(1, len(table) + 1), dtype="Int64")})
+    numbers = floats(table, column).copy()
     missing = np.isnan(numbers)
     if not missing.any():
-        return obstacles
-    numbers[missing] = next_number(obstacles) + np.arange(missing.sum())
-    return obstacles.assign(obstacle_no=pd.array(numbers.astype("int64"), dtype="Int64"))
+        return table
+    numbers[missing] = next_number(table, column) + np.arange(missing.sum())
+    return table.assign(**{column: pd.array(numbers.astype("int64"), dtype="Int64")})
 
 
 def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:

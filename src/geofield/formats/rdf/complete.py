@@ -12,28 +12,28 @@ from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
 from geofield.formats.foreign_tables import heading_deg
 from geofield.grid import Grid
+from geofield.model.obstacles import numbered
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
 
 def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -> None:
-    """Fill gaps in the tables of a file in place; never change a value that is there.
+    """Fill gaps in the tables of a file; never change a value that is there.
 
     Lengths, areas and positions come from the geometry, counts from the other tables,
     segments from tracks that have none. An obstacle without a word on its status counts as
     added by a person, so that no re-run drops it.
     """
+    for layer in (schema.OBSTACLES, schema.TRACKS, schema.TRACK_POINTS):
+        tables[layer.name] = numbered(tables[layer.name], layer.key[-1])
     field, obstacles = tables["field"], tables["obstacles"]
     shapes = field.geometry.to_numpy()
     _fill(field, "area_ha", ground_areas_m2(shapes, crs) / 1e4)
     _fill(field, "perimeter_m", ground_lengths_m(shapely.get_exterior_ring(shapes), crs))
     for column, value in {"kind": "other", "status": "added", "buffer_m": 0.0}.items():
         _fill(obstacles, column, value)
-    numbered(obstacles, "obstacle_no")
     _positions(obstacles, crs)
-    numbered(tables["tracks"], "track_no")
-    numbered(tables["track_points"], "point_no")
     if len(tables["tracks"]) and not len(tables["segments"]):
         tables["segments"] = _segments(tables["tracks"], crs)
     _tracks(tables)
@@ -51,13 +51,6 @@ def _fill(frame: gpd.GeoDataFrame, column: str, values: Any) -> None:
     missing = frame[column].isna()
     if missing.any():
         frame.loc[missing, column] = np.broadcast_to(values, len(frame))[missing.to_numpy()]
-
-
-def numbered(frame: gpd.GeoDataFrame, column: str) -> None:
-    """Give the next free numbers to rows without one, in place."""
-    numbers = frame[column].to_numpy(dtype="float64", na_value=np.nan)
-    last = int(np.nanmax(numbers, initial=0))
-    _fill(frame, column, last + np.cumsum(np.isnan(numbers)))
 
 
 def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:

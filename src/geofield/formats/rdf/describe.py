@@ -15,7 +15,6 @@ import shapely
 from geofield import schema
 from geofield.crs import authority_name
 from geofield.errors import FormatError
-from geofield.formats.rdf.complete import numbered
 from geofield.formats.rdf.features import (
     column_terms,
     feature_group,
@@ -29,7 +28,7 @@ from geofield.formats.rdf.names import NOT_IN_IRI, Names
 from geofield.formats.rdf.namespaces import crs_iri, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, date_term, single
 from geofield.model.dataset import Dataset
-from geofield.model.obstacles import active
+from geofield.model.obstacles import active, numbered
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -260,9 +259,8 @@ def keyed(layer: LayerMap, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     """A layer's table with a number in every row; refuses two rows of one key."""
     keys = list(layer.layer.key)
     last = keys[-1]
-    if layer.layer.column(last).type == "int" and frame[last].isna().any():
-        frame = frame.copy()
-        numbered(frame, last)
+    if layer.layer.column(last).type == "int":
+        frame = numbered(frame, last)
     twice = frame.duplicated(keys)
     if twice.any():
         row = frame[twice].iloc[0]
