@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -25,7 +25,7 @@ from geofield.formats.rdf.features import (
 from geofield.formats.rdf.graph import ontology
 from geofield.formats.rdf.layers import CANDIDATE, LayerMap, layer_map, layer_maps
 from geofield.formats.rdf.names import NOT_IN_IRI, Names
-from geofield.formats.rdf.namespaces import crs_iri, node
+from geofield.formats.rdf.namespaces import PREFIXES, crs_iri, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, date_term, single
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import active, numbered
@@ -42,6 +42,11 @@ PRODUCTS = ("field", "obstacles", "tracks")
 @dataclass(frozen=True, slots=True)
 class Description:
     """A dataset about to be described."""
+
+    #: Of its files.
+    prefixes: ClassVar[dict[str, str]] = PREFIXES
+    #: Whether track points are told where nobody says.
+    points_unasked: ClassVar[bool] = False
 
     dataset: Dataset
     names: Names

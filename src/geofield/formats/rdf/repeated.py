@@ -26,8 +26,8 @@ from geofield.formats.rdf.features import point_group
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.guard import check_json, check_xml
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import DOUBLE, INTEGER, PREFIXES, STUDY_PREFIXES, TYPE, node
-from geofield.formats.rdf.study import study_points
+from geofield.formats.rdf.namespaces import DOUBLE, INTEGER, TYPE, node
+from geofield.formats.rdf.study import StudyDescription, study_points
 from geofield.formats.rdf.triples import Group, Nodes, Texts, Values, single, triples
 
 #: Fewer nodes than this are not worth it.
@@ -152,7 +152,7 @@ def repeated(path: Path, syntax: ox.RdfFormat) -> Graph | None:
 def _points(syntax: ox.RdfFormat) -> list[tuple[Group, str, re.Pattern[str]]]:
     """A track point with places for its values, its text, and what matches any: of each profile."""
     row = pd.DataFrame({column.name: [1] for column in schema.TRACK_POINTS.columns})
-    writer = _Writer(syntax, {**PREFIXES, **STUDY_PREFIXES})
+    writer = _Writer(syntax, StudyDescription.prefixes)
     told = []
     for point_of in (point_group, study_points):
         one, _ = _one(point_of(row, Names(*[""] * 7)), is_xml=False)

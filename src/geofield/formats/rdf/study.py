@@ -19,14 +19,14 @@ The study's sample (METHOD.md, section 5) cannot be taken literally; the choices
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 from geofield import schema
 from geofield.formats.rdf.describe import Description
 from geofield.formats.rdf.features import POINT_DECIMALS, column_terms, row_iris
 from geofield.formats.rdf.layers import LayerMap, layer_map
 from geofield.formats.rdf.names import Names
-from geofield.formats.rdf.namespaces import expand, node
+from geofield.formats.rdf.namespaces import PREFIXES, STUDY_PREFIXES, expand, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, terms
 
 _TRAJECTORY = "http://www.DLC.org/Trajectory#"
@@ -37,6 +37,8 @@ class StudyDescription(Description):
     """A dataset described in the study's vocabulary."""
 
     __slots__ = ()
+    prefixes: ClassVar = {**PREFIXES, **STUDY_PREFIXES}
+    points_unasked = True
 
     def product(self, product: str) -> Iterator[Group]:
         """Obstacles and points as the study has them; all else stands with the field."""
