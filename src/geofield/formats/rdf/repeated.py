@@ -182,6 +182,9 @@ def _parted(text: str, sample: str, shape: re.Pattern[str]) -> tuple[str, int, l
     The nodes of a run follow each other without anything between, and differ in values that
     stand in any place as they are: what two samples mean there, all of them mean.
     """
+    # What is not there is sought much longer than what is.
+    if not all(each in text for each in _PLACES.split(sample)[:: _PLACES.groups + 1]):
+        return "", 0, []
     width = shape.groups + 1
     parts = shape.split(text)
     *before, tail = parts[::width]
