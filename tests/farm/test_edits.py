@@ -811,18 +811,34 @@ def test_an_edit_taken_back_before_the_overview_is_written_is_no_silence(folder:
     assert "as edited" not in _batch(folder)
 
 
-def test_settings_of_the_page_stand_when_the_farm_is_planned_again(folder: Path) -> None:
+@pytest.mark.parametrize("door", ["page", "command", "python"])
+def test_settings_said_of_a_field_stand_when_the_farm_is_planned_again(
+    folder: Path, door: str
+) -> None:
     """A reviewed field turned back from 0 degrees to 88 with the next --fresh, without a word."""
-    session = Session(gf.read_farm(folder / "farm")["b"])
-    said = {"direction": "30", "headland_m": 10, "spacing_m": 9}
-    session.do({"do": "tracks", "settings": said})
-    session.plan.write(folder / "reviewed", formats=["gpkg"])
-    put_back(folder / "reviewed" / "field.gpkg", folder / "farm")
+    file, farm_folder = folder / "reviewed" / "field.gpkg", folder / "farm"
+    if door == "page":
+        session = Session(gf.read_farm(farm_folder)["b"])
+        said = {"direction": "30", "headland_m": 10, "spacing_m": 9}
+        session.do({"do": "tracks", "settings": said})
+        session.plan.write(file.parent, formats=["gpkg"])
+    else:
+        if door == "python":
+            gf.read_farm(farm_folder)["b"].write(file.parent, formats=["gpkg"])
+        else:
+            file.parent.mkdir()
+            geofield("farm", "get", farm_folder, "b", "-o", file)
+            # What the farm is planned with meanwhile was said by nobody who had the plan.
+            _batch(folder, "--fresh", "--min-segment", 9)
+        geofield("tracks", file, "--spacing", 9, "--direction", 30, "--headland", 10,
+                 "-o", file, "--overwrite")  # fmt: skip
+    geofield("farm", "put", file, farm_folder)
     _batch(folder, "--fresh")
     farm = gf.read_farm(folder / "farm")
     tracks, settings = farm["b"].tracks, farm["b"].settings.tracks
     assert tracks.heading_deg == pytest.approx(30.0, abs=0.01)
     assert (settings.headland_m, settings.spacing_m) == (10.0, 6.0)
+    assert settings.min_segment_m == farm["a"].settings.tracks.min_segment_m
     notes = farm.status.set_index("field_id")["notes"]
     assert "as set for this field: --direction 30, --headland 10" in notes["b"]
     assert "--spacing 6 as said now, no longer --spacing 9" in notes["b"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from geofield.farm.reviewed import SUFFIX, file_of, reviewed_files
 from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
-from geofield.farm.taken_out import note_put, refuse_changed
+from geofield.farm.taken_out import note_put, refuse_changed, settings_taken
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
 from geofield.pipeline import run_tracks
@@ -80,6 +80,8 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
         if not (anyway or mine) and file_of(field_id) in reviewed_files(store):
             refuse_changed(plan, before, plan_file, store)
         plan = with_given(_with_its_outline(plan, before), before)
+    taken = settings_put(store).get(field_id, {}) if mine else settings_taken(plan, before)
+    known, plan = plan, _with_said(plan, settings_said(plan, taken))
     settings = plan.settings or (None if before is None else before.settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
@@ -98,8 +100,8 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
                 warnings.warn(
                     f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2
                 )
-            plan, whole = run_tracks(plan, settings=settings), False
-        if not whole:
+            plan = run_tracks(plan, settings=settings)
+        if not (whole and plan is known):
             save_plan(plan, file, overwrite=True)
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
@@ -148,10 +150,8 @@ def take_in_place(store: Store, field_id: str) -> None:
     settings = before.settings or plan.settings or Settings()
     said = settings_said(plan, settings_put(store).get(field_id, {}))
     tracks = settings.tracks.model_copy(update=said)
-    # Whatever they were said with, they are a person's word in every later run.
-    names = tuple(sorted({*plan.evidence.said_tracks, *said}))
-    plan = replace(plan, evidence=replace(plan.evidence, said_tracks=names))
-    plan = run_tracks(plan, settings=settings.model_copy(update={"tracks": tracks}))
+    settings = settings.model_copy(update={"tracks": tracks})
+    plan = run_tracks(_with_said(plan, said), settings=settings)
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         copy_whole(edited, file)
@@ -159,6 +159,14 @@ def take_in_place(store: Store, field_id: str) -> None:
         _put(store, field_id, file)
     note_settings(store, [plan])
     _replace(store, [plan])
+
+
+def _with_said(plan: Plan, names: Iterable[str]) -> Plan:
+    """A plan some of whose tracks' settings are a person's word, whatever they were said with."""
+    said = tuple(sorted({*plan.evidence.said_tracks, *names}))
+    if said == plan.evidence.said_tracks:
+        return plan
+    return replace(plan, evidence=replace(plan.evidence, said_tracks=said))
 
 
 def _put(store: Store, field_id: str, file: Path) -> None:

@@ -20,7 +20,7 @@ _FILE = f"{REVIEWED}/.settings.json"
 
 def note_settings(store: Store, plans: Iterable[Plan]) -> None:
     """Note the settings of plans that were put into a farm."""
-    noted = settings_put(store) | {plan.field.field_id: _tracks(plan) for plan in plans}
+    noted = settings_put(store) | {plan.field.field_id: track_values(plan) for plan in plans}
     store.put(_FILE, json.dumps(noted, sort_keys=True).encode())
 
 
@@ -31,12 +31,14 @@ def settings_put(store: Store) -> dict[str, dict[str, Any]]:
 
 
 def settings_said(plan: Plan, put: dict[str, Any]) -> dict[str, Any]:
-    """Settings of the tracks that a plan has, and was not `put` with."""
+    """Settings of the tracks that a plan has, and was not `put` with, or taken out with."""
     now = {} if plan.settings is None else dict(plan.settings.tracks)
-    told = _tracks(plan)
+    told = track_values(plan)
     return {name: now[name] for name in told if name in put and put[name] != told[name]}
 
 
-def _tracks(plan: Plan) -> dict[str, Any]:
+def track_values(plan: Plan | None) -> dict[str, Any]:
     """The settings of a plan's tracks as plain JSON values."""
-    return {} if plan.settings is None else plan.settings.tracks.model_dump(mode="json")
+    if plan is None or plan.settings is None:
+        return {}
+    return plan.settings.tracks.model_dump(mode="json")

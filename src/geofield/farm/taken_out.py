@@ -16,6 +16,7 @@ from typing import Any
 from geofield.errors import FormatError
 from geofield.farm.as_written import plan_digest
 from geofield.farm.folder import REVIEWED
+from geofield.farm.put_settings import track_values
 from geofield.farm.store import Store
 from geofield.plan import Plan
 
@@ -23,12 +24,20 @@ from geofield.plan import Plan
 PUT = f"{REVIEWED}/.put.json"
 #: What the farm's plan said, in the evidence of one that was taken out.
 _TAKEN = "taken"
+#: With which settings of its tracks.
+_SETTINGS = "taken_settings"
 
 
 def taken_out(plan: Plan) -> Plan:
     """A plan of a farm, noting what it says."""
-    farm = {**plan.evidence.farm, _TAKEN: plan_digest(plan)}
+    farm = {**plan.evidence.farm, _TAKEN: plan_digest(plan), _SETTINGS: track_values(plan)}
     return replace(plan, evidence=replace(plan.evidence, farm=farm))
+
+
+def settings_taken(plan: Plan, before: Plan | None) -> dict[str, Any]:
+    """The settings of its tracks that a plan was taken out with; else those of the farm's plan."""
+    taken: dict[str, Any] = plan.evidence.farm.get(_SETTINGS, track_values(before))
+    return taken
 
 
 def refuse_changed(plan: Plan, before: Plan, plan_file: Path, store: Store) -> None:
