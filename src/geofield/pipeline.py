@@ -332,15 +332,17 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan, searched=False)
     obstacles, said = None, still_said(plan, settings)
+    told = [*field_changes(plan, field, kept=True)] if field is not plan.field else []
     evidence = replace(plan.evidence, track_edits=read_track_edits(plan), said_tracks=said)
     if plan.obstacles is not None:
         obstacles, written = reconcile(plan.obstacles, evidence.written, plan.grid)
+        told += [written.since(evidence.written)] if evidence.written is not None else []
         evidence = replace(evidence, written=written)
     read = replace(plan, field=field, obstacles=obstacles, tracks=None, evidence=evidence)
     tracks = tracks_of_plan(read, settings)
     evidence = replace(evidence, track_edits=tracks.edits).with_unsearched(field)
     warn_of_unsearched(evidence)
-    told = [*tracks_come_back(plan), tracks.edits.in_words()]
+    told += [*tracks_come_back(plan), tracks.edits.in_words()]
     if field is not plan.field:
         evidence = replace(evidence, outline=outline_digest(field.polygon))
     return replace(

@@ -136,6 +136,9 @@ def test_a_mean_of_the_sizes_makes_no_merged_obstacle_smaller(
     write(file, merged(before, [1, 2], whole, **said))
     after, told = understood(file)
     assert re.search(r"the shape counts, and not radius_m", told), told
+    assert bool(re.search(r"Obstacle 1, which took in others, keeps buffer_m", told)) == bool(
+        number
+    )
     assert active(after).geometry.hausdorff_distance(whole).min() < 0.01
 
 

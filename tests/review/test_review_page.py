@@ -237,6 +237,7 @@ def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> N
     box.clear()
     box.send_keys("5000", Keys.ENTER)
     page.wait(lambda: "larger than the field" in page.text("message"))
+    assert "for instance 3." in page.text("message")  # and not --spacing 3
     assert page.state()["tracks"] == before["tracks"]
     page.press(Keys.ESCAPE)
     # A corner dragged across the other side: the outline crosses itself.
@@ -271,7 +272,7 @@ def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(
     box.clear()
     box.send_keys("six")
     page.button("save")
-    page.wait(lambda: "spacing_m: input should be a valid number" in page.text("message"))
+    page.wait(lambda: "a number of metres above 0, not 'six'." in page.text("message"))
     assert page.state()["can_redo"] is page.state()["edited"] is False
     # The refusal went on standing beside a value that is right again.
     box.clear()
@@ -502,6 +503,17 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     box.send_keys("5000", Keys.ENTER)
     page.wait(lambda: "5000 m ist größer als das Feld" in page.text("message"))
     assert "warten auf Ihr Wort" in page.text("left")
+    for name, typed, told in (
+        ("spacing_m", "0", "Der Abstand ist eine Zahl in Metern über 0, nicht 0."),
+        ("headland_m", "900", "Ein Vorgewende von 900 m lässt nichts vom Feld übrig. Wählen Sie"),
+        ("direction", "quer", "ein Kurs in Grad oder eine aus der Liste, nicht 'quer'."),
+    ):
+        box = page.driver.find_element(By.NAME, name)
+        box.clear()
+        box.send_keys(typed, Keys.ENTER)
+        page.wait(lambda told=told: told in page.text("message"))
+        box.clear()
+        box.send_keys(str(page.state()["settings"][name]))
 
 
 def test_the_page_asks_nobody_else(page: Page) -> None:

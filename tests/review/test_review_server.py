@@ -105,6 +105,12 @@ def test_no_page_is_opened_on_a_folder_without_a_plan(tmp_path: Path) -> None:
     done = run_geofield("review", tmp_path, "--no-browser", timeout_s=60)
     assert done.returncode == 1
     assert "holds no plan of geofield" in done.stderr
+    assert not done.stdout
+    for content, told in ((b"", "is empty (0 bytes)"), (b"text", "is not a GeoPackage")):
+        (file := tmp_path / "field.gpkg").write_bytes(content)
+        done = run_geofield("review", file, "--no-browser", timeout_s=60)
+        assert told in done.stderr
+        assert not done.stdout  # no address
     assert done.stdout == ""
 
 

@@ -607,3 +607,14 @@ def test_exports_show_the_picture_and_do_not_replace_those_of_another_plan(
         assert desk.export("shapefile")["files"] == ["export/other/shapefile"]
     assert all("data:image/" in page for page in pages)
     assert (folder / "export" / "field" / "shapefile" / "guidance.shp").exists()
+
+
+def test_an_export_does_not_replace_another_whose_files_are_called_alike(plan_path: Path) -> None:
+    plain, study = "export/field/obstacles.rdf", "export/field/rdf-study"
+    folder, desk = plan_path.parent, Desk(plan_path)
+    for _ in range(2):
+        assert plain in desk.export("rdf")["files"]
+        content = (folder / plain).read_bytes()
+        assert desk.export("rdf-study")["files"] == [study]
+        assert (folder / plain).read_bytes() == content
+    assert b"DLC.org" in (folder / study / "obstacles.rdf").read_bytes()

@@ -53,11 +53,14 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
 
     The page is served to this machine only, under an address that holds a key.
     """
-    from geofield.review.plans import is_farm, plans_in
+    from geofield.review.plans import is_farm, is_plan, plans_in
     from geofield.review.server import ReviewServer
 
+    # No browser is opened on nothing.
     if plan_file.is_dir() and not is_farm(plan_file):
-        plans_in(plan_file)  # no browser is opened on nothing
+        plans_in(plan_file)
+    doubtful = plan_file.is_file() and not is_plan(plan_file)
+    whole = _shelf(plan_file, picture) if doubtful else None
     try:
         server = ReviewServer(port)
     except OSError as error:
@@ -72,7 +75,7 @@ def review(plan_file: Path, picture: Path | None, port: int, no_browser: bool) -
         import webbrowser
 
         webbrowser.open(server.address)
-    shelf = server.load(lambda: _shelf(plan_file, picture))
+    shelf = server.load(lambda: whole or _shelf(plan_file, picture))
     if shelf.desk.brought_back:
         say(shelf.desk.brought_back)
     if is_farm(plan_file):

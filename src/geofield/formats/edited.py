@@ -51,7 +51,7 @@ def made_whole(dataset: Dataset) -> Dataset:
     if isinstance(dataset, Joined):
         return dataset
     tables = {name: _plain(table, name) for name, table in dataset.tables.items()}
-    if dataset.has(schema.OBSTACLES.name):
+    if schema.OBSTACLES.name in tables:  # one without rows may be emptied
         obstacles = tables[schema.OBSTACLES.name]
         tables[schema.OBSTACLES.name] = _understood(obstacles, dataset)
     if dataset.has(schema.FIELD.name):

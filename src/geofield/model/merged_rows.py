@@ -150,9 +150,9 @@ def _write(table: gpd.GeoDataFrame, taken: _Taken) -> None:
 
 
 def _keep_sizes(table: gpd.GeoDataFrame, taken: _Taken, record: Mapping[int, WrittenRow]) -> None:
-    """Leave merged rows no radius whose circle does not hold what they took in, and no less margin.
+    """Leave merged rows no radius whose circle does not hold what they took in.
 
-    Programs that merge rows write means and sums into them.
+    Programs that merge rows write means and sums into them. A margin without a number is none.
     """
     numbers, radius, margin = (floats(table, name) for name in _WORDS[:1] + _WORDS[3:])
     smaller: list[WrittenRow] = []
@@ -161,7 +161,6 @@ def _keep_sizes(table: gpd.GeoDataFrame, taken: _Taken, record: Mapping[int, Wri
         own = record.get(int(np.nan_to_num(numbers[at])))
         if own is not None:
             held.append(own)
-            table.loc[at, "buffer_m"] = np.fmax(margin[at], own.buffer_m or 0.0)
         elif np.isnan(numbers[at]):
             table.loc[at, "buffer_m"] = np.nan  # it is in the shape
         typed = own is None or own.radius_m is None or abs(own.radius_m - radius[at]) > SAME_M

@@ -33,6 +33,7 @@ from geofield.model.obstacles import (
     still_round,
 )
 from geofield.model.resized import as_areas, circles, differ, grown, shape_now, widened
+from geofield.model.whole_layer import tell_all_reshaped, tell_none_left
 from geofield.model.written import (
     MOVED_M,
     PlainShape,
@@ -126,6 +127,7 @@ def reconcile(
     former = [] if written is None else list(written.removed)
     if written is not None:
         left = set(result["obstacle_no"].tolist())
+        tell_none_left(written.rows, left)
         elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
     gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
     former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
@@ -276,6 +278,7 @@ def _bring_up_to_date(
     rows.at["buffer_m"][known] = margin = np.where(np.isnan(margin), was_margin, margin)
     chosen = rows.at["status"][known] != np.array([row.status for row in before], object)
     reshaped = ~same_shapes(rows.shapes[known], shapes)
+    tell_all_reshaped(before, rows.shapes[known], shapes, reshaped)
     new_radius = differ(rows.at["radius_m"][known], was_radius)
     new_margin = differ(margin, was_margin)
     resized = new_radius | new_margin

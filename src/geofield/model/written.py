@@ -78,6 +78,18 @@ class Written:
         """The rows by their obstacles' numbers."""
         return {row.obstacle_no: row for row in self.rows}
 
+    def since(self, before: Written) -> str:
+        """What a person said of obstacles since they were as `before`, in words."""
+        now, then = self.by_number, before.by_number
+        changed = sum(number in then and row != then[number] for number, row in now.items())
+        counts = (
+            (changed, "changed"),
+            (len(now.keys() - then), "drawn"),
+            (len(then.keys() - now), "taken away"),
+        )
+        words = [f"{count} {what}" for count, what in counts if count]
+        return f"obstacles: {', '.join(words)}" if words else ""
+
     def reprojected(self, source: CRS, target: CRS) -> Written:
         """The same in another metric CRS."""
         if source == target:

@@ -213,17 +213,21 @@ class Desk:
 
     def export(self, name: str) -> dict[str, Any]:
         """Write the plan as edited in another format, into a folder of its own beside it."""
-        from geofield.formats import format_named, write_dataset
+        from geofield.formats import FORMATS, format_named, write_dataset
         from geofield.imagery import write_scene
 
-        folder, stem = self._exports()
+        exports, stem = self._exports()
+        chosen = format_named(name)
+        alike = (one.name for one in FORMATS.values() if set(one.files) & set(chosen.files))
+        # Of formats with the same names all but the first have a folder: none replaces another.
+        folder = exports if next(alike) == chosen.name else exports / chosen.name
         with (
             self.lock,
             tempfile.TemporaryDirectory(prefix="geofield-") as place,
             listening() as heard,
         ):
             dataset = self.session.plan.to_dataset()
-            if self._picture_path is not None and format_named(name).pictured:
+            if self._picture_path is not None and chosen.pictured:
                 scene = picture_beside(self.path)
                 if scene != self._picture_path:
                     cut = self._scene_of(self.session.plan)
@@ -232,8 +236,8 @@ class Desk:
             written = write_dataset(
                 dataset, folder, [name], stem=stem, overwrite=True, inputs=[self.path]
             )
-        within = Path(*folder.parts[-2:])
-        made = dict.fromkeys(str(within / path.relative_to(folder).parts[0]) for path in written)
+        within = Path(*exports.parts[-2:])
+        made = dict.fromkeys(str(within / path.relative_to(exports).parts[0]) for path in written)
         return {"files": list(made), "notes": [str(one.message) for one in heard]}
 
     def _exports(self) -> tuple[Path, str]:

@@ -32,7 +32,7 @@ def plans_in(folder: Path) -> list[Path]:
         There is none.
     """
     places = [path for pattern in _DEPTH for path in sorted(folder.glob(pattern))]
-    found = [path for path in places if not path.name.startswith(".") and _is_plan(path)]
+    found = [path for path in places if not path.name.startswith(".") and is_plan(path)]
     if not found:
         raise FormatError(
             f"{folder} holds no plan of geofield.",
@@ -58,7 +58,8 @@ def _is_unsaved(journal: Path) -> bool:
     return len(lines) > 1 and not lines[-1].startswith(b'{"saved"')
 
 
-def _is_plan(path: Path) -> bool:
+def is_plan(path: Path) -> bool:
+    """Whether a file says that it is a plan of geofield; it may be damaged all the same."""
     try:
         with database(path) as file:
             return bool(file.execute("SELECT 1 FROM gpkg_metadata").fetchone())

@@ -1,6 +1,14 @@
 // What the program itself says in English, as a page in another language meets it: doubts and refusals.
+// In English that which speaks of options and names of settings: a page has fields to fill in.
 
 export const SAID = {
+  en: [
+    [/^Give the distance between two tracks in metres.*$/, "Give the distance between two tracks in metres, for instance 3."],
+    [/^Choose a wider headland, or none.*$/, "Choose a wider headland, or 0 for none."],
+    [/^Settings are not valid: spacing_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "The spacing is a number of metres above 0, not $1."],
+    [/^Settings are not valid: headland_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "The headland is a number of metres, 0 for none, not $1."],
+    [/^Settings are not valid: direction: .*?\(given: (.*?)(?:;.*?)?\).*$/, "The direction is a heading in degrees, or one of those in the list, not $1."],
+  ],
   de: [
     [/^it goes on outside the picture: (.*) of the outline is the picture's edge$/, "es geht außerhalb des Bildes weiter: $1 des Umrisses ist der Bildrand"],
     [/^it is rough .*$/, "es ist rau (Gebüsch, Wald, Gebäude?)"],
@@ -37,6 +45,14 @@ export const SAID = {
     [/^There is no picture beside this plan.*$/, "Neben diesem Plan liegt kein Bild, auf dem der Umriss zu finden wäre."],
     [/^A spacing of (.*) m is larger than the field \((.*) m long\)\.$/, "Ein Abstand von $1 m ist größer als das Feld ($2 m lang)."],
     [/^Give the distance between two tracks in metres.*$/, "Gemeint ist der Abstand zweier Spuren in Metern, zum Beispiel 3."],
+    [/^Settings are not valid: spacing_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "Der Abstand ist eine Zahl in Metern über 0, nicht $1."],
+    [/^Settings are not valid: headland_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "Das Vorgewende ist eine Zahl in Metern, 0 für keines, nicht $1."],
+    [/^Settings are not valid: direction: .*?\(given: (.*?)(?:;.*?)?\).*$/, "Die Richtung ist ein Kurs in Grad oder eine aus der Liste, nicht $1."],
+    [/^A headland of (.*) m leaves nothing of the field\.$/, "Ein Vorgewende von $1 m lässt nichts vom Feld übrig."],
+    [/^Choose a narrower headland\.$/, "Wählen Sie ein schmaleres Vorgewende."],
+    [/^A headland of (.*) m is too narrow to be one\.$/, "Ein Vorgewende von $1 m ist zu schmal, um eines zu sein."],
+    [/^Choose a wider headland, or none.*$/, "Wählen Sie ein breiteres Vorgewende, oder 0 für keines."],
+    [/^Choose a smaller spacing or headland, or check the outline\.$/, "Wählen Sie einen kleineren Abstand oder ein schmaleres Vorgewende, oder prüfen Sie den Umriss."],
     [/^The field of (.*) ha is smaller than one track\.$/, "Das Feld von $1 ha ist kleiner als eine Spur."],
     [/^Another program changed (.*) since it was opened here\.$/, "Ein anderes Programm hat $1 geändert, seit die Datei hier geöffnet wurde."],
     [/^Reload it \(edits made here.*$/, "Laden Sie sie neu (Ihre Änderungen werden noch einmal gemacht, wo sie passen), oder speichern Sie unter anderem Namen: siehe Mehr."],

@@ -1,0 +1,72 @@
+"""Edits of all obstacles at once are told: programs make them, and few persons mean them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from geofield import schema
+from geofield.errors import FormatWarning
+from geofield.model.written import WrittenRow
+from geofield.wording import counted
+
+#: One or two are taken away or drawn anew by hand.
+_FEW = 2
+_NOT_MEANT = (
+    "If that was not meant, go on from a copy of the file, or have them searched anew: "
+    "geofield run --fresh."
+)
+
+
+def tell_none_left(record: Collection[WrittenRow], numbers: Collection[float]) -> None:
+    """Tell where none is left of the obstacles that were written and driven around.
+
+    Parameters
+    ----------
+    record : collection of WrittenRow
+    numbers : collection of float
+        Of the obstacles that are there.
+    """
+    gone = [one for one in record if one.status not in schema.NOT_AVOIDED]
+    if len(gone) >= _FEW and not any(one.obstacle_no in numbers for one in gone):
+        _warn(
+            f"All {len(gone)} obstacles that were driven around are gone from the layer: they "
+            "count as taken away, and tracks run where they stood."
+        )
+
+
+def tell_all_reshaped(
+    before: Sequence[WrittenRow],
+    now: NDArray[np.object_],
+    was: NDArray[np.object_],
+    reshaped: NDArray[np.bool_],
+) -> None:
+    """Tell where all obstacles have other shapes than were written.
+
+    Parameters
+    ----------
+    before : sequence of WrittenRow
+    now, was : object array
+        The shape of each, and that which was written.
+    reshaped : bool array
+        Whether these differ.
+    """
+    if len(before) <= _FEW or not reshaped.all():
+        return
+    far_m = float(shapely.hausdorff_distance(now, was).max())
+    found = sum(one.status in ("detected", "possible") and not one.kept for one in before)
+    confirmed = f"; {counted(found, 'that was', 'that were')} found became `confirmed`" * bool(
+        found
+    )
+    _warn(
+        f"All {len(before)} obstacles have other shapes than were written, by up to {far_m:.2g} m, "
+        f"as where a whole layer is simplified, snapped or shifted: they count as yours{confirmed}."
+    )
+
+
+def _warn(words: str) -> None:
+    warnings.warn(f"{words} {_NOT_MEANT}", FormatWarning, stacklevel=5)
