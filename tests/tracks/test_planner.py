@@ -740,3 +740,31 @@ def test_fields_as_tables_of_other_programs_have_them():
     table: Any = gpd.GeoDataFrame(geometry=[shape], crs=CRS)
     with pytest.raises(TrackError, match="a shapely polygon, not GeoDataFrame"):
         plan_tracks(table, spacing_m=10)
+
+
+@pytest.mark.parametrize("clearance_m", [1e30, 1001.0])
+def test_a_clearance_beyond_everything_is_told_as_that(clearance_m: float) -> None:
+    """It was told of too narrow a spacing."""
+    with pytest.raises(TrackError, match=r"A clearance of \S+ m is above 1000 m"):
+        plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=4.0, clearance_m=clearance_m)
+
+
+def test_an_obstacle_larger_than_the_field_leaves_nothing() -> None:
+    tree = gpd.GeoDataFrame({"radius_m": [1e12]}, geometry=[shapely.Point(X, Y)], crs=CRS)
+    with pytest.warns(TrackWarning, match="covers the field"):
+        tracks = plan_tracks(box(0, 0, 100, 60), tree, crs=CRS, spacing_m=4.0)
+    assert len(tracks.segments) == 0
+
+
+@pytest.mark.parametrize(("name", "value"), [("radius_m", -1.0), ("buffer_m", np.inf)])
+def test_a_point_of_no_possible_size_is_refused_as_a_polygon_is(name: str, value: float) -> None:
+    """A margin of -1 m made the tree smaller, an endless one covered all."""
+    sizes = {"radius_m": [3.0], "buffer_m": [1.0], name: [value]}
+    tree = gpd.GeoDataFrame(sizes, geometry=[shapely.Point(X + 50, Y + 30)], crs=CRS)
+    with pytest.raises(ObstacleError, match="negative or infinite"):
+        plan_tracks(box(0, 0, 100, 60), tree, crs=CRS, spacing_m=4.0)
+
+
+def test_a_machine_wider_than_the_field_is_told_by_its_width() -> None:
+    with pytest.warns(TrackWarning, match="The machine's width of 500 m leaves no track"):
+        plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=4.0, width_m=500.0)

@@ -152,6 +152,18 @@ def test_skip_orders() -> None:
     assert track_order(np.arange(1, 8), 2) == [1, 4, 7, 5, 2, 3, 6]
 
 
+def test_a_whole_number_of_tracks_may_be_written_with_a_point() -> None:
+    """It ended in a traceback of Python."""
+    tracks = plan_tracks(shapely.box(0, 0, 60, 60), crs=32633, spacing_m=6.0, direction=90)
+    with pytest.warns(TrackWarning, match="cannot be left out at a turn"):
+        far = plan_route(tracks, pattern="skip", skip=1e30)  # type: ignore[arg-type]
+    one, other = (plan_route(tracks, pattern="skip", skip=each) for each in (2, 2.0))  # type: ignore[arg-type]
+    assert one.route is not None
+    assert other.route is not None
+    assert one.route.equals(other.route)
+    assert far.route is not None
+
+
 def test_start_chooses_the_corner() -> None:
     plain = shapely.box(500000, 5600000, 500300, 5600200)
     tracks = plan_tracks(plain, crs=CRS, spacing_m=6.0)

@@ -198,6 +198,25 @@ def numbered(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> gpd.GeoDat
     return table.assign(**{column: pd.array(numbers.astype("int64"), dtype="Int64")})
 
 
+def sizes_of(obstacles: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray]:
+    """Radii, NaN where there is none, and safety margins of obstacles, metres.
+
+    Raises
+    ------
+    ObstacleError
+        When one is negative or infinite.
+    """
+    radius = floats(obstacles, "radius_m")
+    margin = floats(obstacles, "buffer_m")
+    margin = np.where(np.isnan(margin), 0.0, margin)
+    if np.any(np.isinf(radius) | (radius < 0) | ~np.isfinite(margin) | (margin < 0)):
+        raise ObstacleError(
+            "An obstacle's radius_m or buffer_m is negative or infinite.",
+            hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
+        )
+    return radius, margin
+
+
 def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     """The shapes to avoid: the :func:`active` rows, circles as true circles.
 
@@ -214,14 +233,7 @@ def shapes_of(obstacles: gpd.GeoDataFrame) -> ObstacleShapes:
     present = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
     frame, geometry = frame[present], geometry[present]
     numbers = frame["obstacle_no"].to_numpy(dtype=np.int64)
-    radius = floats(frame, "radius_m")
-    margin = np.nan_to_num(floats(frame, "buffer_m"), nan=0.0)
-    if np.any(np.isinf(radius) | (radius < 0) | ~np.isfinite(margin) | (margin < 0)):
-        raise ObstacleError(
-            "An obstacle's radius_m or buffer_m is negative or infinite.",
-            hint="Correct the row, or leave radius_m empty to use the polygon as drawn.",
-        )
-    total = radius + margin
+    total = np.add(*sizes_of(frame))
     sized = np.isfinite(total)
     total[sized] *= ground_scale_of(geometry[sized], CRS(obstacles.crs))
     is_circle = still_round(geometry, total)

@@ -13,15 +13,15 @@ from pyproj import CRS
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale, ground_scale_of
-from geofield.errors import CRSMismatchError, TrackError, TrackWarning
+from geofield.errors import FARTHEST_M, CRSMismatchError, TrackError, TrackWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model.obstacles import (
     QUARTER_SEGMENTS,
     ObstacleShapes,
     active,
-    floats,
     numbered,
     shapes_of,
+    sizes_of,
 )
 from geofield.tracks.outline import in_degrees
 from geofield.wording import counted
@@ -50,10 +50,13 @@ def obstacle_shapes(
     CRSMismatchError
         When shapes without a CRS cannot be in the field's, or latitude and longitude are swapped.
     TrackError
-        When a point or line has no width, or a geometry is not finite.
+        When a point or line has no width, a geometry is not finite, or the clearance is larger than
+        anything reaches.
     ObstacleError
         When a radius or margin is negative or infinite.
     """
+    if clearance_m > FARTHEST_M:
+        raise TrackError(f"A clearance of {clearance_m:g} m is above {FARTHEST_M:g} m.")
     if obstacles is None:
         none = np.empty(0, np.int64)
         return ObstacleShapes(np.empty((0, 3)), none, np.empty(0, dtype=object), none)
@@ -133,8 +136,9 @@ def _with_thin(
     """Add points as circles and lines as strips, or say that they have no width."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     number = frame["obstacle_no"].to_numpy(dtype=np.int64)
-    own = np.nan_to_num(floats(frame, "radius_m")) + np.nan_to_num(floats(frame, "buffer_m"))
-    width = (own + clearance_m) * ground_scale_of(geometry, CRS(frame.crs))
+    radius, margin = sizes_of(frame)
+    width = np.nan_to_num(radius) + margin + clearance_m
+    width *= ground_scale_of(geometry, CRS(frame.crs))
     bare = np.flatnonzero((point | line) & ~(width > 0.0))
     if len(bare):
         raise TrackError(

@@ -40,6 +40,14 @@ class Strips:
         return (self.spacing_m if self.width_m is None else self.width_m) / 2.0
 
     @property
+    def wide_words(self) -> str:
+        """Machine or spacing, whichever is the wider, in words."""
+        wide_m = 2.0 * self.half_m
+        if wide_m > self.spacing_m:
+            return f"The machine's width of {wide_m:g} m"
+        return f"The spacing of {self.spacing_m:g} m"
+
+    @property
     def overlap_m(self) -> float:
         """Of neighbouring passes; below 0 a gap between them."""
         return 2.0 * self.half_m - self.spacing_m

@@ -118,7 +118,7 @@ def plan_tracks(
     min_segment_m : float
         Shorter segments are not driven; they count as part of the gap.
     clearance_m : float
-        Grows every obstacle.
+        Grows every obstacle; up to 1000.
     step_m : float
         Between track points.
     straight_tolerance_m : float
@@ -290,7 +290,8 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, s
     Lines a spacing apart meet a curve 2 L / (pi spacing) times on average over all directions
     (Crofton); a piece of the field has two ends, and an obstacle cuts one piece into two.
     """
-    length = outline.length + 2.0 * np.pi * shapes.circles[:, 2].sum()
+    # What is larger than the field cuts no more of it than all.
+    length = outline.length + np.minimum(2.0 * np.pi * shapes.circles[:, 2], outline.length).sum()
     length += shapely.length(shapes.polygons).sum()
     count = float(length / (np.pi * spacing))
     if count > MOST_PIECES:
@@ -328,8 +329,8 @@ def _positions(
     positions = strips.across(edges, first)
     if not len(positions):
         note = (
-            f"The spacing of {spacing_m:g} m leaves no track in a field {far - near:.2f} m wide "
-            "across the tracks; one was laid through its middle."
+            f"{strips.wide_words} leaves no track in a field {far - near:.2f} m wide across the "
+            "tracks; one was laid through its middle."
         )
         warnings.warn(note, TrackWarning, stacklevel=3)
         return np.array([(near + far) / 2.0]), spacing_m, (note,)

@@ -24,7 +24,7 @@ def track_order(tracks: IntArray, skip: int) -> list[int]:
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
     order: list[int] = []
-    for begin in range(skip + 1):
+    for begin in range(min(skip + 1, len(tracks))):
         chosen = tracks[begin :: skip + 1].tolist()
         order.extend(chosen if begin % 2 == 0 else chosen[::-1])
     return order

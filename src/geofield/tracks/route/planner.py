@@ -102,7 +102,7 @@ def plan_route(
     ends, legs = _ends(lines) / scale, _legs(lines)
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
     passage = Passage(outline, shapes, margin_m=margin_m)
-    rows, backward = nearest_start(ends, track_no, skip if pattern == "skip" else 0, place)
+    rows, backward = nearest_start(ends, track_no, int(skip) if pattern == "skip" else 0, place)
     if pattern == "shortest":
         rows, backward = shortest_order(
             ends, rows, backward, passage, radius_m=turning_radius_m, start=place
