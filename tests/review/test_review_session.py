@@ -377,6 +377,24 @@ def test_a_picture_of_another_place_is_told_and_not_shown(plan_path: Path, tmp_p
     assert shapely.box(left, bottom, right, top).contains(read_plan(plan_path).field.polygon)
 
 
+def test_a_picture_without_data_is_told(plan_path: Path) -> None:
+    """All lay on blank ground, without a word."""
+    scene = plan_path.with_name("scene.tif")
+    with rasterio.open(scene) as here:
+        profile = {**here.profile, "driver": "GTiff", "nodata": 0}
+        blank = np.zeros_like(here.read())
+    scene.unlink()
+    with rasterio.open(scene, "w", **profile) as there:
+        there.write(blank)
+    desk = Desk(plan_path)
+    assert desk.opening()["brought_back"] == "The picture scene.tif holds no data at this field."
+    exported = desk.export("html")
+    assert any("scene.tif holds no data" in note for note in exported["notes"])
+    assert "data:image/" not in (plan_path.parent / exported["files"][0]).read_text()
+    told = run_geofield("export", plan_path, "-f", "html", "--out", plan_path.parent / "e").stderr
+    assert "The picture scene.tif holds no data" in told
+
+
 def test_another_outline_is_chosen(doubtful_path: Path) -> None:
     desk = Desk(doubtful_path)
     outlines = desk.session.plan.field.alternatives

@@ -92,6 +92,15 @@ class TiledPicture:
         """Whether the picture has a near infrared band."""
         return "nir" in self.reader.roles.roles
 
+    def has_data(self, bounds: Bounds) -> bool:
+        """Whether the picture shows anything at a place of the tiles' CRS."""
+        left, bottom, right, top = bounds
+        window = self._window((left, top), max(right - left, top - bottom))
+        if window is None:
+            return False
+        shape = (min(window[3], TILE_PX), min(window[2], TILE_PX))
+        return bool(self.reader.read(window, shape_px=shape).valid.any())
+
     def tile(self, level: int, column: int, row: int, show: Show) -> tuple[bytes, str]:
         """One tile as an image file, and its media type; an error where there is none."""
         if not 0 <= level < len(self.resolutions_m):

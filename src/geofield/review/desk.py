@@ -77,7 +77,7 @@ class Desk:
         self.lost = False
 
     def _opened(self, plan: Plan) -> tuple[TiledPicture | None, str | None]:
-        """The picture, or why there is none of a plan that was made from one."""
+        """The picture, and why it shows nothing or there is none."""
         path = self._picture_path
         if path is None:
             lost = "The picture of this plan is not beside it; --picture shows one."
@@ -94,6 +94,8 @@ class Desk:
                 None,
                 f"The picture is not shown: {path.name} is of another place than this field.",
             )
+        if not picture.has_data(plan.field.polygon.bounds):
+            return picture, f"The picture {path.name} holds no data at this field."
         return picture, None
 
     def _read_plan(self) -> tuple[str, Plan]:

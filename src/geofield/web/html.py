@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.crs import ground_scale_of
-from geofield.errors import FormatError
+from geofield.errors import FormatError, ImageryWarning
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import frame_lines
 from geofield.model.scene import Scene
@@ -162,6 +163,11 @@ def _picture(
         data, kind, bounds = shown_scene(scene, dataset.crs, LONG_SIDE_PX)
     elif dataset.scene_path is not None and dataset.scene_path.exists():
         picture = TiledPicture.open(dataset.scene_path, dataset.crs)
+        if not picture.has_data(tuple(dataset.table(schema.FIELD.name).total_bounds)):
+            name = dataset.scene_path.name
+            words = f"The picture {name} holds no data at {dataset.name}: the page shows none."
+            warnings.warn(words, ImageryWarning, stacklevel=3)
+            return None, None
         data, kind, bounds = shown_scene(picture.reduced(LONG_SIDE_PX), dataset.crs, LONG_SIDE_PX)
     else:
         return None, None

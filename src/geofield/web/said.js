@@ -70,6 +70,8 @@ export const SAID = {
     [/^The plan was changed since an earlier session .*: (\d+) of its (\d+) edits? (?:was|were) made again\. Make these by hand: (.*)\. All are kept in (.*)\.$/, "Der Plan wurde geändert, seit eine Sitzung ohne Speichern endete: $1 ihrer $2 Änderungen sind wieder da. Diese machen Sie bitte von Hand: $3. Alle liegen in $4."],
     [/^The plan was changed since an earlier session .*: (\d+) of its (\d+) edits? (?:was|were) made again\.$/, "Der Plan wurde geändert, seit eine Sitzung ohne Speichern endete: $1 ihrer $2 Änderungen sind wieder da."],
     [/^The picture of this plan is not beside it; --picture shows one\.$/, "Das Bild dieses Plans liegt nicht daneben; --picture zeigt eines."],
+    [/^The picture is not shown: (.*) is of another place than this field\.$/, "Das Bild ist nicht zu sehen: $1 zeigt einen anderen Ort als dieses Feld."],
+    [/^The picture (.*) holds no data at this field\.$/, "Das Bild $1 enthält an diesem Feld keine Daten."],
     [/^The outline lies outside the picture\.$/, "Der Umriss liegt außerhalb des Bildes."],
     [/^The plan was changed since another review of it.*: (\d+) of its (\d+) edits? (?:was|were) made again\. Make these by hand: (.*)\. All are kept in (.*)\.$/, "Der Plan wurde geändert, seit eine andere Sitzung, die noch offen ist, ihre Änderungen notierte: $1 ihrer $2 sind hier wieder gemacht. Diese machen Sie bitte von Hand: $3. Alle liegen in $4."],
     [/^The plan was changed since another review of it.*: (\d+) of its (\d+) edits? (?:was|were) made again\.$/, "Der Plan wurde geändert, seit eine andere Sitzung, die noch offen ist, ihre Änderungen notierte: $1 ihrer $2 sind hier wieder gemacht."],
