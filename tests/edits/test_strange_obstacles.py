@@ -70,3 +70,22 @@ def test_a_circle_of_nearly_no_size_may_be_drawn(folder: Path) -> None:
     geofield("tracks", file, "-o", file)
     geofield("tracks", file, "-o", file)
     assert len(rows(plan_in(folder))) == len(before) + 1
+
+
+def test_a_radius_of_nothing_is_none(folder: Path) -> None:
+    """Of a pond it made a circle as large as the margin, which was driven through at its sides."""
+    file = folder / "out/field.gpkg"
+
+    def pond(table: Frame) -> Frame:
+        table.loc[at(table, 2), "geometry"] = table.geometry[at(table, 2)].envelope.buffer(3)
+        return table
+
+    rewritten(file, "obstacles", pond)
+    geofield("tracks", file, "-o", file)
+    before = rows(plan_in(folder))
+    # As programs write it that know no empty number.
+    rewritten(file, "obstacles", lambda table: table.assign(radius_m=table["radius_m"].fillna(0)))
+    assert "obstacles" not in geofield("tracks", file, "-o", file)
+    after = rows(plan_in(folder))
+    assert after.geometry[2].equals_exact(before.geometry[2], 1e-6)
+    assert after["radius_m"].equals(before["radius_m"])

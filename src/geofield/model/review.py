@@ -180,6 +180,9 @@ def _with_shapes(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     names = [each.name for each in schema.OBSTACLES.columns if each.type in ("int", "float")]
     if not all(name in kinds and kinds[name].kind in "if" for name in names):
         table = schema.conform(schema.OBSTACLES, table, extras=True)
+    # Programs that know no empty number write 0: a pond would be a circle of its margin.
+    unsized = table["radius_m"] == 0
+    table = table.assign(radius_m=table["radius_m"].mask(unsized)) if unsized.any() else table
     return widened(possible_numbers(table))
 
 
