@@ -660,6 +660,14 @@ def _exported(folder: Path) -> str:
     return geofield("export", folder / "farm", "-f", "geojson", "--out", folder / "out")
 
 
+def test_a_field_of_which_all_obstacles_were_deleted_is_told_by_its_name(folder: Path) -> None:
+    _edit(folder, "obstacles", lambda table: table[table["field_id"] != "b"])
+    told = _batch(folder)
+    assert "Field b, as edited: All 2 obstacles that were driven around are gone" in told
+    assert "Field a, as" not in told
+    assert len(gf.read_farm(folder / "farm").obstacles) == 6
+
+
 def _third(status: str) -> Callable[[Any], Any]:
     """With a status for obstacle 3, which stands in field b."""
     return lambda table: table.assign(

@@ -235,6 +235,7 @@ def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
     Before a run all edits; after it `only` those of fields that had no plan before.
     """
     from geofield.farm.edited_in_place import edited_in_place
+    from geofield.farm.edited_plan import said_of
     from geofield.farm.edits import put_edits
     from geofield.farm.overview import OVERVIEW
     from geofield.farm.put_back import take_in_place
@@ -243,7 +244,8 @@ def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
     if store.folder is None:
         return []
     for one in list(edited_in_place(store)) if only is None else ():
-        take_in_place(store, one)
+        with said_of(one):
+            take_in_place(store, one)
         say(f"Field      {one} as edited in {file_of(one)}: kept, its tracks planned again")
     overview = store.folder / OVERVIEW
     edited, waiting = put_edits(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.errors import FormatError, GeofieldError
+from geofield.errors import FormatError, GeofieldError, listening
 from geofield.farm import edited_tracks
 from geofield.farm.as_written import own_names, text_of
 from geofield.farm.layers import EPSG, FIELD_ID
@@ -112,10 +113,20 @@ def planned(plan: Plan) -> Plan:
 
 
 @contextmanager
+def said_of(field_id: str) -> Iterator[None]:
+    """Tell of which field it is what a block tells."""
+    with listening() as heard:
+        yield
+    for each in heard:
+        warnings.warn(f"Field {field_id}, as edited: {each.message}", each.category, stacklevel=4)
+
+
+@contextmanager
 def _of_field(field_id: str) -> Iterator[None]:
     """Say whose edit it is that was refused."""
     try:
-        yield
+        with said_of(field_id):
+            yield
     except GeofieldError as error:
         raise FormatError(
             f"Field {field_id}, as edited: {error.message}", hint=error.hint

@@ -127,7 +127,7 @@ def reconcile(
     former = [] if written is None else list(written.removed)
     if written is not None:
         left = set(result["obstacle_no"].tolist())
-        tell_none_left(written.rows, left)
+        tell_none_left(written.rows, result)
         elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
     gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
     former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]

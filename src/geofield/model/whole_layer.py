@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -11,28 +12,33 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.errors import FormatWarning
-from geofield.model.written import WrittenRow
+from geofield.model.written import WrittenRow, matches, shapes_of_plain
 from geofield.wording import counted
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 #: One or two are taken away or drawn anew by hand.
 _FEW = 2
 _NOT_MEANT = (
-    "If that was not meant, go on from a copy of the file, or have them searched anew: "
-    "geofield run --fresh."
+    "If that was not meant, go on from the file as it was before; geofield run --fresh searches "
+    "them anew."
 )
 
 
-def tell_none_left(record: Collection[WrittenRow], numbers: Collection[float]) -> None:
+def tell_none_left(record: Collection[WrittenRow], left: gpd.GeoDataFrame) -> None:
     """Tell where none is left of the obstacles that were written and driven around.
 
     Parameters
     ----------
     record : collection of WrittenRow
-    numbers : collection of float
-        Of the obstacles that are there.
+    left : GeoDataFrame
+        The obstacles that are there.
     """
     gone = [one for one in record if one.status not in schema.NOT_AVOIDED]
-    if len(gone) >= _FEW and not any(one.obstacle_no in numbers for one in gone):
+    if len(gone) < _FEW or left["obstacle_no"].isin([one.obstacle_no for one in gone]).any():
+        return
+    if (matches(shapes_of_plain([one.shape for one in gone]), left.geometry) < 0).all():
         _warn(
             f"All {len(gone)} obstacles that were driven around are gone from the layer: they "
             "count as taken away, and tracks run where they stood."
