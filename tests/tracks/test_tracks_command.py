@@ -29,6 +29,7 @@ from geofield.plan import read_plan
 from geofield.plan_files import save_plan
 from geofield.tracks import plan_tracks
 from geofield.tracks.fewest import candidate_angles
+from geofield_command import run_geofield
 
 CRS = 32633
 SAMPLE = Path(__file__).parents[2] / "sample_data"
@@ -300,6 +301,26 @@ def test_a_plan_that_lost_its_record_is_told(tmp_path: Path) -> None:
         )
         assert done.exception is None, done.output
         assert ("has lost the record" in " ".join(done.output.split())) == lost
+
+
+def test_tracks_that_were_imported_are_told_to_be_planned_anew(tmp_path: Path) -> None:
+    """One that was taken away came back, at another spacing, without a word."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    plan, back = tmp_path / "plan.gpkg", tmp_path / "back.gpkg"
+    run(tmp_path / "parcel.gpkg", "--spacing", "5", "-o", plan)
+    told = []
+    for arguments in (
+        ["export", plan, "-f", "kml", "--out", tmp_path],
+        ["import", tmp_path / "field.kml", "-o", back],
+        ["tracks", back, "-o", back],
+        ["tracks", back, "-o", back],
+    ):
+        done = run_geofield(*arguments)
+        assert done.returncode == 0, done.stderr
+        told.append(" ".join(done.stderr.split()))
+    words = "back.gpkg has no record of how its tracks were planned (they were imported, perhaps)"
+    assert [words in each for each in told] == [False, False, True, False]
+    assert "the spacing is 2 m now" in told[2]
 
 
 def test_a_blank_name_is_none(tmp_path: Path) -> None:

@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from geofield.settings import Settings
 
 
+#: Settings that say how far tracks are apart.
+_SPACED = ("spacing_m", "width_m", "machine")
+
+
 @click.command(
     cls=GroupedCommand,
     epilog="""\b
@@ -147,37 +151,48 @@ def tracks(
         )
 
 
+def _has_rows(file: Path, layer: str) -> bool:
+    import pyogrio
+
+    return bool(pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"])
+
+
 def _own_plan(file: Path, settings: Settings) -> Plan | None:
     """The plan in a GeoPackage of geofield; None for any other file of polygons."""
     import pyogrio
 
     from geofield import schema
     from geofield.formats.foreign import layer_names
-    from geofield.formats.gpkg_read import is_own
+    from geofield.formats.gpkg_read import record_of
     from geofield.plan import read_plan
     from geofield.strangers import is_geopackage
 
     if not is_geopackage(file):
         return None
-    own, layers, layer = is_own(file), layer_names(file), schema.FIELD.name
+    record, layers, layer = record_of(file), layer_names(file), schema.FIELD.name
     if layer in layers:
         ids = pyogrio.read_dataframe(file, layer=layer, columns=["field_id"], read_geometry=False)
         # An outline cut into rows, or deleted, is a plan's that says what to do.
-        if len(ids) != 1 and not (own and len(ids.drop_duplicates()) < 2):
+        if len(ids) != 1 and not (record and len(ids.drop_duplicates()) < 2):
             return None
-    elif not own:
+    elif record is None:
         return None
     plan = read_plan(file)
-    if schema.TRACKS.name in layers and not own:
+    planned = record is not None and "tracks" in record.provenance.evidence
+    if schema.TRACKS.name in layers and not planned and _has_rows(file, schema.TRACKS.name):
         said = settings.tracks.model_fields_set
-        spacing = (
+        lost = (
+            "has no record of how its tracks were planned (they were imported, perhaps)"
+            if record is not None
+            else "has lost the record of what was written (as copies made by other programs do)"
+        )
+        spacing = plan.settings is None and (
             f" Its settings are lost, too: the spacing is {settings.tracks.spacing_m:g} m now, "
             "where --spacing says no other."
         )
         say_note(
-            f"{file.name} has lost the record of what was written (as copies made by other "
-            "programs do): its tracks are planned anew, whatever was changed of them."
-            f"{spacing if said.isdisjoint(('spacing_m', 'width_m', 'machine')) else ''}"
+            f"{file.name} {lost}: its tracks are planned anew, whatever was changed of them."
+            f"{spacing if spacing and said.isdisjoint(_SPACED) else ''}"
         )
     return plan
 
