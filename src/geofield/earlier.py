@@ -73,6 +73,27 @@ def still_said(plan: Plan, settings: Settings) -> tuple[str, ...]:
     return tuple(name for name in names if name in then and then[name] == now[name])
 
 
+def no_longer_said(settings: Settings, previous: Plan | None) -> str | None:
+    """Settings of an earlier plan's tracks that give way, for nothing says them now, in words."""
+    if previous is None or previous.settings is None:
+        return None
+    then, now = previous.settings.tracks, with_said_tracks(settings, previous)[0].tracks
+    # Some follow from others that are said, as the spacing from the width.
+    names = [
+        name
+        for name, usual in TrackSettings()
+        if name not in now.model_fields_set
+        and getattr(now, name) == usual
+        and getattr(then, name) not in (usual, None)
+    ]
+    if not names:
+        return None
+    return (
+        f"No longer as in the earlier plan: {', '.join(_said(then, name) for name in names)}. The "
+        "defaults hold where nothing is said; `geofield tracks` keeps a plan's settings."
+    )
+
+
 def _said(tracks: TrackSettings, name: str) -> str:
     """A setting as an option of the command line."""
     value = getattr(tracks, name)

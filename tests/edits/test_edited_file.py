@@ -201,6 +201,20 @@ def test_a_stage_goes_on_with_the_settings_of_the_plan(folder: Path) -> None:
     assert set(rows(plan_in(folder))["buffer_m"]) == {2.5}
 
 
+def test_a_run_tells_which_settings_of_the_plan_give_way(
+    folder: Path, made: SimulatedField
+) -> None:
+    """A direction said for the tracks alone was gone with the next run, without a word."""
+    file = folder / "out/field.gpkg"
+    geofield("tracks", file, "--direction", 30, "-o", file)
+    told = run(folder, made, "--overwrite")
+    assert "No longer as in the earlier plan: --direction 30. The defaults hold" in told
+    assert "No longer" not in run(folder, made, "--overwrite")
+    # Spacing and headland follow from what is said here.
+    told = run(folder, made, "--width", 8, "--headland-passes", 2, "--overwrite")
+    assert "No longer" not in told
+
+
 def test_the_stages_behind_an_outline_go_on_with_the_settings_of_the_plan(
     folder: Path, made: SimulatedField
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, progress_bar, say
+from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import FOLDER, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import (
@@ -92,7 +92,7 @@ def run(
     Shapefiles, RDF, a map picture and report.json.
     """
     from geofield.cli.imagery_tools import imagery_of, say_wider
-    from geofield.earlier import known_outline, with_said_tracks
+    from geofield.earlier import known_outline, no_longer_said, with_said_tracks
     from geofield.formats import format_named
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
@@ -111,6 +111,9 @@ def run(
     earlier = out / "field.gpkg"
     previous = read_plan(earlier) if earlier.is_file() and not fresh else None
     tell_idle(with_said_tracks(settings, previous)[0], parcel=parcel is not None)
+    gone = no_longer_said(settings, previous)
+    if gone is not None:
+        say_note(gone)
     timings: dict[str, float] = {}
     seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
     source = imagery_of(imagery, seen, (lon, lat), acknowledged=acknowledge_terms)
