@@ -329,16 +329,3 @@ def test_help_ends_with_examples(capsys: pytest.CaptureFixture[str]) -> None:
     for command in (["tiles"], ["sources"], ["cache"], ["cache", "info"], ["cache", "clear"]):
         assert run(*command, "--help") == 0
         assert "geofield " + command[0] in capsys.readouterr().out.partition("Example")[2]
-
-
-def test_units_of_a_picture_are_looked_up_without_a_complaint(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Of kilometres PROJ said "Cannot find proj.db", though all was right."""
-    crs = "+proj=utm +zone=36 +datum=WGS84 +units=km"
-    place = rasterio.Affine(0.0005, 0, 548.3, 0, -0.0005, 3881.6)
-    path = write(tmp_path / "kilometres.tif", ground(), crs=crs, transform=place)
-    assert run("info", path) == 0
-    told = capfd.readouterr()
-    assert "metres per pixel on the ground: 0.5" in told.out
-    assert not told.err

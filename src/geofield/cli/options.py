@@ -88,7 +88,7 @@ class Number(click.FloatRange):
         return number
 
 
-class NearestChoice(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
+class NearestChoice(click.Choice[str]):
     """A choice whose refusal names the nearest one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

@@ -18,7 +18,6 @@ from geofield import __version__
 from geofield.crs import parse_crs
 from geofield.errors import CRSError, ImageryError
 from geofield.imagery.damage import made_up
-from geofield.imagery.proj_data import find_proj_data
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.vrt import check_beside, check_vrt
 
@@ -42,8 +41,6 @@ _DRIVERS = [
     *("GTiff", "JPEG", "PNG", "JP2OpenJPEG", "WEBP", "HFA", "GPKG", "MBTiles", "BMP", "GIF"),
     *("ENVI", "EHdr", "AAIGrid"),
 ]
-
-find_proj_data()
 
 _REMOTE = re.compile(r"^(https?://|/vsicurl/|/vsis3/|s3://|gs://)", re.IGNORECASE)
 
