@@ -315,3 +315,20 @@ def test_a_picture_that_cannot_be_read_is_named_with_what_to_do(dataset, tmp_pat
     with pytest.raises(FormatError, match=r"The picture .*scene\.tif of the plan cannot") as told:
         write_dataset(dataclasses.replace(dataset, scene_path=picture), tmp_path, ["gpkg"])
     assert told.value.hint.startswith("Put a whole one there")
+
+
+@pytest.mark.parametrize(
+    ("damaged", "what"),
+    [("{}", "'version' is missing"), ('{"version": 1', "Expecting"), ("[]", "list indices")],
+)
+def test_a_damaged_note_of_what_was_written_is_told_with_what_to_do(
+    dataset, tmp_path, damaged, what
+):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    path = tmp_path / "field.gpkg"
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE gpkg_metadata SET metadata = ?", (damaged,))
+    connection.close()
+    with pytest.raises(FormatError, match=f"noted in the file is damaged: .*{what}") as told:
+        read_dataset(path)
+    assert "ogr2ogr copy.gpkg" in told.value.hint

@@ -76,7 +76,7 @@ def from_json(text: str) -> Origin:
     try:
         return from_content(json.loads(text))
     except ValueError as error:
-        raise FormatError(f"The record of the file's origin is damaged: {error!r}.") from error
+        raise _damaged(error) from error
 
 
 def from_content(content: Mapping[str, Any]) -> Origin:
@@ -109,7 +109,16 @@ def from_content(content: Mapping[str, Any]) -> Origin:
             ),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise FormatError(f"The record of the file's origin is damaged: {error!r}.") from error
+        raise _damaged(error) from error
+
+
+def _damaged(error: Exception) -> FormatError:
+    what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    return FormatError(
+        f"What geofield noted in the file is damaged: {what}.",
+        hint="Go on from the file as it was before. A copy without that note (ogr2ogr copy.gpkg "
+        "FILE) is read as one of another program.",
+    )
 
 
 def restored(dataset: Dataset, record: Origin | None) -> Dataset:
