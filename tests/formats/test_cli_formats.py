@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import shutil
 import zipfile
 from dataclasses import replace
 
 import pytest
+import rasterio
 from click.testing import CliRunner
 from formats_plan import NAME, make_dataset
+from rasterio.transform import from_origin
 
 from geofield.cli.export import export
 from geofield.cli.formats import formats
@@ -72,8 +73,14 @@ def test_export_options_reach_the_writer(plan_file, tmp_path):
 
 
 def test_a_project_shows_the_picture_where_it_lies_beside_it_alone(sample, tmp_path):
-    picture = shutil.copy(sample / "field_1.tif", tmp_path / "scene.tif")
-    write_dataset(replace(make_dataset(), scene_path=picture), tmp_path, ["gpkg"])
+    dataset, picture = make_dataset(), tmp_path / "scene.tif"
+    with rasterio.open(sample / "field_1.tif") as file:
+        west, _, _, north = dataset.tables["field"].to_crs(file.crs).total_bounds
+        place = from_origin(west, north, *file.res)
+        profile = {**file.profile, "transform": place, "driver": "GTiff"}
+        with rasterio.open(picture, "w", **profile) as there:
+            there.write(file.read())
+    write_dataset(replace(dataset, scene_path=picture), tmp_path, ["gpkg"])
     run(export, tmp_path / "field.gpkg", "-f", "gpkg,html", "--out", tmp_path / "out")
     run(export, tmp_path / "field.gpkg", "-f", "gpkg,scene", "--out", tmp_path / "whole")
     for place in ("", "/.."):

@@ -55,6 +55,19 @@ def between_two_steps(folder: Path) -> bool:
     return False
 
 
+def reads(plan: Path) -> bool:
+    """Whether somebody reads a plan just now, which others wait for before they write."""
+    if not plan.is_file():
+        return False
+    with closing(sqlite3.connect(plan, timeout=0, isolation_level=None)) as file:
+        try:
+            file.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError:
+            return True
+        file.execute("ROLLBACK")
+    return False
+
+
 @contextmanager
 def asleep(folder: Path, *words: object) -> Iterator[Asleep]:
     """A command that has begun to work on a folder and sleeps until the block is over."""
@@ -67,7 +80,7 @@ def asleep(folder: Path, *words: object) -> Iterator[Asleep]:
                 assert time.monotonic() < until
                 time.sleep(0.005)
             process.send_signal(signal.SIGSTOP)
-            while between_two_steps(folder):
+            while between_two_steps(folder) or reads(folder / "field.gpkg"):
                 process.send_signal(signal.SIGCONT)
                 time.sleep(0.005)
                 process.send_signal(signal.SIGSTOP)
