@@ -224,7 +224,7 @@ def whole(plan: Path) -> None:
     """A GeoPackage that opens, and whose tracks are of one planning."""
     found = read_plan(plan)
     assert found.tracks is not None
-    with sqlite3.connect(plan) as file:
+    with closing(sqlite3.connect(plan)) as file, file:
         assert file.execute("PRAGMA integrity_check").fetchone() == ("ok",)
 
 

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,8 @@ def _edit(folder: Path, layer: str, change: Callable[[Any], Any]) -> None:
     """Change a layer of the overview in place, as a program that knows nothing of geofield does."""
     path = folder / "farm" / "farm.gpkg"
     table = change(pyogrio.read_dataframe(path, layer=layer))
-    columns = {row[1] for row in sqlite3.connect(path).execute(f"PRAGMA table_info({layer})")}
+    with closing(sqlite3.connect(path)) as file:
+        columns = {row[1] for row in file.execute(f"PRAGMA table_info({layer})")}
     assert set(table.columns) - {"geometry"} <= columns
     pyogrio.write_dataframe(table, path, layer=layer, geometry_name="geom")
 

@@ -6,6 +6,7 @@ import json
 import sqlite3
 import subprocess
 import warnings
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -170,7 +171,7 @@ def test_a_chunk_without_status_does_not_count(plans: list[gf.Plan], tmp_path: P
 def test_a_field_of_a_farm_is_written_like_any_plan(plans: list[gf.Plan], tmp_path: Path) -> None:
     Farm(plans).write(tmp_path / "farm")
     read_farm(tmp_path / "farm")["Süd 1"].write(tmp_path / "one", formats=["gpkg"])
-    with sqlite3.connect(tmp_path / "one" / "field.gpkg") as file:
+    with closing(sqlite3.connect(tmp_path / "one" / "field.gpkg")) as file, file:
         assert file.execute("SELECT farmer, plots FROM field").fetchone() == ("Mayer", 3)
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pandas as pd
@@ -121,7 +122,7 @@ def test_missing_and_empty_geometries_are_refused(dataset, tmp_path, shape):
 
 def test_rows_without_geometry_made_in_qgis_are_told(dataset, tmp_path):
     write_dataset(dataset, tmp_path, ["gpkg"])
-    with sqlite3.connect(tmp_path / "field.gpkg") as connection:
+    with closing(sqlite3.connect(tmp_path / "field.gpkg")) as connection, connection:
         # Its condition needs functions that only GDAL and QGIS bring along.
         connection.execute('DROP TRIGGER "rtree_obstacles_geom_insert"')
         connection.execute("INSERT INTO obstacles (status) VALUES ('added')")
@@ -191,7 +192,7 @@ def test_a_drawn_obstacle_is_exported_before_planning_again(dataset, tmp_path, n
 
 def test_a_renamed_field_keeps_its_new_name(dataset, tmp_path):
     write_dataset(dataset, tmp_path, ["gpkg"])
-    with sqlite3.connect(tmp_path / "field.gpkg") as connection:
+    with closing(sqlite3.connect(tmp_path / "field.gpkg")) as connection, connection:
         for (trigger,) in connection.execute(
             "SELECT name FROM sqlite_master WHERE type='trigger' AND tbl_name='field'"
         ).fetchall():
@@ -301,7 +302,7 @@ def test_a_strangers_plan_names_no_picture_elsewhere(dataset, tmp_path):
     write_dataset(dataset, tmp_path / "plan", ["gpkg"])
     path = tmp_path / "plan" / "field.gpkg"
     for place in ("../secret.tif", str(secret)):
-        with sqlite3.connect(path) as connection:
+        with closing(sqlite3.connect(path)) as connection, connection:
             (text,) = connection.execute("SELECT metadata FROM gpkg_metadata").fetchone()
             said = json.dumps(json.loads(text) | {"scene": place})
             connection.execute("UPDATE gpkg_metadata SET metadata = ?", (said,))
@@ -326,7 +327,7 @@ def test_a_damaged_note_of_what_was_written_is_told_with_what_to_do(
 ):
     write_dataset(dataset, tmp_path, ["gpkg"])
     path = tmp_path / "field.gpkg"
-    with sqlite3.connect(path) as connection:
+    with closing(sqlite3.connect(path)) as connection, connection:
         connection.execute("UPDATE gpkg_metadata SET metadata = ?", (damaged,))
     connection.close()
     with pytest.raises(FormatError, match=f"noted in the file is damaged: .*{what}") as told:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import xml.etree.ElementTree as ET
+from contextlib import closing
 
 import fiona
 import geojson_validator
@@ -65,7 +66,7 @@ def test_styles_and_projects_are_no_layers(folder):
 
 
 def test_geopackage_tables(folder):
-    with sqlite3.connect(folder / "field.gpkg") as connection:
+    with closing(sqlite3.connect(folder / "field.gpkg")) as connection, connection:
 
         def ask(text):
             return connection.execute(text).fetchall()

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 import zlib
+from contextlib import closing
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -634,7 +635,7 @@ def test_the_cache_keeps_to_its_size_and_age(tmp_path: Path) -> None:
         assert info.path.stat().st_size < 400_000
         old = replace(FAST, cache_dir=folder, cache_max_age_s=3600.0)
         acquire(source, HERE, tmp_path / "b.tif", options=old)
-        with sqlite3.connect(info.path) as db:
+        with closing(sqlite3.connect(info.path)) as db, db:
             db.execute("UPDATE fetched SET time_s = time_s - 7200")
         db.close()
         server.asked.clear()
@@ -660,7 +661,7 @@ def test_several_processes_share_one_cache(tmp_path: Path) -> None:
     info = cache_infos(tmp_path / "cache")[0]
     assert info.tiles == len(server.asked)
     assert sha(tmp_path / "0.tif") == sha(tmp_path / "2.tif")
-    with sqlite3.connect(info.path) as db:
+    with closing(sqlite3.connect(info.path)) as db, db:
         assert db.execute("PRAGMA integrity_check").fetchone() == ("ok",)
     db.close()
 

@@ -856,7 +856,7 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
     import sqlite3
 
     file = tmp_path / "other.mbtiles"
-    with sqlite3.connect(file) as db:
+    with closing(sqlite3.connect(file)) as db, db:
         db.execute("CREATE TABLE metadata (name TEXT, value TEXT)")
         db.execute(
             "CREATE TABLE tiles (zoom_level INT, tile_column INT, tile_row INT, tile_data BLOB)"
@@ -885,7 +885,7 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
     with pytest.raises(ImageryError, match="not an MBTiles file"):
         find_source(str(tmp_path / "bad.mbtiles"))
     # Damaged after it was looked at.
-    with sqlite3.connect(file) as db:
+    with closing(sqlite3.connect(file)) as db, db:
         (page,) = db.execute("SELECT rootpage FROM sqlite_master WHERE name = 'tiles'").fetchone()
         (size,) = db.execute("PRAGMA page_size").fetchone()
     db.close()
