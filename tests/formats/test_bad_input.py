@@ -126,7 +126,6 @@ def test_rows_without_geometry_made_in_qgis_are_told(dataset, tmp_path):
         # Its condition needs functions that only GDAL and QGIS bring along.
         connection.execute('DROP TRIGGER "rtree_obstacles_geom_insert"')
         connection.execute("INSERT INTO obstacles (status) VALUES ('added')")
-    connection.close()
     with pytest.warns(FormatWarning, match="1 row.*no geometry"):
         back = read_dataset(tmp_path / "field.gpkg")
     assert len(back.table("obstacles")) == 4
@@ -198,7 +197,6 @@ def test_a_renamed_field_keeps_its_new_name(dataset, tmp_path):
         ).fetchall():
             connection.execute(f'DROP TRIGGER "{trigger}"')
         connection.execute("UPDATE field SET name = 'Neuer Name'")
-    connection.close()
     assert read_dataset(tmp_path / "field.gpkg").name == "Neuer Name"
 
 
@@ -329,7 +327,6 @@ def test_a_damaged_note_of_what_was_written_is_told_with_what_to_do(
     path = tmp_path / "field.gpkg"
     with closing(sqlite3.connect(path)) as connection, connection:
         connection.execute("UPDATE gpkg_metadata SET metadata = ?", (damaged,))
-    connection.close()
     with pytest.raises(FormatError, match=f"noted in the file is damaged: .*{what}") as told:
         read_dataset(path)
     assert "ogr2ogr copy.gpkg" in told.value.hint

@@ -663,7 +663,6 @@ def test_several_processes_share_one_cache(tmp_path: Path) -> None:
     assert sha(tmp_path / "0.tif") == sha(tmp_path / "2.tif")
     with closing(sqlite3.connect(info.path)) as db, db:
         assert db.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-    db.close()
 
 
 def test_the_rate_limit_is_kept(tmp_path: Path) -> None:

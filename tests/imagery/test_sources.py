@@ -867,7 +867,6 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
                 x, y = tile.x + dx, tile.y + dy
                 body = encode(tile_pixels(16, x, y))
                 db.execute("INSERT INTO tiles VALUES (16, ?, ?, ?)", (x, 2**16 - 1 - y, body))
-    db.close()
     source = find_source(str(file))
     where = Where(lat=LAT, lon=LON, zoom="max", size_px=256)
     done = acquire(source, where, tmp_path / "a.tif")
@@ -888,7 +887,6 @@ def test_mbtiles_of_others(tmp_path: Path) -> None:
     with closing(sqlite3.connect(file)) as db, db:
         (page,) = db.execute("SELECT rootpage FROM sqlite_master WHERE name = 'tiles'").fetchone()
         (size,) = db.execute("PRAGMA page_size").fetchone()
-    db.close()
     content = bytearray(file.read_bytes())
     content[page * size - size : page * size - size + 8] = b"\xff" * 8
     file.write_bytes(content)

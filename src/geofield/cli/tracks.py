@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     from geofield.settings import Settings
 
 
-#: Settings that say how far tracks are apart.
-_SPACED = ("spacing_m", "width_m", "machine")
-
-
 @click.command(
     cls=GroupedCommand,
     epilog="""\b
@@ -151,18 +147,12 @@ def tracks(
         )
 
 
-def _has_rows(file: Path, layer: str) -> bool:
-    import pyogrio
-
-    return bool(pyogrio.read_info(file, layer=layer, force_feature_count=True)["features"])
-
-
 def _own_plan(file: Path, settings: Settings) -> Plan | None:
     """The plan in a GeoPackage of geofield; None for any other file of polygons."""
     import pyogrio
 
     from geofield import schema
-    from geofield.formats.foreign import layer_names
+    from geofield.formats.foreign import has_rows, layer_names
     from geofield.formats.gpkg_read import record_of
     from geofield.plan import read_plan
     from geofield.strangers import is_geopackage
@@ -179,20 +169,21 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
         return None
     plan = read_plan(file)
     planned = record is not None and "tracks" in record.provenance.evidence
-    if schema.TRACKS.name in layers and not planned and _has_rows(file, schema.TRACKS.name):
+    if schema.TRACKS.name in layers and not planned and has_rows(file, schema.TRACKS.name):
         said = settings.tracks.model_fields_set
         lost = (
             "has no record of how its tracks were planned (they were imported, perhaps)"
             if record is not None
             else "has lost the record of what was written (as copies made by other programs do)"
         )
-        spacing = plan.settings is None and (
+        unsaid = plan.settings is None and said.isdisjoint(("spacing_m", "width_m", "machine"))
+        spacing = (
             f" Its settings are lost, too: the spacing is {settings.tracks.spacing_m:g} m now, "
             "where --spacing says no other."
         )
         say_note(
             f"{file.name} {lost}: its tracks are planned anew, whatever was changed of them."
-            f"{spacing if spacing and said.isdisjoint(_SPACED) else ''}"
+            f"{spacing if unsaid else ''}"
         )
     return plan
 

@@ -23,7 +23,7 @@ from geofield.farm.place_reader import read_table
 from geofield.farm.store import Store
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import unwrapped
-from geofield.formats.foreign import layer_names, read_vector
+from geofield.formats.foreign import has_rows, layer_names, read_vector
 from geofield.formats.foreign_tables import (
     BUFFER_COLUMNS,
     NUMBER_COLUMNS,
@@ -148,12 +148,8 @@ def own_obstacles(places: Path) -> Path | None:
 
 def _holds_obstacles(path: Path) -> bool:
     """Whether it is a GeoPackage with a layer of obstacles in which something stands."""
-    import pyogrio
-
     layer = schema.OBSTACLES.name
-    if not is_geopackage(path) or layer not in layer_names(path):
-        return False
-    return bool(pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"])
+    return is_geopackage(path) and layer in layer_names(path) and has_rows(path, layer)
 
 
 def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:

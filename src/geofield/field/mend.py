@@ -60,8 +60,9 @@ def mended(polygon: Polygon, include: Points, exclude: Points, frame: Frame) -> 
     if near and len(include) + len(exclude) - 1 >= _DETAILS_FROM:
         rings += _bent(sides)
         at_points = forced(polygon, include, exclude)
-    limit = np.array(frame.shape[::-1], float)
-    changed = np.array([Polygon(np.clip(one, 0.0, limit)) for one in rings], object)
+    of_ring = np.repeat(np.arange(len(rings)), [len(one) for one in rings])
+    within = np.clip(np.concatenate(rings), 0.0, np.array(frame.shape[::-1], float))
+    changed = np.asarray(shapely.polygons(shapely.linearrings(within, indices=of_ring)))
     changed = frame.within(changed[shapely.is_valid(changed)])
     return [*changed[obeys(changed, include, exclude)], *at_points]
 

@@ -146,6 +146,13 @@ def layer_names(path: Path) -> list[str]:
         raise unreadable(path, error) from error
 
 
+def has_rows(path: Path, layer: str) -> bool:
+    """Whether a layer of a file holds any row."""
+    import pyogrio
+
+    return bool(pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"])
+
+
 def read_foreign(
     layers: list[RawLayer], path: Path, *, crs: CRS | None = None, name: str | None = None
 ) -> Dataset:

@@ -65,9 +65,8 @@ def tell_all_reshaped(
         return
     far_m = float(shapely.hausdorff_distance(now, was).max())
     found = sum(one.status in ("detected", "possible") and not one.kept for one in before)
-    confirmed = f"; {counted(found, 'that was', 'that were')} found became `confirmed`" * bool(
-        found
-    )
+    words = f"; {counted(found, 'that was', 'that were')} found became `confirmed`"
+    confirmed = words if found else ""
     _warn(
         f"All {len(before)} obstacles have other shapes than were written, by up to {far_m:.2g} m, "
         f"as where a whole layer is simplified, snapped or shifted: they count as yours{confirmed}."
