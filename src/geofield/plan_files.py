@@ -74,3 +74,24 @@ def save_plan(
     with staged_plan(output, overwrite=overwrite or same, inputs=inputs) as staging:
         shown = {"picture": True}
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem, options=shown)
+
+
+def tracks_unread(file: Path) -> str | None:
+    """Why tracks that lie in a plan's GeoPackage are none of its plan, in words; None if they are.
+
+    Without the record of how they were planned nobody can tell what a person changed of them:
+    they are planned anew.
+    """
+    from geofield import schema
+    from geofield.formats.foreign import has_rows, layer_names
+    from geofield.formats.gpkg_read import record_of
+
+    record, layer = record_of(file), schema.TRACKS.name
+    planned = record is not None and "tracks" in record.provenance.evidence
+    if planned or layer not in layer_names(file) or not has_rows(file, layer):
+        return None
+    return (
+        "has lost the record of what was written (as copies made by other programs do)"
+        if record is None
+        else "has no record of how its tracks were planned (they were imported, perhaps)"
+    )

@@ -395,6 +395,22 @@ def test_a_picture_without_data_is_told(plan_path: Path) -> None:
     assert "The picture scene.tif holds no data" in told
 
 
+def test_tracks_of_which_nothing_is_known_are_told_to_be_planned_anew(plan_path: Path) -> None:
+    """Those that had been imported were replaced by the first saving, without a word."""
+    assert Desk(plan_path).opening()["brought_back"] is None
+    back = plan_path.with_name("back.gpkg")
+    folder = plan_path.with_name("kml")
+    for words in (
+        ["export", plan_path, "-f", "kml", "--out", folder],
+        ["import", folder / "field.kml", "-o", back],
+    ):
+        done = run_geofield(*words)
+        assert done.returncode == 0, done.stderr
+    told = Desk(back).opening()["brought_back"]
+    assert "back.gpkg has no record of how its tracks were planned" in told
+    assert "to save replaces those in the file" in told
+
+
 def test_another_outline_is_chosen(doubtful_path: Path) -> None:
     desk = Desk(doubtful_path)
     outlines = desk.session.plan.field.alternatives

@@ -152,9 +152,10 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
     import pyogrio
 
     from geofield import schema
-    from geofield.formats.foreign import has_rows, layer_names
+    from geofield.formats.foreign import layer_names
     from geofield.formats.gpkg_read import record_of
     from geofield.plan import read_plan
+    from geofield.plan_files import tracks_unread
     from geofield.strangers import is_geopackage
 
     if not is_geopackage(file):
@@ -168,21 +169,16 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
     elif record is None:
         return None
     plan = read_plan(file)
-    planned = record is not None and "tracks" in record.provenance.evidence
-    if schema.TRACKS.name in layers and not planned and has_rows(file, schema.TRACKS.name):
+    unread = tracks_unread(file)
+    if unread is not None:
         said = settings.tracks.model_fields_set
-        lost = (
-            "has no record of how its tracks were planned (they were imported, perhaps)"
-            if record is not None
-            else "has lost the record of what was written (as copies made by other programs do)"
-        )
         unsaid = plan.settings is None and said.isdisjoint(("spacing_m", "width_m", "machine"))
         spacing = (
             f" Its settings are lost, too: the spacing is {settings.tracks.spacing_m:g} m now, "
             "where --spacing says no other."
         )
         say_note(
-            f"{file.name} {lost}: its tracks are planned anew, whatever was changed of them."
+            f"{file.name} {unread}: its tracks are planned anew, whatever was changed of them."
             f"{spacing if unsaid else ''}"
         )
     return plan

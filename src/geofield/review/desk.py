@@ -22,6 +22,7 @@ from geofield.errors import ChangedError, FormatError, GeofieldError, listening
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
 from geofield.plan import Plan, read_plan
+from geofield.plan_files import tracks_unread
 from geofield.review.commands import Command
 from geofield.review.ground import Ground
 from geofield.review.journal import Journal, fingerprint, play
@@ -66,7 +67,14 @@ class Desk:
                 "Field, obstacles or tracks were edited after the tracks had been planned; the "
                 "tracks here are planned anew, with what you changed of them. Save them."
             )
-        self.brought_back = " ".join(filter(None, [self.brought_back, unshown])) or None
+        unread = tracks_unread(self.path)
+        if unread is not None:
+            unread = (
+                f"{self.path.name} {unread}: the tracks here are planned anew, and to save replaces "
+                "those in the file."
+            )
+        told = filter(None, [self.brought_back, unread, unshown])
+        self.brought_back = " ".join(told) or None
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.
         self.reading = secrets.token_hex(4)
