@@ -29,7 +29,7 @@ def test_shapes_that_all_changed_are_told(folder: Path, change: object) -> None:
     told = geofield("tracks", file, "-o", file)
     assert words in told
     assert "11 that were found became `confirmed`" in told
-    assert "geofield run --fresh" in told
+    assert "a run with --fresh" in told
     assert "Changes: obstacles: 11 changed\n" in told
     assert set(rows(plan_in(folder))["status"]) == {"confirmed"}
     told = geofield("tracks", file, "-o", file)
@@ -43,7 +43,7 @@ def test_a_layer_of_which_all_rows_were_deleted_is_told(folder: Path, made: Simu
     assert words in geofield("export", file, "--format", "geojson", "--out", folder / "e")
     told = geofield("tracks", file, "-o", file)
     assert words in told
-    assert "geofield run --fresh" in told
+    assert "a run with --fresh" in told
     assert "Changes: obstacles: 11 taken away\n" in told
     assert "obstacles" not in geofield("tracks", file, "-o", file)
     # The next step that it tells.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: One or two are taken away or drawn anew by hand.
 _FEW = 2
 _NOT_MEANT = (
-    "If that was not meant, go on from the file as it was before; geofield run --fresh searches "
+    "If that was not meant, go on from the file as it was before; a run with --fresh searches "
     "them anew."
 )
 
