@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -12,7 +11,6 @@ from geofield import schema
 from geofield.crs import LONLAT, transformer
 from geofield.errors import (
     FieldError,
-    GeofieldWarning,
     ObstacleError,
     ObstacleWarning,
     TrackWarning,
@@ -23,6 +21,7 @@ from geofield.model.field import MAKE_ONE, Field
 from geofield.model.own_values import empty_columns
 from geofield.model.review import reconcile
 from geofield.model.track_edits import TrackEdits
+from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.settings import Settings, TrackSettings, as_before, option_named
 from geofield.wording import counted
@@ -235,8 +234,7 @@ def is_planned(plan: Plan) -> bool:
         return True
     if written is None:
         return bool(obstacles["obstacle_no"].notna().all() and obstacles["status"].notna().all())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", GeofieldWarning)
+    with listening():
         return reconcile(obstacles, written, plan.grid)[1] == written
 
 
@@ -304,7 +302,7 @@ def read_track_edits(plan: Plan) -> TrackEdits:
     twice = () if plan.tracks is None else plan.tracks.changed_twice
     if twice:
         numbers = ", ".join(map(str, twice))
-        warnings.warn(
+        warn(
             f"Changed in both `tracks` and `segments`, in each another way: track {numbers}. What "
             "`segments` has of it counts; change it there again where that is not what you want.",
             TrackWarning,
@@ -322,7 +320,7 @@ def _warn_of_empty_columns(plan: Plan) -> None:
     for layer, rows in of_layer:
         names = empty_columns(layer, rows)
         if names and len(rows):
-            warnings.warn(
+            warn(
                 f"Nothing stands in {', '.join(names)} of `{layer.name}`: an empty column of your "
                 "own goes when tracks are planned anew. Add it again and write into one row.",
                 TrackWarning,
@@ -333,7 +331,7 @@ def _warn_of_empty_columns(plan: Plan) -> None:
 def warn_of_unsearched(evidence: Evidence) -> None:
     """Tell of ground that an outline gained after obstacles were searched."""
     for doubt in evidence.unsearched:
-        warnings.warn(
+        warn(
             f"{doubt} `geofield obstacles PICTURE PLAN` searches it; then plan the tracks again.",
             ObstacleWarning,
             stacklevel=3,

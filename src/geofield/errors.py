@@ -6,9 +6,7 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from math import isfinite, isinf, isnan, nan
 from numbers import Real
 from typing import Any, get_args
@@ -116,15 +114,6 @@ def is_truth(value: object) -> bool:
     return isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", None) == "b"
 
 
-@contextmanager
-def listening() -> Iterator[list[warnings.WarningMessage]]:
-    """Hear geofield's own warnings of a block, and no others; nobody else hears any."""
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", GeofieldWarning)
-        yield heard
-
-
 def _is_written(value: object) -> bool:
     """Whether text is a number but for its quotes."""
     try:
@@ -208,8 +197,7 @@ class OutputExistsError(FormatError):
 class GeofieldWarning(UserWarning):
     """Base of every warning that geofield gives.
 
-    >>> import warnings
-    >>> with warnings.catch_warnings():
+    >>>     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", gf.GeofieldWarning)
     ...     scene = gf.read_scene("sample_data/field_1.tif")
     """

@@ -7,7 +7,6 @@ what a person has edited since: a moved outline, a confirmed, rejected or added 
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -45,6 +44,7 @@ from geofield.model.searched import searched_in
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.model.written import Written
+from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 from geofield.windows import (
@@ -180,7 +180,7 @@ def run_field(
                 hint="Move the outline itself, or --fresh to have it found again.",
             )
         if boundary is not None:
-            warnings.warn(
+            warn(
                 "The outline there was drawn by hand: it is kept, and the boundary is not used. "
                 "To have the boundary, forget the earlier plan (--fresh; in Python previous=None).",
                 FieldWarning,
@@ -277,8 +277,7 @@ def _find(
         path = fetch_wider(size_m) if fetch_wider is not None else picture
         if path is None:
             return latest
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ImageryWarning)  # told with the first window
+        with listening(ImageryWarning):  # told with the first window
             unasked = path == picture and settings.imagery.size_m is None
             if unasked and shows_all(picture, lat, lon, scene, settings):
                 return scene

@@ -8,6 +8,7 @@ import platform
 import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import asdict, replace
 from importlib import metadata
 from pathlib import Path
@@ -59,7 +60,10 @@ def write_products(
             written += write_scene(dataset, staging, stem="", options=shown)
             dataset = replace(dataset, scene_path=written[0])
         # Compressing the map takes as long as several formats, and holds no lock.
-        drawn = beside.submit(write_map, dataset, staging, stem="", options=shown)
+        # Whoever listens here hears what it tells.
+        drawn = beside.submit(
+            copy_context().run, write_map, dataset, staging, stem="", options=shown
+        )
         # What a format leaves out stands in the report: the GeoPackage beside it has all.
         told = "gpkg" in asked
         written += write_dataset(

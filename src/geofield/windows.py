@@ -6,7 +6,6 @@ was drawn, and the further points that were clicked: what it does not show is no
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ import shapely
 
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import FieldError, ImageryWarning, PointOutsideError
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     from geofield.grid import Grid
@@ -80,7 +80,7 @@ def tell_guesses(scene: Scene, *, after: Scene | None = None) -> None:
     told = () if after is None else _guesses(after)
     for guess in _guesses(scene):
         if guess not in told:
-            warnings.warn(guess, ImageryWarning, stacklevel=3)
+            warn(guess, ImageryWarning, stacklevel=3)
 
 
 def _guesses(scene: Scene) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from geofield.evaluation.driving import Driving, driving
 from geofield.evaluation.matching import FloatArray, Matches, match_points
 from geofield.evaluation.scores import Counts, Score, score
 from geofield.model.obstacles import active, floats
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -166,7 +166,7 @@ def _tell_elsewhere(found_m: FloatArray, true_m: FloatArray) -> None:
     boxes = [shapely.box(*each.min(axis=0), *each.max(axis=0)) for each in (found_m, true_m)]
     apart_km = float(shapely.distance(*boxes)) / 1000
     if apart_km > _ELSEWHERE_KM:
-        warnings.warn(
+        warn(
             f"The truth lies {apart_km:,.0f} km from the obstacles: it is of another place, or its "
             "CRS is not the right one (are latitude and longitude exchanged?).",
             ObstacleWarning,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.farm.layers import FIELD_ID
 from geofield.formats import origin
 from geofield.formats.gpkg_read import in_own_terms, record_of, tell_lost_columns
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -85,4 +85,4 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
 
 def tell(words: str) -> None:
     """Warn of what was left and cannot be taken in."""
-    warnings.warn(words, FormatWarning, stacklevel=4)
+    warn(words, FormatWarning, stacklevel=4)

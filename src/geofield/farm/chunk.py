@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import pyarrow as pa
 
 from geofield import __version__
-from geofield.errors import FormatError, listening
+from geofield.errors import FormatError
 from geofield.farm.folder import sweep_chunk, write_chunk
 from geofield.farm.layers import tables_of
 from geofield.farm.limits import Limits, Watch
@@ -22,6 +22,7 @@ from geofield.farm.reviewed import file_of, reviewed_plan
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.farm.work import Job, in_words, plan_place, told
+from geofield.notes import listening
 from geofield.plan import Plan
 
 _LIMIT_HINT = "Look at it alone with `geofield run`, or give it more: --{}-limit."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -15,6 +14,7 @@ from geofield.farm.as_written import digests_of
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.reviewed import file_of, reviewed_files
 from geofield.farm.store import Store
+from geofield.notes import warn
 from geofield.staging.generations import earlier_of
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def tell_double(store: Store, overview: Path, double: Sequence[str]) -> None:
         stays = ""
         if file_of(one) in there:
             stays = f"; the other plan stays as {earlier_of(Path(file_of(one)))}"
-        warnings.warn(
+        warn(
             f"Field {one} was changed in the farm since {overview.name} was written, too: what "
             f"{overview.name} says holds{stays}.",
             FieldWarning,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Iterator, Set
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from geofield.farm.put_settings import settings_put, settings_said
 from geofield.farm.reviewed import file_of, reviewed_files
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
+from geofield.notes import warn
 from geofield.plan import Plan, read_plan
 from geofield.staging import written_ns
 
@@ -73,7 +73,7 @@ def _differs(file: Path, before: Plan, put: dict[str, Any]) -> bool:
         return _is_edited(plan, before, put)
     except GeofieldError as error:
         words = f"{file_of(field_id)} is not taken in: {error}"
-        warnings.warn(words, FieldWarning, stacklevel=3)
+        warn(words, FieldWarning, stacklevel=3)
         return False
 
 

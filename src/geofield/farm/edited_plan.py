@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -14,13 +13,14 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.errors import FormatError, GeofieldError, listening
+from geofield.errors import FormatError, GeofieldError
 from geofield.farm import edited_tracks
 from geofield.farm.as_written import own_names, text_of
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.farm.standing import with_further
 from geofield.model import Field
 from geofield.model.review import reconcile
+from geofield.notes import listening, warn
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
@@ -118,7 +118,7 @@ def said_of(field_id: str) -> Iterator[None]:
     with listening() as heard:
         yield
     for each in heard:
-        warnings.warn(f"Field {field_id}, as edited: {each.message}", each.category, stacklevel=4)
+        warn(f"Field {field_id}, as edited: {each}", type(each), stacklevel=4)
 
 
 @contextmanager

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import warnings
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -35,6 +34,7 @@ from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
 from geofield.formats import origin
 from geofield.model.merged_rows import parts_apart
+from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.wording import counted, some_of
 
@@ -260,7 +260,7 @@ def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) ->
             f"The obstacles of {file} are not looked up yet on ground that field "
             f"{', '.join(wider[:5])} gained: `geofield batch` with --fresh does that."
         )
-        warnings.warn(words, FieldWarning, stacklevel=3)
+        warn(words, FieldWarning, stacklevel=3)
 
 
 def is_edited(folder: Path, overview: Path) -> bool:
@@ -270,8 +270,7 @@ def is_edited(folder: Path, overview: Path) -> bool:
     if not overview.is_file():
         return False
     taken = _taken(Store.of(folder), overview)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FormatWarning)
+    with listening(FormatWarning):
         try:
             return bool(_edits(read_farm(folder), overview, taken).marks)
         except FormatError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from geofield.farm.store import Store
 from geofield.farm.taken_out import note_put, refuse_changed, settings_taken
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
+from geofield.notes import warn
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import save_plan
@@ -97,9 +97,7 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
                     if plan.tracks is None
                     else "its tracks were not those of its outline and obstacles, and"
                 )
-                warnings.warn(
-                    f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2
-                )
+                warn(f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2)
             plan = run_tracks(plan, settings=settings)
         if not (whole and plan is known):
             save_plan(plan, file, overwrite=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -15,7 +14,6 @@ from geofield.errors import (
     FormatError,
     GeofieldError,
     ImageryError,
-    listening,
     refuse_other,
 )
 from geofield.farm.place_reader import read_places
@@ -23,6 +21,7 @@ from geofield.farm.places import Place, Places
 from geofield.farm.standing import own_obstacles
 from geofield.farm.work import Job, in_words, plan_place, told
 from geofield.imagery import Imagery
+from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values
 
@@ -90,10 +89,10 @@ def plan_fields(
     waiting = iter(found.take(found.order()))
     for plan, why in _here(waiting, job) if client is None else _there(waiting, job, client):
         if plan is None:
-            warnings.warn(why, FieldWarning, stacklevel=2)
+            warn(why, FieldWarning, stacklevel=2)
         else:
             if why:
-                warnings.warn(f"{plan.field.name}: {why}", FieldWarning, stacklevel=2)
+                warn(f"{plan.field.name}: {why}", FieldWarning, stacklevel=2)
             yield plan
 
 

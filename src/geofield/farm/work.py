@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,13 +13,14 @@ import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.earlier import drew_outline, with_said_tracks
-from geofield.errors import FieldError, FieldWarning
+from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
+from geofield.notes import warn
 from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
@@ -72,7 +72,7 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
         place = _as_reviewed(place, previous)
         settings, said = with_said_tracks(settings, previous)
         for words in said:
-            warnings.warn(words, FieldWarning, stacklevel=2)
+            warn(words, FieldWarning, stacklevel=2)
         if previous is reviewed and _same_stages(previous.settings, settings):
             return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)
@@ -148,7 +148,7 @@ def _on_parcel(previous: Plan, place: Place) -> Plan:
         return replace(previous, field=replace(field, polygon=polygon), evidence=evidence)
     apart = polygon.symmetric_difference(field.polygon).area
     if apart > _PARTED * min(polygon.area, field.polygon.area):
-        warnings.warn(
+        warn(
             f"The reviewed outline stands; that of the places differs by {apart / 10_000:.2f} ha.",
             FieldWarning,
             stacklevel=2,
@@ -222,15 +222,15 @@ def parcel_of(place: Place) -> Field:
     outline = shapely.force_2d(reproject(shapely.from_wkb(place.outline), source, metric))
     polygon, repaired = clean_outline(outline)
     for words in repaired:
-        warnings.warn(words, FieldWarning, stacklevel=2)
+        warn(words, FieldWarning, stacklevel=2)
     return Field(
         polygon, metric, name=place.name, field_id=place.field_id, method="boundary", own=place.own
     )
 
 
-def told(place: Place, heard: Sequence[warnings.WarningMessage]) -> str:
+def told(place: Place, heard: Sequence[GeofieldWarning]) -> str:
     """What the stages had to tell of a place, each thing once."""
-    return "; ".join(dict.fromkeys([*place.notes, *(str(each.message) for each in heard)]))
+    return "; ".join(dict.fromkeys([*place.notes, *(str(each) for each in heard)]))
 
 
 def in_words(error: BaseException) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transfo
 from geofield.errors import CRSError, FieldError, FieldWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
+from geofield.notes import warn
 from geofield.wording import counted, none_of
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _somewhere(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
             f"The boundary file holds {are}, with coordinates that are no finite numbers.",
             hint=MEND_IT,
         )
-    warnings.warn(
+    warn(
         f"{are} of the boundary file with coordinates that are no finite numbers: left out.",
         FieldWarning,
         stacklevel=3,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -36,6 +35,7 @@ from geofield.model import Alternative, Field, FieldQuality, Scene
 from geofield.model.scene import OPEN_IT
 from geofield.model.segmentation import Segmentation
 from geofield.model.upright import upright
+from geofield.notes import warn
 from geofield.raster import gaps_filled
 
 Holes = Literal["fill", "keep"]
@@ -184,7 +184,7 @@ def extract_field(
         ),
     )
     if not quality.trusted:
-        warnings.warn(
+        warn(
             f"The outline of field {field.name} should be looked at before use: "
             f"{'; '.join(quality.reasons)}.",
             FieldWarning,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
-from geofield.errors import FieldWarning, SettingsError
+from geofield.errors import SettingsError
 from geofield.field.extract import extract_field
 from geofield.model import Field, Scene
 from geofield.model.frame import along_frame
+from geofield.notes import listening, warn
 
 
 def grow_field(
@@ -58,20 +58,14 @@ def grow_field(
         ended = (bounds == covered and scene.valid.size > 1) or size_m >= largest_m
         # A window of one pixel, or of evenly white ground, is no empty picture yet.
         if ended or not scene.is_blank:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
+            with listening() as heard:
                 field = extract_field(scene, lat=lat, lon=lon, **options)
             if ended or not along_frame(field.polygon, field.crs, scene.grid):
                 break
         covered = bounds
         size_m = min(2 * size_m, largest_m)
-    for warning in caught:
-        if not issubclass(warning.category, FieldWarning):
-            warnings.warn_explicit(
-                warning.message, warning.category, warning.filename, warning.lineno
-            )
-        else:
-            warnings.warn(str(warning.message), FieldWarning, stacklevel=2)
+    for note in heard:
+        warn(str(note), type(note), stacklevel=2)
     return field, scene
 
 

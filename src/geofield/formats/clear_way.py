@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from geofield.errors import TrackError, TrackWarning
 from geofield.model import Dataset
 from geofield.model.obstacles import active
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 from geofield.wording import some_of
 
 #: Segments end exactly on a border: so far beyond it is no fault, metres.
@@ -79,7 +79,7 @@ def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
         # No terminal is given these: they are told, and refuse nothing.
         blocked += _in_the_way(each, "headland_tracks") + _in_the_way(each, "turns")
         if blocked:
-            warnings.warn(
+            warn(
                 f"{each.name}: {' and '.join(blocked)}: plan the tracks again (`geofield tracks`).",
                 TrackWarning,
                 stacklevel=3,

@@ -7,7 +7,6 @@ a drawn row has a shape and nothing else.
 from __future__ import annotations
 
 import json
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,7 @@ from geofield.model.field import refuse_no_areas
 from geofield.model.frame import along_frame, with_outside
 from geofield.model.review import reconcile
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -82,7 +82,7 @@ def _driven(dataset: Dataset) -> Dataset:
     if whole is tracks:
         return dataset  # columns alone
     if tracks.route is not None and not of_before:
-        warnings.warn(
+        warn(
             "Tracks were edited since their route was planned: it is of before. Plan it again "
             "(geofield tracks).",
             TrackWarning,

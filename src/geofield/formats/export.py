@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from geofield.formats.registry import FORMATS, Format, format_named
 from geofield.formats.terminal import main_field
 from geofield.model import Dataset
 from geofield.model.obstacles import active
+from geofield.notes import warn
 from geofield.staging import staged_folder
 from geofield.wording import nearest
 
@@ -124,10 +124,10 @@ def write_datasets(
         told = (dropped(one, each, together=len(datasets) > 1) for one in datasets)
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
-            warnings.warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
+            warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
         by_points = {"track_points", "tracks", "segments"} & set(each.layers) == {"track_points"}
         if by_points and any(one.has("tracks") and not one.has("track_points") for one in datasets):
-            warnings.warn(
+            warn(
                 f"{each.title} has nothing of the tracks: there are none of their points, which "
                 "`geofield tracks` makes.",
                 FormatWarning,
@@ -145,7 +145,7 @@ def _tell_bare(datasets: Sequence[Dataset]) -> None:
         and one.table(schema.FIELD.name)["imagery"].fillna("").ne("").any()
     ]
     if bare:
-        warnings.warn(
+        warn(
             f"Shown without the picture, which is not beside the plan: {', '.join(bare)}. "
             "`geofield export --picture` takes it from elsewhere.",
             FormatWarning,

@@ -25,6 +25,7 @@ from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
+from geofield.notes import warn
 from geofield.strangers import check_vector, unreadable
 from geofield.wording import counted
 
@@ -117,7 +118,7 @@ def _mended(path: Path, layer: str | None) -> Any:
     closed = int(plain.isna().sum()) - lost
     words = [f"{closed} with rings that were not closed: they are closed now"] if closed else []
     words += [f"{lost} without a shape that can be: they are left out"] if lost else []
-    warnings.warn(
+    warn(
         f"{path.name}: geometries that are damaged: {'; '.join(words)}. Look at them.",
         FormatWarning,
         stacklevel=4,
@@ -239,7 +240,7 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
         return frame if frame.crs is not None else frame.set_crs(LONLAT)
     west, south, east, north = frame.total_bounds
     if abs(west) <= 180 and abs(east) <= 180 and abs(south) <= 90 and abs(north) <= 90:
-        warnings.warn(
+        warn(
             f"{where} does not say its CRS (a Shapefile does in its .prj). Its numbers look like "
             "degrees and are read as WGS 84 longitude and latitude; name the CRS if that is wrong.",
             FormatWarning,
@@ -291,7 +292,7 @@ def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFr
     wanted = of.geometry.removeprefix("Multi")
     fits = frame.geom_type.str.removeprefix("Multi") == wanted
     if not fits.all():
-        warnings.warn(
+        warn(
             f"{path.name}: "
             f"{counted(int((~fits).sum()), 'geometry', 'geometries')} of {of.name!r} that "
             f"{'is' if (~fits).sum() == 1 else 'are'} no {wanted}: left out.",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
 from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
+from geofield.notes import warn
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     radius[~(np.isfinite(radius) & (radius > 0))] = np.nan
     unsized = is_point & np.isnan(radius)
     if few := int(unsized.sum()):
-        warnings.warn(
+        warn(
             f"{path.name}: {counted(few, 'obstacle point has', 'obstacle points have')} no radius; "
             f"{'it is a circle' if few == 1 else 'they are circles'} of "
             f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
@@ -129,7 +129,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         radius[unsized] = POINT_RADIUS_M
     wrong = (margin < 0) | np.isinf(margin)
     if wrong.any():
-        warnings.warn(
+        warn(
             f"{path.name}: "
             f"{counted(int(wrong.sum()), 'safety margin is', 'safety margins are')} negative or "
             f"infinite; {'it counts' if wrong.sum() == 1 else 'they count'} as 0 m. Correct them.",
@@ -264,7 +264,7 @@ def _one_of(
     }
     if unknown:
         more = ", ..." if len(unknown) > 5 else ""
-        warnings.warn(
+        warn(
             f"{path.name}: obstacles have a {name} that is none of {', '.join(allowed)}: "
             f"{', '.join(list(unknown)[:5])}{more}. Correct it in the layer obstacles of the plan.",
             FormatWarning,

@@ -7,7 +7,6 @@ was, row for row and byte for byte.
 from __future__ import annotations
 
 import sqlite3
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -17,6 +16,7 @@ from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
 from geofield.formats.gpkg_read import own_layers
 from geofield.formats.qgis.as_written import is_as_written, is_project_as_written
+from geofield.notes import warn
 from geofield.staging.generations import keep_earlier
 
 #: Of QGIS: their rows are brought one by one.
@@ -114,7 +114,7 @@ def keep_project(there: Path, new: Path) -> None:
     if not (new.is_file() and there.is_file()) or is_project_as_written(there.read_bytes()):
         return
     new.unlink()
-    warnings.warn(
+    warn(
         f"{there.name} is as it was saved in QGIS: it stays, and shows the plan as it is now. To "
         "have that of geofield anew, rename yours and repeat.",
         FormatWarning,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_v
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
 from geofield.model.merged_rows import parts_apart
+from geofield.notes import warn
 from geofield.strangers import database, is_geopackage
 from geofield.wording import counted
 
@@ -72,7 +72,7 @@ def read(path: Path) -> Dataset:
         _refuse_far(tables, field, path)
     for name in layers:
         if name not in known and not (several and name == schema.PLACES.name):
-            warnings.warn(
+            warn(
                 f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",
                 FormatWarning,
                 stacklevel=2,
@@ -177,7 +177,7 @@ def _exact(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoData
     import pyogrio
 
     if "geometry" in pyogrio.read_info(path, layer=of.name)["fields"]:
-        warnings.warn(
+        warn(
             f"{path.name}: the column 'geometry' of layer {of.name!r} has the name of the shapes "
             "and is not kept: give it another name.",
             FormatWarning,
@@ -204,7 +204,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     frame = in_own_terms(of, frame, crs, path)
     absent = frame.geometry.isna() | frame.geometry.is_empty
     if absent.any():
-        warnings.warn(
+        warn(
             f"{path.name}: {int(absent.sum())} row(s) of layer {of.name!r} have no geometry and "
             "are left out.",
             FormatWarning,
@@ -214,7 +214,7 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     _refuse_no_lines(of, frame, path)
     tell_lost_columns(of, frame, path)
     if of is schema.SEGMENTS and (frame.count_geometries() > 1).any():
-        warnings.warn(
+        warn(
             f"{path.name}: layer 'segments' has rows of several lines: each line counts as the "
             "track on which it was written.",
             FormatWarning,
@@ -250,7 +250,7 @@ def tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> 
         # Rows that were drawn have neither number.
         lost += ["segment_no"] if frame["segment_no"].isna().all() else []
     if lost:
-        warnings.warn(
+        warn(
             f"{path.name}: layer {of.name!r} has no column {', '.join(lost)} any more: there each "
             "row counts as it was written, and what stands in a column of another name does not.",
             FormatWarning,

@@ -8,7 +8,6 @@ is a row to guess them from.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from geofield.crs import LONLAT
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.arrow import cut_lonlat, disk_hint, exact_geometry
 from geofield.model import Dataset
+from geofield.notes import warn
 
 TEXT_BYTES = 254
 NAME_CHARACTERS = 10
@@ -106,7 +106,7 @@ def _own(series: Any) -> Column:
     texts = [None if pd.isna(value) else str(value) for value in series]
     long = [text for text in texts if text is not None and len(text.encode()) > TEXT_BYTES]
     if long:
-        warnings.warn(
+        warn(
             f"Shapefiles cut text at {TEXT_BYTES} bytes: column {series.name!r} has longer ones.",
             FormatWarning,
             stacklevel=2,

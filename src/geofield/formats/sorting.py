@@ -9,7 +9,6 @@ obstacles. Nothing is left out or taken without a word.
 from __future__ import annotations
 
 import re
-import warnings
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
+from geofield.notes import warn
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
         words += kept if whole else " into parts"
     sound = frame.copy()
     sound.loc[bad, sound.geometry.name] = np.array(shapes, dtype=object)
-    warnings.warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
+    warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
     sound = sound.explode(index_parts=False, ignore_index=True)
     return sound[sound.geom_type.isin(["Polygon", "Point"])]
 

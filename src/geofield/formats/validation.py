@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,7 +19,6 @@ from geofield.errors import (
     FormatWarning,
     GeofieldError,
     SeveralFieldsError,
-    listening,
 )
 from geofield.formats.clear_way import DRIVEN, WITHIN, driven_through, leaving
 from geofield.formats.format import Format
@@ -34,6 +32,7 @@ from geofield.model.field import refuse_no_areas
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
 from geofield.model.resized import widened
 from geofield.model.searched import unsearched
+from geofield.notes import listening
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -118,9 +117,9 @@ def _of_content(
     except GeofieldError as error:
         return [] if broken else [Finding("error", place.name, str(error))]
     findings = [
-        Finding("warning", place.name, str(each.message).removeprefix(f"{place.name}: "))
+        Finding("warning", place.name, str(each).removeprefix(f"{place.name}: "))
         for each in heard
-        if issubclass(each.category, FormatWarning)
+        if isinstance(each, FormatWarning)
     ]
     with_segments = "segments" in found.layers
     for one in fields:
@@ -236,8 +235,7 @@ def _check_areas(obstacles: gpd.GeoDataFrame) -> Iterator[Finding]:
 
 def _check_obstacles(dataset: Dataset) -> Iterator[Finding]:
     if dataset.has(schema.OBSTACLES.name):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FormatWarning)  # sizes are found already
+        with listening(FormatWarning):  # sizes are found already
             areas = widened(dataset.table(schema.OBSTACLES.name))
         dataset = replace(dataset, tables={**dataset.tables, schema.OBSTACLES.name: areas})
     for layer, (number, one, _) in DRIVEN.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -30,6 +29,7 @@ from geofield.imagery.terms import check_terms
 from geofield.imagery.tiling import Block
 from geofield.imagery.write import replacing, write_scene
 from geofield.model.scene import ImagerySource, Scene
+from geofield.notes import warn
 
 Zoom = int | Literal["max", "fit"] | None
 
@@ -235,14 +235,14 @@ def _tell_nothing(source: Tiles, block: Block, missing_px: int, report: FetchRep
     if not isinstance(source, TileSource):
         return  # a file of one's own shows what it shows
     if missing_px and not report.absent:
-        warnings.warn(
+        warn(
             f"{source.name} does not show {100 * missing_px / (width * height):.2g} % of the "
             "picture: it is transparent there, and no-data.",
             ImageryWarning,
             stacklevel=3,
         )
     if report.alike:
-        warnings.warn(
+        warn(
             f"{report.alike} of {report.wanted} tiles of {source.name} are the same picture: it "
             "may have nothing there, or not at this zoom. Look at the picture first.",
             ImageryWarning,
@@ -294,7 +294,7 @@ def _picture(
         )
     scene = _with_provenance(scene, source)
     for guess in scene.guesses:
-        warnings.warn(guess, ImageryWarning, stacklevel=3)
+        warn(guess, ImageryWarning, stacklevel=3)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 

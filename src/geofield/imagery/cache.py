@@ -11,13 +11,13 @@ import math
 import re
 import sqlite3
 import time
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from geofield.errors import ImageryError, ImageryWarning
+from geofield.notes import warn
 from geofield.strangers import database
 
 if TYPE_CHECKING:
@@ -251,7 +251,7 @@ class TileCache:
             self.path.replace(aside)
         for ending in ("-journal", "-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
-        warnings.warn(
+        warn(
             f"The tile cache {self.path.name} was damaged. It is set aside as {aside.name} and a "
             "new one begun; you may delete the old one.",
             ImageryWarning,

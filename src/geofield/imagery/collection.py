@@ -8,7 +8,6 @@ sheets in another UTM zone.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import REACH_M, WarpOrigin
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import swapped
+from geofield.notes import warn
 
 #: Readers of pictures that were looked at: values without open files.
 _KNOWN: dict[Any, SceneReader] = {}
@@ -145,7 +145,7 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
         )
     reference = _reference(readers, options.point, name, told)
     if damaged:
-        warnings.warn(told, ImageryWarning, stacklevel=2)
+        warn(told, ImageryWarning, stacklevel=2)
     unlike = [_unlike(each, reference) for each in readers]
     usable = [each for each, why in zip(readers, unlike, strict=True) if not why]
     usable.sort(key=lambda each: each is not reference)  # stable: the reference first

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +69,7 @@ def gdal_env(path: str = "", **options: Any) -> Iterator[None]:
         for name, value in _OPTIONS.items()
         if remote or name != "GDAL_DISABLE_READDIR_ON_OPEN"
     }
-    with rasterio.Env(**(chosen | options)), warnings.catch_warnings():
-        # Said by our own errors, with a next step.
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+    with rasterio.Env(**(chosen | options)):
         yield
 
 
@@ -99,12 +97,12 @@ def to_rasterio(crs: CRS) -> Any:
         raise CRSError(f"GDAL does not know the coordinate reference system {crs.name}.") from error
 
 
-def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
+def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) -> Any:
     """Open a picture with rasterio, or say why it cannot be opened.
 
     Only drivers are used whose files hold the pixels themselves, and VRTs that were looked
     at: nothing is opened beyond what the user named, its folder and `reach`. The path is a file, an
-    address, or a VRT as text.
+    address, or a VRT as text; one that is known to be `placed` leaves warnings as they are.
 
     Raises
     ------
@@ -126,7 +124,8 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
             from geofield.imagery.gateway import gateway
 
             rasterio.env.setenv(**gateway().options(reach.of(path)))
-        dataset = DatasetReader(path, driver=drivers)
+        with nullcontext() if placed else _unplaced_is_no_news():
+            dataset = DatasetReader(path, driver=drivers)
         if "OVERVIEW_FILE" in dataset.tags(ns="OVERVIEWS"):
             dataset.close()
             raise ImageryError(f"The picture {name} names overviews in another file.")
@@ -142,6 +141,17 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER) -> Any:
                 "`gdalinfo` tells more."
             ),
         ) from None
+
+
+@contextmanager
+def _unplaced_is_no_news() -> Iterator[None]:
+    """Silence what our own errors say of a picture without a place, with a next step.
+
+    Warnings are silenced in all threads of a process: not while windows are read, which several do.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        yield
 
 
 def _tell_refused(path: str, reach: Reach = OWN_FOLDER) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.errors import GeofieldError, ImageryWarning
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired
@@ -63,7 +63,7 @@ class PlacePicture:
             return str(self.fetch(size_m).path)
         except GeofieldError as error:
             self.offers_more = False
-            warnings.warn(
+            warn(
                 f"More of the picture could not be had: {error.message}",
                 ImageryWarning,
                 stacklevel=2,

@@ -302,7 +302,7 @@ class SceneReader:
         part = self.grid.crop(window.col_off, window.row_off, window.width, window.height)
         with (
             gdal_env(self.path),
-            open_picture(self.path, self.reach) as dataset,
+            open_picture(self.path, self.reach, placed=True) as dataset,
             reading(self.path),
             as_taken(dataset, self.nodata, alpha=self.roles.alpha is not None) as plain,
             self._through_warp(plain, part) as raster,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import active
 from geofield.model.written import SAME_M, WrittenRow, same_shapes
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -56,7 +56,7 @@ def without_copies(
         numbers.iloc[group] = number
         told.setdefault(words, []).append("?" if number is None else str(int(number)))
     for words, names in told.items():
-        warnings.warn(
+        warn(
             f"Rows copied in place (obstacle {', '.join(names)}): {words}.",
             FormatWarning,
             stacklevel=3,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from geofield import schema
 from geofield.crs import ground_lengths_m
 from geofield.errors import FormatWarning
 from geofield.model.tracks_written import SAME_M, TracksWritten, track_numbers
+from geofield.notes import warn
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _once(of: schema.Layer, rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     copy = (said.duplicated() & rows["track_no"].notna()).to_numpy(bool)
     if not copy.any():
         return rows
-    warnings.warn(
+    warn(
         f"Layer {of.name!r}: {counted(int(copy.sum()), 'row is', 'rows are')} copied in place and "
         "count once.",
         FormatWarning,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +14,7 @@ from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import active, circle_polygons, floats
 from geofield.model.written import SAME_M, WrittenRow, same_shapes, shapes_of_plain
+from geofield.notes import warn
 from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
@@ -211,4 +211,4 @@ def _tell(rows: Iterable[WrittenRow], words: str) -> None:
 
 
 def _warn(words: str) -> None:
-    warnings.warn(f"{words}.", FormatWarning, stacklevel=5)
+    warn(f"{words}.", FormatWarning, stacklevel=5)

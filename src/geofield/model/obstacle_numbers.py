@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import FloatArray, floats
 from geofield.model.written import WrittenRow, matches, same_shapes, shapes_of_plain
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -29,7 +29,7 @@ def possible_numbers(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     if not strange.any():
         return obstacles
     which = ", ".join(f"{number:.15g}" for number in numbers[strange][:5])
-    warnings.warn(
+    warn(
         f"obstacle_no {which} is no whole number from 1 to {_MOST}: such rows are known by their "
         "shapes, or get the next numbers.",
         FormatWarning,

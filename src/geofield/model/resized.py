@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from geofield.model.obstacles import (
     still_round,
 )
 from geofield.model.written import WrittenRow, fitted_circles, same_shapes, shapes_of_plain
+from geofield.notes import warn
 from geofield.wording import some_of
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def as_areas(obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> g
         return obstacles
     shapes[lines[same]] = areas[same]
     names = [str(row.obstacle_no) for row, is_one in zip(known, same, strict=True) if is_one]
-    warnings.warn(
+    warn(
         f"The borders of obstacles became lines ({some_of(names, 20)}): each is the area that it "
         "was.",
         FormatWarning,
@@ -170,7 +170,7 @@ def _tell_unsized(points: int, lines: int) -> None:
     ):
         if count:
             many = f"One {what}" if count == 1 else f"{count} {what}s"
-            warnings.warn(
+            warn(
                 f"{many} among the obstacles without {column}: taken for {taken}. Correct the "
                 "sizes that are others.",
                 FormatWarning,

@@ -8,7 +8,6 @@ detection with it.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +43,7 @@ from geofield.model.written import (
     same_shapes,
     shapes_of_plain,
 )
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -240,7 +240,7 @@ def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> N
                 unknown.setdefault(repr(value), []).append(rows.name_of(row))
             values[row] = word if word in allowed else None
         for said, names in unknown.items():
-            warnings.warn(
+            warn(
                 f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {name} {said} is "
                 f"none of {', '.join(allowed)} and is not used.",
                 FormatWarning,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.written import WrittenRow, matches, shapes_of_plain
+from geofield.notes import warn
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -74,4 +74,4 @@ def tell_all_reshaped(
 
 
 def _warn(words: str) -> None:
-    warnings.warn(f"{words} {_NOT_MEANT}", FormatWarning, stacklevel=5)
+    warn(f"{words} {_NOT_MEANT}", FormatWarning, stacklevel=5)

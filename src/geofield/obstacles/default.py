@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -18,6 +17,7 @@ from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.evidence import UNSEEN
 from geofield.model.field import Field
 from geofield.model.upright import Turn
+from geofield.notes import warn
 from geofield.obstacles.crowns import (
     CELL_PX,
     NETWORK,
@@ -134,7 +134,7 @@ def detect_by_default(
     if ring is not None:
         doubts += _unseen(ring.area, seen_px, gaps_px, resolution)
     for doubt in doubts:
-        warnings.warn(doubt, ObstacleWarning, stacklevel=3)
+        warn(doubt, ObstacleWarning, stacklevel=3)
     crowns = once_each(crowns, **facts["suppression"])
     p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     shapes: list[shapely.Polygon] = []

@@ -18,9 +18,10 @@ from typing import Any, get_args
 import shapely
 
 from geofield.crs import ground_scale_of
-from geofield.errors import ChangedError, FormatError, GeofieldError, listening
+from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.imagery.display import TiledPicture
 from geofield.model.scene import Scene
+from geofield.notes import listening
 from geofield.plan import Plan, read_plan
 from geofield.plan_files import tracks_unread
 from geofield.review.commands import Command
@@ -70,8 +71,8 @@ class Desk:
         unread = tracks_unread(self.path)
         if unread is not None:
             unread = (
-                f"{self.path.name} {unread}: the tracks here are planned anew, and to save replaces "
-                "those in the file."
+                f"{self.path.name} {unread}: the tracks here are planned anew, and to save "
+                "replaces those in the file."
             )
         told = filter(None, [self.brought_back, unread, unshown])
         self.brought_back = " ".join(told) or None
@@ -248,7 +249,7 @@ class Desk:
             )
         within = Path(*exports.parts[-2:])
         made = dict.fromkeys(str(within / path.relative_to(exports).parts[0]) for path in written)
-        return {"files": list(made), "notes": [str(one.message) for one in heard]}
+        return {"files": list(made), "notes": [str(one) for one in heard]}
 
     def _exports(self) -> tuple[Path, str]:
         """The folder of exports, one for each plan as their names are the same, and their stem."""

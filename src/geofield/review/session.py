@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geofield.earlier import is_planned
-from geofield.errors import GeofieldWarning, listening
+from geofield.notes import listening
 from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.review.commands import Command, EditError, apply_command
 from geofield.settings import Settings
@@ -107,8 +106,7 @@ class Session:
         """
         plan = self._edited(command)
         settings = plan.settings or Settings()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", GeofieldWarning)
+        with listening():
             return replace(plan, tracks=tracks_of_plan(plan, settings))
 
     def _edited(self, command: Command) -> Plan:
@@ -141,6 +139,6 @@ def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
     """A plan with the tracks that follow from its field, obstacles and settings."""
     with listening() as heard:
         after = run_tracks(plan, settings=plan.settings or Settings())
-    notes = dict.fromkeys(str(each.message) for each in heard)
+    notes = dict.fromkeys(str(each) for each in heard)
     kept = after.evidence.track_edits.in_words()
     return Step(after, command, (*notes, kept) if kept else tuple(notes))

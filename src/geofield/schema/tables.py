@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from geofield.errors import FormatError, FormatWarning
+from geofield.notes import warn
 from geofield.schema.columns import ColumnType, Layer
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _whole_numbers(of: Layer, name: str, numbers: pd.Series[Any]) -> pd.Series[A
         strange = ~np.isnan(plain) & ~(np.abs(plain - np.round(plain)) < 1e-6)
     if strange.any():
         what = f"{name} {plain[strange][0]:g}"
-        warnings.warn(
+        warn(
             f"Layer {of.name!r}: {what} is no whole number and counts as none.",
             FormatWarning,
             stacklevel=4,

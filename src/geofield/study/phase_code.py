@@ -8,12 +8,12 @@ measures each radius on a histogram of the distances of the edge pixels around i
 
 from __future__ import annotations
 
-import warnings
 from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield import notes
 from geofield.errors import ObstacleError, ObstacleWarning, refuse_unknown
 from geofield.model.circles import Circles, checked_range
 from geofield.study.accumulator import (
@@ -78,7 +78,7 @@ def find_circles(
         raise ObstacleError(f"The sensitivity {sensitivity:g} is outside 0 to 1.")
     refuse_unknown(ObstacleError, "circle method", method, CIRCLE_METHODS)
     if warn and (low <= 5 or high >= 3 * low):
-        warnings.warn(
+        notes.warn(
             f"Radii of {low:g} to {high:g} px are outside the range the circular Hough "
             "transform is reliable in (above 5 px, and less than threefold).",
             ObstacleWarning,

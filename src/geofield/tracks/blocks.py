@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import geopandas as gpd
@@ -23,6 +22,7 @@ from geofield.model.obstacles import (
     shapes_of,
     sizes_of,
 )
+from geofield.notes import warn
 from geofield.tracks.outline import in_degrees
 from geofield.wording import counted
 
@@ -169,4 +169,4 @@ def _grown(shapes: ObstacleShapes, clearance_m: float, crs: CRS) -> ObstacleShap
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, TrackWarning, stacklevel=4)
+    warn(message, TrackWarning, stacklevel=4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,6 +18,7 @@ from geofield.model.obstacles import active
 from geofield.model.rows import replaced
 from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 from geofield.settings import TrackSettings
 from geofield.tracks.outline import NEAR_M, metric, near
 from geofield.tracks.planner import plan_tracks
@@ -74,7 +74,7 @@ def plan_with_settings(
     )
     told = _reaching_in(settings, obstacles)
     for note in told:
-        warnings.warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning, stacklevel=2)
     tracks = replaced(tracks, notes=(*tracks.notes, *told))
     if settings.route == "none":
         return tracks

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,6 +20,7 @@ from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_edits import TrackEdits
 from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.by_hand import on_layout, with_drawn, with_own
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
@@ -161,7 +161,7 @@ def plan_tracks(
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
-        warnings.warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning, stacklevel=2)
     shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m, outline=outline)
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
@@ -219,7 +219,7 @@ def plan_tracks(
             holes=headland_holes,
         )
     for note in told:
-        warnings.warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning, stacklevel=2)
     tracks = _tracks(
         pieces,
         crossings,
@@ -332,7 +332,7 @@ def _positions(
             f"{strips.wide_words} leaves no track in a field {far - near:.2f} m wide across the "
             "tracks; one was laid through its middle."
         )
-        warnings.warn(note, TrackWarning, stacklevel=3)
+        warn(note, TrackWarning, stacklevel=3)
         return np.array([(near + far) / 2.0]), spacing_m, (note,)
     if strips.last_strip == "spread" and len(positions) > 1:
         spacing_m = float(positions[1] - positions[0])

@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import html
 import json
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from geofield.model.dataset import Dataset
 from geofield.model.map_words import frame_lines
 from geofield.model.scene import Scene
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 from geofield.staging import staged_file
 from geofield.theme import web_theme
 from geofield.web import inlined, page_file
@@ -166,7 +166,7 @@ def _picture(
         if not picture.has_data(tuple(dataset.table(schema.FIELD.name).total_bounds)):
             name = dataset.scene_path.name
             words = f"The picture {name} holds no data at {dataset.name}: the page shows none."
-            warnings.warn(words, ImageryWarning, stacklevel=3)
+            warn(words, ImageryWarning, stacklevel=3)
             return None, None
         data, kind, bounds = shown_scene(picture.reduced(LONG_SIDE_PX), dataset.crs, LONG_SIDE_PX)
     else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -35,6 +34,7 @@ from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
 from geofield.model.dataset import Dataset
 from geofield.model.obstacles import circle_polygons
+from geofield.notes import warn
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -116,7 +116,7 @@ def _add_siblings(graph: Graph, path: Path) -> None:
         if not fields or not theirs or fields & theirs:
             graph.merge(more)
             continue
-        warnings.warn(
+        warn(
             f"{sibling.name} is of another field than {path.name}: not read.",
             FormatWarning,
             stacklevel=3,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass
 
 from geofield.errors import FormatError, FormatWarning, SeveralFieldsError
 from geofield.formats.rdf.graph import Graph
 from geofield.formats.rdf.layers import LayerMap
+from geofield.notes import warn
 
 #: The end of a plan's IRI that its content named, not a person.
 _OWN_PLAN = re.compile(r"/plan(?:/[0-9a-f]{12})?$")
@@ -94,7 +94,7 @@ def _one(kind: str, found: list[str], wanted: str | None = None) -> str | None:
             )
         return chosen[0]
     if len(found) > 1:
-        warnings.warn(
+        warn(
             f"There are {len(found)} {kind}s ({', '.join(found)}): reading <{found[0]}>. Name "
             "another by its plan.",
             FormatWarning,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -24,6 +23,7 @@ from geofield.errors import (
 )
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
+from geofield.notes import warn
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.outline import place_near, refuse_no_length
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
@@ -127,7 +127,7 @@ def plan_route(
         note = (
             f"Of {count} tracks {skip} cannot be left out at a turn: each is followed by the next."
         )
-        warnings.warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning, stacklevel=2)
         notes = (*notes, note)
     cut_off = sum(turn.kind == "none" for turn in turns)
     if cut_off:
@@ -136,7 +136,7 @@ def plan_route(
             f"segments {'does' if cut_off == 1 else 'do'} not exist, and the route leaves "
             f"{'it' if cut_off == 1 else 'them'} out."
         )
-        warnings.warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning, stacklevel=2)
         notes = (*notes, note)
     return replace(tracks, route=route, turns=table, notes=notes)
 
