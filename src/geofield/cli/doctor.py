@@ -74,16 +74,21 @@ def _libraries() -> dict[str, str]:
 
 
 def _native() -> dict[str, str]:
-    import fiona
     import pyogrio
     import pyproj
     import rasterio
     import shapely
 
+    try:
+        import fiona
+
+        of_fiona = fiona.__gdal_version__
+    except ImportError:
+        of_fiona = "not there; tile indexes are not read"
     transformer = pyproj.Transformer.from_crs(4326, 3857)
     return {
         "GDAL of rasterio": rasterio.__gdal_version__,
-        "GDAL of fiona": fiona.__gdal_version__,
+        "GDAL of fiona": of_fiona,
         "GDAL of pyogrio": ".".join(map(str, pyogrio.__gdal_version__)),
         "GEOS of shapely": shapely.geos_version_string,
         "PROJ of pyproj": pyproj.proj_version_str,

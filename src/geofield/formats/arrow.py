@@ -218,23 +218,29 @@ def write_layer(
     **options: Any,
 ) -> None:
     """Write a layer into a file through GDAL, in the dataset's CRS or WGS 84."""
+    crs = LONLAT if lonlat else dataset.crs
+    name = authority_name(crs)
+    write_file(
+        layer_batches(dataset, of, points=points, lonlat=lonlat, decimals=decimals),
+        path,
+        driver,
+        layer=of.name,
+        geometry_type=of.geometry,
+        crs=name if ":" in name else crs.to_wkt(),
+        **options,
+    )
+
+
+def write_file(
+    rows: pa.Table | pa.RecordBatchReader, path: Path, driver: str, **options: Any
+) -> None:
+    """Write Arrow, WKB in its column `geom`, into a file through GDAL."""
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    crs = LONLAT if lonlat else dataset.crs
-    name = authority_name(crs)
     try:
-        pyogrio.write_arrow(
-            layer_batches(dataset, of, points=points, lonlat=lonlat, decimals=decimals),
-            path,
-            layer=of.name,
-            driver=driver,
-            geometry_name="geom",
-            geometry_type=of.geometry,
-            crs=name if ":" in name else crs.to_wkt(),
-            **options,
-        )
+        pyogrio.write_arrow(rows, path, driver=driver, geometry_name="geom", **options)
     except (DataSourceError, DataLayerError) as error:
         raise FormatError(
             f"{path.name} could not be written: {error}.", hint=disk_hint(path)

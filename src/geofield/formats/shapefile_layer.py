@@ -1,9 +1,8 @@
 """One Shapefile: what it holds, whether it fits, and writing it.
 
 A Shapefile cuts names at ten characters, text at 254 bytes and files at 2 GB, mostly in
-silence. Everything that would be cut is an error here, before anything is written. fiona
-writes them: each column has the type and width that its schema says, whether or not there
-is a row to guess them from.
+silence. Everything that would be cut is an error here, before anything is written. Each column
+has the type that its schema says, whether or not there is a row to guess it from.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import shapely
-from shapely.geometry import mapping
 
 from geofield import schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.arrow import cut_lonlat, disk_hint, exact_geometry
+from geofield.formats.arrow import arrow_values, cut_lonlat, exact_geometry, write_file
 from geofield.model import Dataset
 from geofield.notes import warn
 
@@ -30,8 +29,7 @@ NAME_CHARACTERS = 10
 FILE_BYTES = 2**31 - 1
 #: Text columns have at least so many bytes, and terminals some room to write.
 _TEXT_WIDTH = 80
-#: Width of the other columns as GDAL itself declares them; a day has eight digits.
-_TYPES = {"int": "int:18", "float": "float:24.15", "date": "date"}
+#: Width of the other columns as GDAL declares them; a day has eight digits.
 _WIDTHS = {"int": 18, "float": 24, "date": 8}
 
 _SENTENCES = {"doubts"}
@@ -194,46 +192,24 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
 
     `day` (ISO 8601) is that of the last change.
     """
-    import fiona
-
-    place.parent.mkdir(parents=True, exist_ok=True)
-    types = {
-        name: _TYPES.get(kind) or f"str:{max(_TEXT_WIDTH, len(_longest(values).encode()))}"
+    columns = {
+        name: arrow_values(schema.Column(name, kind, "", ""), pd.Series(values, dtype=object))
         for name, (kind, values) in layer.columns.items()
     }
-    rows = zip(*(_plain(*column) for column in layer.columns.values()), strict=True)
+    columns["geom"] = pa.array(shapely.to_wkb(layer.shapes), pa.binary())
     file = place.with_name(place.name + ".shp")
-    try:
-        with fiona.open(
-            file,
-            "w",
-            driver="ESRI Shapefile",
-            crs=LONLAT.to_wkt("WKT1_GDAL"),
-            schema={"geometry": layer.geometry, "properties": types},
-            encoding="UTF-8",
-            DBF_DATE_LAST_UPDATE=day or "1970-01-01",
-        ) as target:
-            target.writerecords(
-                {"geometry": mapping(shape), "properties": dict(zip(types, row, strict=True))}
-                for shape, row in zip(layer.shapes, rows, strict=True)
-            )
-    except Exception as error:
-        # GDAL's own errors come through; the class they have in common is not public.
-        known = isinstance(error, (RuntimeError, ValueError))
-        if not known and not type(error).__module__.startswith("fiona"):
-            raise
-        raise FormatError(
-            f"{file.name} could not be written: {error}.", hint=disk_hint(file)
-        ) from error
+    write_file(
+        pa.table(columns),
+        file,
+        "ESRI Shapefile",
+        geometry_type=layer.geometry,
+        crs=LONLAT.to_wkt("WKT1_GDAL"),
+        encoding="UTF-8",
+        DBF_DATE_LAST_UPDATE=day or "1970-01-01",
+    )
     if day is None:
         _leave_undated(file.with_suffix(".dbf"))
     return [place.with_name(place.name + end) for end in (".shp", ".shx", ".dbf", ".prj", ".cpg")]
-
-
-def _plain(kind: schema.ColumnType, values: Sequence[Any]) -> list[Any]:
-    """Values as fiona takes them; missing ones (NaN included) as None."""
-    make = {"int": int, "float": float, "str": str}.get(kind, lambda value: str(value)[:10])
-    return [None if pd.isna(value) else make(value) for value in values]
 
 
 def _leave_undated(table: Path) -> None:

@@ -84,10 +84,15 @@ def holds_tiles(file: Path) -> bool:
 
 def pictures_of_index(index: Path) -> list[str]:
     """The pictures that a tile index (`gdaltindex`) lists; empty for other vector files."""
-    import fiona
-    from fiona.errors import FionaError
-
     check_vector(index)
+    try:
+        import fiona
+        from fiona.errors import FionaError
+    except ImportError as error:
+        raise ImageryError(
+            f"{display_name(index)} is read by fiona, which is not there for this Python.",
+            hint="Name the folder of the pictures, or make a VRT of them: gdalbuildvrt.",
+        ) from error
     try:
         with fiona.open(index, ignore_geometry=True) as table:
             names = {name.lower(): name for name in table.schema["properties"]}
