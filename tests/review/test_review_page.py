@@ -379,6 +379,20 @@ def test_edits_to_be_made_by_hand_are_named_until_they_were_read(
     assert page.text("message") == ""
 
 
+def test_what_is_told_together_is_all_in_german(page: Page, plan_path: Path) -> None:
+    """Two things at once were in English, or one of them was left out."""
+    with closing(sqlite3.connect(plan_path)) as file, file:
+        for (name,) in file.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'"):
+            file.execute(f'DROP TRIGGER "{name}"')
+        file.execute("DELETE FROM obstacles WHERE obstacle_no = 1")
+    plan_path.with_name("scene.tif").unlink()
+    page.run("localStorage.setItem('language', 'de')")
+    page.button("more")
+    page.button("reload")
+    page.wait(lambda: "hier sind die Spuren neu geplant" in page.text("message"))
+    assert "Das Bild ist nicht zu sehen" in page.text("message")
+
+
 def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:
     first = page.driver.current_window_handle
     address = page.run("return location.href")

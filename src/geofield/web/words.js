@@ -85,10 +85,15 @@ export function t(name, values = {}) {
   return text.replace(/\{(\w+)\}/g, (_, key) => values[key]);
 }
 
-// What the program says, where it is known in the page's language.
+// What the program says, where it is known in the page's language: as a whole, or its sentences.
 export function told(text) {
-  const found = SAID[language]?.find(([pattern]) => pattern.test(text));
-  return found ? text.replace(...found) : text;
+  const sentences = text.split(/(?<=\.) (?=[A-Z])/);
+  for (let n = sentences.length; n > 0; n--) {
+    const first = sentences.slice(0, n).join(" "), rest = sentences.slice(n).join(" ");
+    const found = SAID[language]?.find(([pattern]) => pattern.test(first));
+    if (found) return [first.replace(...found), ...(rest ? [told(rest)] : [])].join(" ");
+  }
+  return sentences.length < 2 ? text : `${sentences[0]} ${told(sentences.slice(1).join(" "))}`;
 }
 
 export const currentLanguage = () => language;
