@@ -22,8 +22,8 @@ from geofield.farm.engine import ONE_THREAD, Patience
 from geofield.farm.folder import sweep_chunk
 from geofield.farm.worker import ENDED, send
 
-#: What a worker is started with.
-PROGRAM: Sequence[str] = (sys.executable, "-m", "geofield.farm.worker")
+#: What a worker is started with; what libraries warn of is not why it died.
+PROGRAM: Sequence[str] = (sys.executable, "-W", "ignore", "-m", "geofield.farm.worker")
 #: Workers that end before they are ready: more of them are no accident.
 _FALSE_STARTS = 3
 _GONE = object()
