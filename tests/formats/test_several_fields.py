@@ -214,6 +214,13 @@ def test_validate_checks_each_of_several_fields(out, file, tmp_path):
     assert "North" not in done.stderr
 
 
+@pytest.mark.parametrize("file", ["geojson/segments.geojson", "shapefile/guidance.shp"])
+def test_a_layer_of_several_fields_alone_can_be_checked(out, file):
+    """Each field has a track 1: a traceback, then two rows of one key."""
+    done = geofield("validate", out / file)
+    assert (done.returncode, done.stderr) == (0, f"{out / file}: no fault found\n")
+
+
 def test_others_have_a_file_or_folder_of_their_own(out):
     for name in ("North", "North_2", "West"):
         for suffix in (".gpx", ".dxf"):
