@@ -84,7 +84,7 @@ def test_templates_put_numbers_where_they_belong(zoom: int, data: Any) -> None:
     tile = Tile(zoom, column, row)
 
     def url(template: str) -> str:
-        return XYZSource("x", template).request(tile).url
+        return XYZSource("x", template).address(tile)
 
     flipped = 2**zoom - 1 - row
     assert url("http://h/{z}/{x}/{y}.png") == f"http://h/{zoom}/{column}/{row}.png"
@@ -187,7 +187,7 @@ def google_server(server: TileServer) -> None:
 def test_google_needs_acknowledgement_and_is_never_cached(tmp_path: Path) -> None:
     with serving() as server:
         google_server(server)
-        source = GoogleStaticSource(key=KEY, address=server.address + "/staticmap")
+        source = GoogleStaticSource(key=KEY, service=server.address + "/staticmap")
         options = replace(FAST, cache_dir=tmp_path / "cache")
         where = Where(lat=LAT, lon=LON, zoom=18)
         with pytest.raises(TermsError, match="acknowledged=True"):
@@ -264,7 +264,7 @@ def test_keys_show_nowhere(
             shown.append(str(error))
             assert trouble
         assert any(quoted in path for path in server.paths)
-    shown += [repr(source), repr(source.request(Tile(1, 0, 0))), caplog.text, *capfd.readouterr()]
+    shown += [repr(source), caplog.text, *capfd.readouterr()]
     everything = "\n".join(shown).encode() + _everything_written(tmp_path)
     assert KEY.encode() not in everything
     assert quoted.encode() not in everything

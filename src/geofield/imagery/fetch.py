@@ -191,11 +191,10 @@ class TileFetcher:
             return decode_tile(held, "", size_px), None
         if self._client is None:
             raise NotThereError("not in the cache (offline)")
-        request = self.source.request(tile)
         return self._client.get(
-            request.url,
+            self.source.address(tile),
             lambda body, kind: (decode_tile(body, kind, size_px), body),
-            dict(request.headers),
+            dict(self.source.headers),
         )
 
     def _absent(self, why: Exception) -> None:

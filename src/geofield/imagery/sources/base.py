@@ -12,14 +12,6 @@ from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TilePyramid
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Request:
-    """What to ask a server for; its address may hold a key, so it is never shown."""
-
-    url: str
-    headers: tuple[tuple[str, str], ...] = ()
-
-
 @dataclass(frozen=True, slots=True)
 class TileSource:
     """Tiles from a server; each kind of server says what to ask it for."""
@@ -55,8 +47,8 @@ class TileSource:
         """The spellings of the key that may stand in an address."""
         return tuple({self.key, quote(self.key, safe=""), quote(self.key)} - {""})
 
-    def request(self, tile: Tile) -> Request:
-        """What to ask for."""
+    def address(self, tile: Tile) -> str:
+        """What to ask for; it may hold the key, so it is never shown."""
         raise NotImplementedError
 
 

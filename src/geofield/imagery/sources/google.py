@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from geofield.errors import ImageryError
 from geofield.grid import Grid
-from geofield.imagery.sources.base import Request, TileSource
+from geofield.imagery.sources.base import TileSource
 from geofield.imagery.sources.xyz import key_variable
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Block, Tile, TileLevel, TilePyramid
@@ -37,7 +37,7 @@ class GoogleStaticSource(TileSource):
     name: str = "google"
     terms: Terms = GOOGLE_TERMS
     rate_per_s: float | None = 10.0
-    address: str = "https://maps.googleapis.com/maps/api/staticmap"
+    service: str = "https://maps.googleapis.com/maps/api/staticmap"
     #: Latitude and longitude, degrees.
     centre: tuple[float, float] | None = None
     size_px: int = MAX_FRAME_PX
@@ -70,13 +70,13 @@ class GoogleStaticSource(TileSource):
         level = TileLevel(zoom, transform.a, transform.c, transform.f, 1, 1, (size_px, size_px))
         return replace(self, centre=(lat, lon), size_px=size_px), Block(grid.crs, level, 0, 0, 1, 1)
 
-    def request(self, tile: Tile) -> Request:
+    def address(self, tile: Tile) -> str:
         """The address of the frame at `centre`."""
         if self.centre is None:
             raise ImageryError("Google static maps has no tiles, only frames around a point.")
         lat, lon = self.centre
-        return Request(
-            f"{self.address}?center={lat:.6f},{lon:.6f}&zoom={tile.zoom}"
+        return (
+            f"{self.service}?center={lat:.6f},{lon:.6f}&zoom={tile.zoom}"
             f"&size={self.size_px}x{self.size_px}&scale=1&maptype=satellite&format=png"
             f"&key={quote(self.key, safe='')}"
         )

@@ -96,7 +96,7 @@ def find_source(
         own_values = {each: getattr(entry, each) for each in own}
         return XYZSource(name, entry.address, key=key, **own_values, **shared)
     if kind == "google":
-        return GoogleStaticSource(name, terms=entry.terms, key=key, address=entry.address, **shared)
+        return GoogleStaticSource(name, terms=entry.terms, key=key, service=entry.address, **shared)
     if kind == "mbtiles":
         return replace(MBTilesSource.open(entry.address, terms), date=entry.date)
     if kind in ("wmts", "wms"):

@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 
 from geofield.crs import WEB_MERCATOR, is_metric, metric_crs, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     Service,
     ServiceSource,
@@ -43,7 +42,7 @@ class WMSSource(ServiceSource):
         service = plain_address(self.service)
         return f"wms {service} {self.layer} {self.style} {self.crs_name} {self.form}"
 
-    def request(self, tile: Tile) -> Request:
+    def address(self, tile: Tile) -> str:
         """The address of a window."""
         level = self.pyramid.level(tile.zoom)
         width, height = level.tile_px
@@ -69,7 +68,7 @@ class WMSSource(ServiceSource):
         }
         if self.key and self.key_parameter:
             values[self.key_parameter] = self.key
-        return Request(with_query(self.service, **values), self.headers)
+        return with_query(self.service, **values)
 
 
 def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSSource:

@@ -11,7 +11,6 @@ from pyproj import CRS
 
 from geofield.crs import WEB_MERCATOR, is_metric, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.sources.base import Request
 from geofield.imagery.sources.ows import (
     Service,
     ServiceSource,
@@ -50,7 +49,7 @@ class WMTSSource(ServiceSource):
             address = address.replace(secret, "")
         return f"wmts {self.layer} {address}"
 
-    def request(self, tile: Tile) -> Request:
+    def address(self, tile: Tile) -> str:
         """The address of a tile."""
         level = self.pyramid.level(tile.zoom)
         address = (
@@ -61,7 +60,7 @@ class WMTSSource(ServiceSource):
         if self.key and self.key_parameter:
             address += f"{'&' if '?' in address else '?'}{self.key_parameter}="
             address += quote(self.key, safe="")
-        return Request(address, self.headers)
+        return address
 
 
 def open_wmts(service: Service) -> WMTSSource:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from urllib.parse import quote, urlsplit
 
 from geofield.errors import ImageryError
-from geofield.imagery.sources.base import Request, TileSource
+from geofield.imagery.sources.base import TileSource
 from geofield.imagery.tiling import Tile, TilePyramid
 
 _PLACE = re.compile(r"\{([^{}]*)\}")
@@ -69,7 +69,7 @@ class XYZSource(TileSource):
         """The template: it holds ``{key}``, not the key."""
         return f"xyz {self.template} {self.tile_px or ''}"
 
-    def request(self, tile: Tile) -> Request:
+    def address(self, tile: Tile) -> str:
         """The address of a tile."""
         values = {
             "z": str(tile.zoom),
@@ -91,7 +91,7 @@ class XYZSource(TileSource):
                 return choices[(tile.column + tile.row) % len(choices)].strip()
             return values[name]
 
-        return Request(_PLACE.sub(filled, self.template), self.headers)
+        return _PLACE.sub(filled, self.template)
 
 
 def quadkey(tile: Tile) -> str:
