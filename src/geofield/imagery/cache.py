@@ -186,21 +186,16 @@ class TileCache:
             return
 
         def shrink(db: sqlite3.Connection) -> bool:
-            (total,) = db.execute("SELECT COALESCE(SUM(bytes), 0) FROM fetched").fetchone()
-            if total <= limit:
-                return False
-            gone = []
-            for *place, size in db.execute(
-                "SELECT zoom_level, tile_column, tile_row, bytes FROM fetched ORDER BY time_s"
-            ):
-                gone.append(place)
-                total -= size
-                if total <= limit:
-                    break
+            gone = db.execute(
+                "SELECT zoom_level, tile_column, tile_row FROM (SELECT *, SUM(bytes) OVER "
+                "(ORDER BY time_s DESC ROWS UNBOUNDED PRECEDING) AS with_newer FROM fetched) "
+                "WHERE with_newer > ?",
+                (limit,),
+            ).fetchall()
             where = "WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?"
             db.executemany(f"DELETE FROM tiles {where}", gone)  # noqa: S608
             db.executemany(f"DELETE FROM fetched {where}", gone)  # noqa: S608
-            return True
+            return bool(gone)
 
         if self._guarded(shrink):
             self._guarded(lambda db: db.execute("PRAGMA incremental_vacuum").fetchall())

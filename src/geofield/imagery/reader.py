@@ -206,20 +206,16 @@ class SceneReader:
                 raise ImageryError(
                     f"A window of {size_m} m shows nothing.", hint="Give a size above 0."
                 )
-            size_px = max(1, round(size_m / self._resolution_m(x, y)))
+            size_px = max(1, round(size_m / self.grid.resolution_at(x, y)))
         elif max(self.grid.shape) <= MAX_SIDE_PX:
             return 0, 0, self.grid.width_px, self.grid.height_px
         else:
-            size_px = max(MAX_SIDE_PX, round(least_m / self._resolution_m(x, y)))
+            size_px = max(MAX_SIDE_PX, round(least_m / self.grid.resolution_at(x, y)))
         column, row = round(x - size_px / 2), round(y - size_px / 2)
         c0, r0 = max(column, 0), max(row, 0)
         c1 = min(column + size_px, self.grid.width_px)
         r1 = min(row + size_px, self.grid.height_px)
         return c0, r0, max(c1 - c0, 1), max(r1 - r0, 1)
-
-    def _resolution_m(self, x: float, y: float) -> float:
-        """Ground metres of a pixel at a place, pixel coordinates."""
-        return self.grid.crop(int(x), int(y), 1, 1).ground_resolution_m
 
     # -- pixels ----------------------------------------------------------------------------
 

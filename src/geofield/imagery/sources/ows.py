@@ -104,23 +104,15 @@ def read_document(
             f"{plain_address(address)} does not give XML: {error}.",
             hint="Give the address of a WMS or WMTS capabilities document.",
         ) from None
-    if local(root) in ("ExceptionReport", "ServiceExceptionReport", "ServiceException"):
+    if root.tag.endswith(("ExceptionReport", "ServiceException")):
         text = " ".join("".join(root.itertext()).split())
         raise ImageryError(f"{plain_address(address)} answers: {text[:300]}.")
     return root
 
 
-def local(element: ET.Element) -> str:
-    """A tag without its namespace."""
-    return element.tag.rpartition("}")[2]
-
-
 def children(element: ET.Element, *names: str) -> list[ET.Element]:
     """The elements along a path of local names."""
-    found = [element]
-    for name in names:
-        found = [child for parent in found for child in parent if local(child) == name]
-    return found
+    return element.findall("/".join(f"{{*}}{name}" for name in names))
 
 
 def text(element: ET.Element, *names: str) -> str:
