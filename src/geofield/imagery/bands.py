@@ -23,27 +23,15 @@ _MASK_SHARE = 0.9
 #: What an opaque pixel of a mask holds, whatever the type of the bands beside it.
 OPAQUE = (1, 255, 32767, 65535)
 
-_WORDS = {
-    "red": "red",
-    "r": "red",
-    "green": "green",
-    "g": "green",
-    "blue": "blue",
-    "b": "blue",
-    "nir": "nir",
-    "nir1": "nir",
-    "n": "nir",
-    "near_infrared": "nir",
-    "nearinfrared": "nir",
-    "infrared": "nir",
-    "near_ir": "nir",
-    "alpha": "alpha",
-    "mask": "alpha",
-    "gray": "grey",
-    "grey": "grey",
-    "pan": "grey",
-    "panchromatic": "grey",
+_SPELLINGS = {
+    "red": "red r",
+    "green": "green g",
+    "blue": "blue b",
+    "nir": "nir nir1 n near_infrared nearinfrared infrared near_ir",
+    "alpha": "alpha mask",
+    "grey": "gray grey pan panchromatic",
 }
+_WORDS = {word: role for role, words in _SPELLINGS.items() for word in words.split()}
 #: What the values of a band without a name look like; flat is one value everywhere, as of no mask,
 #: empty is 0 everywhere: as a mask it hides the whole picture, which the file has to say itself.
 Look = Literal["picture", "mask", "flat", "empty"]

@@ -22,7 +22,7 @@ from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
-from geofield.imagery.placing import REACH_M, WarpOrigin
+from geofield.imagery.placing import REACH_M, WarpOrigin, border_px
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import swapped
 from geofield.notes import warn
@@ -296,33 +296,26 @@ def _common_grid(
     if point is not None:
         x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
-    near = [x0 - reach, y0 - reach], [x0 + reach, y0 + reach]
-    boxes: list[tuple[Any, Any] | None] = []
-    for reader in readers:
-        px = _border_px(reader, base)
-        low, high = np.maximum(px.min(axis=1), near[0]), np.minimum(px.max(axis=1), near[1])
-        boxes.append((low, high) if np.isfinite(px).all() and (high > low).all() else None)
-    there = [box for box in boxes if box is not None]
-    first = np.floor(np.min([low for low, _ in there], axis=0) + _SAME_PX).astype(int)
-    last = np.ceil(np.max([high for _, high in there], axis=0) - _SAME_PX).astype(int)
-    grid = base.crop(*map(int, first), *map(int, last - first))
-    places: list[_Box | None] = []
-    for box in boxes:
-        if box is None:
-            places.append(None)
-            continue
-        start = np.maximum(np.floor(box[0]).astype(int) - first - 1, 0)
-        stop = np.minimum(np.ceil(box[1]).astype(int) - first + 1, last - first)
-        places.append((int(start[0]), int(start[1]), int(stop[0]), int(stop[1])))
+    px = np.array([_border_px(reader, base) for reader in readers])
+    low = np.maximum(px.min(axis=2), (x0 - reach, y0 - reach))
+    high = np.minimum(px.max(axis=2), (x0 + reach, y0 + reach))
+    there = np.isfinite(px).all(axis=(1, 2)) & (high > low).all(axis=1)
+    first = np.floor(low[there].min(axis=0) + _SAME_PX)
+    size = np.ceil(high[there].max(axis=0) - _SAME_PX) - first
+    grid = base.crop(*map(int, first), *map(int, size))
+    start = np.maximum(np.floor(low) - first - 1, 0)
+    stop = np.minimum(np.ceil(high) - first + 1, size)
+    places: list[_Box | None] = [
+        (int(left), int(top), int(right), int(bottom)) if near else None
+        for near, (left, top), (right, bottom) in zip(there, start, stop, strict=True)
+    ]
     return grid, places
 
 
 def _border_px(reader: SceneReader, base: Grid) -> NDArray[np.float64]:
     """Where the border of a picture lies on another one's grid: columns and rows."""
-    edge, zero, one = np.linspace(0.0, 1.0, 9), np.zeros(9), np.ones(9)
-    xs = np.concatenate([edge, one, edge, zero]) * reader.grid.width_px
-    ys = np.concatenate([zero, edge, one, edge]) * reader.grid.height_px
-    return np.array(base.from_crs(*reader.grid.to_native(xs, ys), reader.grid.crs))
+    border = reader.grid.to_native(*border_px(reader.grid, 9))
+    return np.array(base.from_crs(*border, reader.grid.crs))
 
 
 def _around(reader: SceneReader, grid: Grid) -> _Box | None:

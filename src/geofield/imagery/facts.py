@@ -54,11 +54,18 @@ def picture_facts(path: str | Path) -> dict[str, list[str]]:
 
 def _sample(dataset: Any, band: int) -> NDArray[Any]:
     """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
-    width, height = min(_SAMPLE_PX, dataset.width), min(_SAMPLE_PX, dataset.height)
-    columns = [round((dataset.width - width) * share) for share in (0.0, 0.5, 1.0)]
-    rows = [round((dataset.height - height) * share) for share in (0.0, 0.5, 1.0)]
-    windows = [Window(column, row, width, height) for row in rows for column in columns]
+    windows = spread(dataset.shape, _SAMPLE_PX, 3)
     return np.concatenate([dataset.read(band, window=each).ravel() for each in windows])
+
+
+def spread(shape: tuple[int, int], side_px: int, each_way: int) -> list[Window]:
+    """Square windows spread evenly over a picture of rows and columns, `each_way` at the most."""
+    sides = [min(side, side_px) for side in shape]
+    rows, columns = (
+        sorted({round((side - window) * n / (each_way - 1)) for n in range(each_way)})
+        for side, window in zip(shape, sides, strict=True)
+    )
+    return [Window(column, row, sides[1], sides[0]) for row in rows for column in columns]
 
 
 def top_of(dataset: Any, alpha: int | None) -> float | None:

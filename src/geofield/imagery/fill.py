@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from geofield.imagery.facts import opaque
+from geofield.imagery.facts import opaque, spread
 
 #: What programs fill with, besides the ends of the file's type.
 _USUAL = (0, -9999, -10000, -32767, -32768, -99999)
@@ -100,11 +100,7 @@ def _looked_at(
     overview = bool(dataset.overviews(1))
     most = _OVERVIEW_PX if overview else _WINDOW_PX
     rows, columns = min(size[0], most), min(size[1], most)
-    windows = [
-        Window(column, row, columns, rows)
-        for row in _starts(size[0], rows)
-        for column in _starts(size[1], columns)
-    ]
+    windows = spread(size, most, _WINDOWS)
     if overview:
         windows, size = [Window(0, 0, size[1], size[0])], (rows, columns)
 
@@ -119,11 +115,6 @@ def _looked_at(
         shown = opaque(read([alpha])[0], top)
         values, at_frame = values[:, shown], at_frame[shown]
     return values, at_frame
-
-
-def _starts(side_px: int, window_px: int) -> list[int]:
-    """The first rows, or columns, of windows spread evenly over a side; each once."""
-    return sorted({round((side_px - window_px) * n / (_WINDOWS - 1)) for n in range(_WINDOWS)})
 
 
 def _frame(window: Window, shape: tuple[int, int], whole: tuple[int, int]) -> NDArray[np.bool_]:

@@ -95,10 +95,7 @@ def stage_to_cog(staged: Path, target: Path, tags: Mapping[str, str]) -> None:
         with rasterio.open(staged, "r+") as file:
             file.update_tags(**tags)
             # Seven times cheaper here, from plain pixels, than in the COG driver.
-            file.build_overviews(_overviews(max(file.shape)), Resampling.average)
+            # Until the coarsest one fits one block.
+            factors = [2**n for n in range(1, 32) if max(file.shape) > 256 * 2**n]
+            file.build_overviews(factors, Resampling.average)
         write_cog(str(staged), target, NUM_THREADS="ALL_CPUS")
-
-
-def _overviews(side_px: int) -> list[int]:
-    """Factors of two until the coarsest overview fits one block."""
-    return [2**n for n in range(1, 32) if side_px > 256 * 2**n]

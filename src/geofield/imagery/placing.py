@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
+from numpy.typing import NDArray
 from pyproj import CRS
 from rasterio.transform import from_gcps
 from rasterio.vrt import WarpedVRT
@@ -142,6 +143,13 @@ def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
     return max(length_x, length_y) / min(length_x, length_y), angle
 
 
+def border_px(grid: Grid, per_side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Columns and rows of places along the border of a grid, corners included."""
+    edge, zero, one = np.linspace(0.0, 1.0, per_side), np.zeros(per_side), np.ones(per_side)
+    x, y = np.concatenate([edge, one, edge, zero]), np.concatenate([zero, edge, one, edge])
+    return x * grid.width_px, y * grid.height_px
+
+
 def _square_grid(native: Grid, point: LonLat | None) -> Grid:
     """Square metres over a picture: in the metric CRS of the point, else of its centre."""
     here = native.centre_lonlat if point is None else point
@@ -156,11 +164,7 @@ def _square_grid(native: Grid, point: LonLat | None) -> Grid:
     aspect, _ = pixel_shape(local)
     # The finer of the two sides, so that no detail is lost.
     resolution = float(f"{local.ground_resolution_m / np.sqrt(aspect):.4g}")
-    edge = np.linspace(0.0, 1.0, 33)
-    zero, one = np.zeros_like(edge), np.ones_like(edge)
-    border_x = np.concatenate([edge, one, edge, zero]) * native.width_px
-    border_y = np.concatenate([zero, edge, one, edge]) * native.height_px
-    xs, ys = native.to_crs(border_x, border_y, target)
+    xs, ys = native.to_crs(*border_px(native, 33), target)
     cx, cy = transformer(LONLAT, target).transform(*here)
     finite = np.isfinite(xs) & np.isfinite(ys)
     xs = np.clip(np.append(xs[finite], cx), cx - REACH_M, cx + REACH_M)
