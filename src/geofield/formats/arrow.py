@@ -56,6 +56,23 @@ def gdal_config(**options: str) -> Iterator[None]:
             pyogrio.set_gdal_config_options(before)
 
 
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Writing a file with GDAL, which may refuse it.
+
+    Raises
+    ------
+    FormatError
+        With the driver's words.
+    """
+    try:
+        yield
+    except RuntimeError as error:  # which all errors of pyogrio are
+        raise FormatError(
+            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
+        ) from error
+
+
 def disk_hint(path: Path) -> str:
     """What to tell beside a driver's refusal: the disk only where it is nearly full."""
     free = shutil.disk_usage(path.parent).free
@@ -236,12 +253,7 @@ def write_file(
 ) -> None:
     """Write Arrow, WKB in its column `geom`, into a file through GDAL."""
     import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
+    with writing(path):
         pyogrio.write_arrow(rows, path, driver=driver, geometry_name="geom", **options)
-    except (DataSourceError, DataLayerError) as error:
-        raise FormatError(
-            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
-        ) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,8 +44,11 @@ def driven_through(dataset: Dataset, layer: str = "segments") -> list[tuple[int,
     inside[thin] = shapely.buffer(shapes[thin], -_THIN_HAIR_M)
     tree = shapely.STRtree(lines.geometry.to_numpy())
     hit, where = tree.query(inside, predicate="intersects")
-    numbers = kept["obstacle_no"].tolist()
-    return [(int(row), _obstacle(numbers[at])) for at, row in zip(hit, where, strict=True)]
+    names = [
+        "an obstacle that was drawn" if pd.isna(number) else f"obstacle {number}"
+        for number in kept["obstacle_no"].tolist()
+    ]
+    return [(int(row), names[at]) for at, row in zip(hit, where, strict=True)]
 
 
 def leaving(dataset: Dataset, layer: str = "segments") -> NDArray[np.int64]:
@@ -118,7 +120,3 @@ def _lines(dataset: Dataset, layer: str, rows: Sequence[int]) -> str:
     return (
         f"{several if many else one} {some_of([*map(str, numbers)], _MOST)} run{'s' * (not many)}"
     )
-
-
-def _obstacle(number: Any) -> str:
-    return "an obstacle that was drawn" if pd.isna(number) else f"obstacle {number}"

@@ -12,7 +12,7 @@ from typing import Any
 
 from geofield import schema
 from geofield.errors import FormatError
-from geofield.formats.arrow import disk_hint, exact_geometry, gdal_config
+from geofield.formats.arrow import disk_hint, exact_geometry, gdal_config, writing
 from geofield.formats.terminal import avoided
 from geofield.model import Dataset
 
@@ -29,7 +29,6 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     """Write ``{stem}.dxf`` and ``{stem}.prj``."""
     import geopandas as gpd
     import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
     names: list[str] = []
     lines: list[Any] = []
@@ -42,14 +41,9 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     # Polygons are written ring by ring, each with the flag that says it is closed.
     # Arrow would create the column `Layer`, which the driver has already.
     frame = gpd.GeoDataFrame({"Layer": names}, geometry=lines, crs=dataset.crs)
-    try:
-        with gdal_config(DXF_WRITE_HATCH="NO"):
-            pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
+    with writing(path), gdal_config(DXF_WRITE_HATCH="NO"):
+        pyogrio.write_dataframe(frame, path, driver="DXF", layer="entities", use_arrow=False)
         written = pyogrio.read_info(path, force_feature_count=True)["features"]
-    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
-        raise FormatError(
-            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
-        ) from error
     if written < len(frame):  # on a full disk, of which GDAL does not tell
         raise FormatError(f"{path.name} could not be written whole.", hint=disk_hint(path))
     beside = path.with_suffix(".prj")

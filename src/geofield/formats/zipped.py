@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 import zipfile
 import zlib
@@ -76,10 +75,8 @@ def unpacked(path: Path) -> Iterator[Path]:
                     raise FormatError(f"{path}: the entry {entry.filename!r} leads out of it.")
                 if parts[0] == "__MACOSX":
                     continue
-                target = folder.joinpath(*parts)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with archive.open(entry) as source, target.open("wb") as out:
-                    shutil.copyfileobj(source, out)
+                entry.filename = "/".join(parts)
+                archive.extract(entry, folder)
             yield _innermost(folder)
     # OSError: a place in the archive that is none, as a bad entry names it.
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError) as error:

@@ -8,8 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from geofield import schema, theme
 from geofield.crs import grid_north_deg, ground_scale_of
 from geofield.errors import FormatError, GeofieldError
@@ -48,7 +46,10 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
 
         _, ax = plt.subplots(figsize=(8, 8), layout="constrained")
     if scene is not None:
-        _draw_picture(ax, scene, dataset)
+        from geofield.imagery.display import shown_pixels
+
+        pixels, (left, bottom, right, top) = shown_pixels(scene, dataset.crs, 2000)
+        ax.imshow(pixels, extent=(left, right, bottom, top), zorder=1)
     casing = [patheffects.withStroke(linewidth=3, foreground="#00000090")]
     marks: list[Line2D] = []
 
@@ -83,13 +84,6 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
     ax.ticklabel_format(useOffset=False, style="plain")
     ax.legend(handles=marks, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return ax
-
-
-def _draw_picture(ax: Axes, scene: Scene, dataset: Dataset) -> None:
-    from geofield.imagery.display import shown_pixels
-
-    pixels, (left, bottom, right, top) = shown_pixels(scene, dataset.crs, 2000)
-    ax.imshow(np.asarray(pixels), extent=(left, right, bottom, top), zorder=1)
 
 
 def write_svg(

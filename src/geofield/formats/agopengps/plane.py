@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
@@ -69,8 +70,4 @@ def ring_headings(ring: FloatArray) -> FloatArray:
 
 def densified(ring: FloatArray, step: float) -> FloatArray:
     """An open ring with vertices at most `step` metres apart; its corners stay."""
-    after = np.roll(ring, -1, axis=0)
-    pieces = np.maximum(np.ceil(np.hypot(*(after - ring).T) / step - 1e-9), 1).astype(int)
-    share = np.concatenate([np.arange(n) / n for n in pieces])[:, None]
-    start, end = np.repeat(ring, pieces, axis=0), np.repeat(after, pieces, axis=0)
-    return np.asarray(start + share * (end - start))
+    return shapely.get_coordinates(shapely.segmentize(shapely.LinearRing(ring), step))[:-1]
