@@ -115,15 +115,19 @@ def children(element: ET.Element, *names: str) -> list[ET.Element]:
     return element.findall("/".join(f"{{*}}{name}" for name in names))
 
 
+def texts(element: ET.Element, *names: str) -> list[str]:
+    """All texts at a path of local names."""
+    return [(each.text or "").strip() for each in children(element, *names)]
+
+
 def text(element: ET.Element, *names: str) -> str:
-    """The text at a path of local names, or ''."""
-    found = children(element, *names)
-    return (found[0].text or "").strip() if found else ""
+    """The first text at a path of local names, or ''."""
+    return next(iter(texts(element, *names)), "")
 
 
-def link(element: ET.Element) -> str:
-    """The xlink:href of an element."""
-    return element.get(_XLINK, "")
+def link(element: ET.Element, *names: str) -> str:
+    """The xlink:href of the first element along a path of local names, or ''."""
+    return next((each.get(_XLINK, "") for each in children(element, *names)), "")
 
 
 def with_query(address: str, **values: str) -> str:

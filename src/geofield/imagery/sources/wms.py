@@ -7,18 +7,7 @@ from xml.etree import ElementTree as ET
 
 from geofield.crs import WEB_MERCATOR, is_metric, metric_crs, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.sources.ows import (
-    Service,
-    ServiceSource,
-    children,
-    choose_layer,
-    link,
-    parse_ogc_crs,
-    plain_address,
-    query_value,
-    text,
-    with_query,
-)
+from geofield.imagery.sources import ows
 from geofield.imagery.tiling import Tile, TilePyramid
 
 _FORMATS = ("image/png", "image/jpeg", "image/jpg", "image/webp", "image/png8")
@@ -27,7 +16,7 @@ _TILE_PX = 512
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WMSSource(ServiceSource):
+class WMSSource(ows.ServiceSource):
     """One layer of a WMS in one CRS."""
 
     service: str = field(repr=False)
@@ -39,7 +28,7 @@ class WMSSource(ServiceSource):
     @property
     def identity(self) -> str:
         """Service, layer, style, CRS and format, without any key."""
-        service = plain_address(self.service)
+        service = ows.plain_address(self.service)
         return f"wms {service} {self.layer} {self.style} {self.crs_name} {self.form}"
 
     def address(self, tile: Tile) -> str:
@@ -68,10 +57,10 @@ class WMSSource(ServiceSource):
         }
         if self.key and self.key_parameter:
             values[self.key_parameter] = self.key
-        return with_query(self.service, **values)
+        return ows.with_query(self.service, **values)
 
 
-def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSSource:
+def open_wms(service: ows.Service, point: tuple[float, float] | None = None) -> WMSSource:
     """A WMS source from the address or path of its capabilities.
 
     Web Mercator is asked for where the service knows it, so that the windows are those of
@@ -79,33 +68,30 @@ def open_wms(service: Service, point: tuple[float, float] | None = None) -> WMSS
     metric CRS it names.
     """
     address = service.address
-    version = query_value(address, "version") or "1.3.0"
+    version = ows.query_value(address, "version") or "1.3.0"
     root = service.capabilities(SERVICE="WMS", REQUEST="GetCapabilities", VERSION=version)
-    named = _layers(children(root, "Capability", "Layer"), [])
-    wanted = service.layer or query_value(address, "layers")
-    chosen = choose_layer(sorted(named), wanted, address)
+    named = _layers(ows.children(root, "Capability", "Layer"), [])
+    wanted = service.layer or ows.query_value(address, "layers")
+    chosen = ows.choose_layer(sorted(named), wanted, address)
     names, element = named[chosen]
-    credit = text(element, "Attribution", "Title") or text(
+    credit = ows.text(element, "Attribution", "Title") or ows.text(
         root, "Service", "ContactInformation", "ContactPersonPrimary", "ContactOrganization"
     )
     crs_name, pyramid = _pyramid(names, point, address)
-    get_map = children(root, "Capability", "Request", "GetMap")
-    target, offered = address, []
-    if get_map:
-        links = children(get_map[0], "DCPType", "HTTP", "Get", "OnlineResource")
-        target = (link(links[0]) if links else "") or address
-        offered = [(each.text or "").strip() for each in children(get_map[0], "Format")]
+    get_map = ("Capability", "Request", "GetMap")
+    target = ows.link(root, *get_map, "DCPType", "HTTP", "Get", "OnlineResource") or address
+    offered = ows.texts(root, *get_map, "Format")
     form = next((f for f in _FORMATS if f in offered), "image/png")
     service.require(target)
     return WMSSource(
         name=chosen,
-        service=with_query(target, SERVICE="WMS"),
+        service=ows.with_query(target, SERVICE="WMS"),
         layer=chosen,
         pyramid=pyramid,
-        terms=service.terms_by(credit, text(root, "Service", "AccessConstraints")),
+        terms=service.terms_by(credit, ows.text(root, "Service", "AccessConstraints")),
         version=root.get("version", "1.3.0"),
         crs_name=crs_name,
-        style=query_value(address, "styles"),
+        style=ows.query_value(address, "styles"),
         form=form,
     )
 
@@ -116,10 +102,10 @@ def _layers(
     """The named layers with their CRS names; children inherit their parents' CRS."""
     found: dict[str, tuple[list[str], ET.Element]] = {}
     for element in elements:
-        systems = (*children(element, "CRS"), *children(element, "SRS"))
-        names = [*inherited, *(part for each in systems for part in (each.text or "").split())]
-        name = text(element, "Name")
-        inner = _layers(children(element, "Layer"), names)
+        systems = (*ows.texts(element, "CRS"), *ows.texts(element, "SRS"))
+        names = [*inherited, *(part for each in systems for part in each.split())]
+        name = ows.text(element, "Name")
+        inner = _layers(ows.children(element, "Layer"), names)
         if name and not inner:
             found[name] = (names, element)
         found |= inner
@@ -129,7 +115,7 @@ def _layers(
 def _pyramid(
     names: list[str], point: tuple[float, float] | None, address: str
 ) -> tuple[str, TilePyramid]:
-    known = [(name, crs) for name in names if (crs := parse_ogc_crs(name)) is not None]
+    known = [(name, crs) for name in names if (crs := ows.parse_ogc_crs(name)) is not None]
     for name, crs in known:
         if crs == WEB_MERCATOR:
             return name, TilePyramid.web_mercator(1, 22, _TILE_PX, shift=1)
@@ -140,6 +126,6 @@ def _pyramid(
         name, crs = metric[0]
         return name, TilePyramid.metric(crs, _TILE_PX)
     raise ImageryError(
-        f"{plain_address(address)} offers the layer in no metric coordinate reference system.",
+        f"{ows.plain_address(address)} offers the layer in no metric coordinate reference system.",
         hint="Give another service, or a GeoTIFF made from this one with QGIS.",
     )

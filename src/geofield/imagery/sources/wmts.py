@@ -11,18 +11,7 @@ from pyproj import CRS
 
 from geofield.crs import WEB_MERCATOR, is_metric, northing_first
 from geofield.errors import ImageryError
-from geofield.imagery.sources.ows import (
-    Service,
-    ServiceSource,
-    children,
-    choose_layer,
-    link,
-    parse_ogc_crs,
-    plain_address,
-    query_value,
-    text,
-    with_query,
-)
+from geofield.imagery.sources import ows
 from geofield.imagery.tiling import Tile, TileLevel, TilePyramid
 
 #: Metres per pixel at scale 1:1 in the standard (0.28 mm pixels).
@@ -36,7 +25,7 @@ _FORMATS = ("image/png", "image/webp", "image/jpeg", "image/jpg", "image/png8")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WMTSSource(ServiceSource):
+class WMTSSource(ows.ServiceSource):
     """One layer of a WMTS in one tile matrix set."""
 
     template: str = field(repr=False)
@@ -63,18 +52,18 @@ class WMTSSource(ServiceSource):
         return address
 
 
-def open_wmts(service: Service) -> WMTSSource:
+def open_wmts(service: ows.Service) -> WMTSSource:
     """A WMTS source from the address or path of its capabilities."""
     address = service.address
     whole = address.partition("?")[0].lower().endswith(".xml")
     query = {} if whole else {"SERVICE": "WMTS", "REQUEST": "GetCapabilities"}
     root = service.capabilities(**query)
-    layers = {text(each, "Identifier"): each for each in children(root, "Contents", "Layer")}
-    wanted = service.layer or query_value(address, "layer")
-    chosen = choose_layer(sorted(layers), wanted, address)
+    layers = _by_identifier(root, "Contents", "Layer")
+    wanted = service.layer or ows.query_value(address, "layer")
+    chosen = ows.choose_layer(sorted(layers), wanted, address)
     element = layers[chosen]
-    sets = {text(each, "Identifier"): each for each in children(root, "Contents", "TileMatrixSet")}
-    links = [text(each, "TileMatrixSet") for each in children(element, "TileMatrixSetLink")]
+    sets = _by_identifier(root, "Contents", "TileMatrixSet")
+    links = ows.texts(element, "TileMatrixSetLink", "TileMatrixSet")
     set_id, pyramid = _best_set([(i, sets[i]) for i in links if i in sets], address)
     template = _template(root, element, set_id, address)
     service.require(template)
@@ -84,17 +73,22 @@ def open_wmts(service: Service) -> WMTSSource:
         pyramid=pyramid,
         template=template,
         terms=service.terms_by(
-            text(root, "ServiceProvider", "ProviderName"),
-            text(root, "ServiceIdentification", "AccessConstraints"),
+            ows.text(root, "ServiceProvider", "ProviderName"),
+            ows.text(root, "ServiceIdentification", "AccessConstraints"),
         ),
     )
+
+
+def _by_identifier(element: ET.Element, *names: str) -> dict[str, ET.Element]:
+    """The elements along a path of local names, by what they are called."""
+    return {ows.text(each, "Identifier"): each for each in ows.children(element, *names)}
 
 
 def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[str, TilePyramid]:
     """Web Mercator first (every cache and viewer knows it), then a metric CRS, then degrees."""
     found = []
     for identifier, element in candidates:
-        crs = parse_ogc_crs(text(element, "SupportedCRS"))
+        crs = ows.parse_ogc_crs(ows.text(element, "SupportedCRS"))
         if crs is None:
             continue
         levels = _levels(element, crs)
@@ -103,8 +97,8 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
             found.append((rank, -len(levels), identifier, TilePyramid(crs, levels)))
     if not found:
         raise ImageryError(
-            f"{plain_address(address)} offers the layer in no known coordinate reference system, "
-            "or does not say how it is cut into tiles."
+            f"{ows.plain_address(address)} offers the layer in no known coordinate reference "
+            "system, or does not say how it is cut into tiles."
         )
     _, _, identifier, pyramid = min(found, key=lambda each: each[:3])
     return identifier, pyramid
@@ -113,8 +107,8 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
 def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
     unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
     # The corner follows the authority's axis order when the CRS is named as a URN or an address.
-    swapped = northing_first(crs) and not text(element, "SupportedCRS").startswith("EPSG:")
-    read = (_matrix(each, unit_m, swapped, crs) for each in children(element, "TileMatrix"))
+    swapped = northing_first(crs) and not ows.text(element, "SupportedCRS").startswith("EPSG:")
+    read = (_matrix(each, unit_m, swapped, crs) for each in ows.children(element, "TileMatrix"))
     sound = sorted(filter(None, read), key=lambda each: -each.resolution)
     levels = [replace(level, zoom=zoom) for zoom, level in enumerate(sound)]
     return tuple(_in_web_mercator(levels) if crs == WEB_MERCATOR else levels)
@@ -123,10 +117,10 @@ def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
 def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> TileLevel | None:
     """A level, its zoom still to be counted; None of one that is not written as it should be."""
     try:
-        resolution = float(text(element, "ScaleDenominator")) * _PIXEL_M / unit_m
-        left, top = (float(part) for part in text(element, "TopLeftCorner").split())
+        resolution = float(ows.text(element, "ScaleDenominator")) * _PIXEL_M / unit_m
+        left, top = (float(part) for part in ows.text(element, "TopLeftCorner").split())
         names = ("MatrixWidth", "MatrixHeight", "TileWidth", "TileHeight")
-        columns, rows, width, height = (int(text(element, name)) for name in names)
+        columns, rows, width, height = (int(ows.text(element, name)) for name in names)
     except ValueError:
         return None
     if not (1 / _FAR < resolution < _FAR and abs(left) < _FAR and abs(top) < _FAR):
@@ -136,7 +130,7 @@ def _matrix(element: ET.Element, unit_m: float, swapped: bool, crs: CRS) -> Tile
     # Some write longitude first all the same: no latitude is beyond 90 degrees.
     if swapped and not (crs.is_geographic and abs(left) > 90):
         left, top = top, left
-    size, identifier = (width, height), text(element, "Identifier")
+    size, identifier = (width, height), ows.text(element, "Identifier")
     return TileLevel(0, resolution, left, top, columns, rows, size, identifier)
 
 
@@ -165,39 +159,37 @@ def _in_web_mercator(levels: list[TileLevel]) -> list[TileLevel]:
 
 
 def _template(root: ET.Element, layer: ET.Element, set_id: str, address: str) -> str:
-    styles = sorted(children(layer, "Style"), key=lambda each: each.get("isDefault") != "true")
-    style = text(styles[0], "Identifier") if styles else ""
+    styles = sorted(ows.children(layer, "Style"), key=lambda each: each.get("isDefault") != "true")
+    style = ows.text(styles[0], "Identifier") if styles else ""
     dimensions = {
-        text(each, "Identifier"): text(each, "Default") for each in children(layer, "Dimension")
+        name: ows.text(each, "Default") for name, each in _by_identifier(layer, "Dimension").items()
     }
-    offered = [(each.text or "").strip() for each in children(layer, "Format")]
+    offered = ows.texts(layer, "Format")
     form = next((f for f in _FORMATS if f in offered), offered[0] if offered else "image/png")
     resources = [
         each
-        for each in children(layer, "ResourceURL")
+        for each in ows.children(layer, "ResourceURL")
         if each.get("resourceType", "tile") == "tile"
     ]
     if resources:
         best = next((each for each in resources if each.get("format") == form), resources[0])
         template = best.get("template", "")
-        fixed = {"style": style, "tilematrixset": set_id, "layer": text(layer, "Identifier")}
+        fixed = {"style": style, "tilematrixset": set_id, "layer": ows.text(layer, "Identifier")}
         fixed |= {name.lower(): value for name, value in dimensions.items()}
         return re.sub(r"\{(\w+)\}", lambda m: fixed.get(m.group(1).lower(), m.group(0)), template)
     service = address.partition("?")[0]
-    for operation in children(root, "OperationsMetadata", "Operation"):
+    for operation in ows.children(root, "OperationsMetadata", "Operation"):
         if operation.get("name") == "GetTile":
-            gets = children(operation, "DCP", "HTTP", "Get")
-            if gets and link(gets[0]):
-                service = link(gets[0])
+            service = ows.link(operation, "DCP", "HTTP", "Get") or service
     values = {
         "SERVICE": "WMTS",
         "REQUEST": "GetTile",
         "VERSION": "1.0.0",
-        "LAYER": text(layer, "Identifier"),
+        "LAYER": ows.text(layer, "Identifier"),
         "STYLE": style,
         "FORMAT": form,
         "TILEMATRIXSET": set_id,
     }
     values |= {name.upper(): value for name, value in dimensions.items()}
-    base = with_query(service, **values)
+    base = ows.with_query(service, **values)
     return base + "&TILEMATRIX={TileMatrix}&TILEROW={TileRow}&TILECOL={TileCol}"
