@@ -119,17 +119,13 @@ def _is_whole(obstacles: gpd.GeoDataFrame, dataset: Dataset) -> bool:
 
 def _named(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:
     """The outline with a name and an id, where a person emptied them."""
-    for name in ("name", "field_id"):
-        missing = field[name].isna()
-        if missing.any():
-            shapes = shapely.get_geometry(field.geometry[missing].to_numpy(), 0)
-            texts = field[name].to_numpy(dtype=object, copy=True)
-            texts[missing] = [
-                dataset.name if name == "name" else Field(shape, dataset.crs).field_id
-                for shape in shapes
-            ]
-            field = field.assign(**{name: texts})
-    return field
+    texts = field[["name", "field_id"]]
+    if not texts.isna().any(axis=None):
+        return field
+    shapes = shapely.get_geometry(field.geometry.to_numpy(), 0)
+    ids = [Field(shape, dataset.crs).field_id for shape in shapes]
+    known = pd.DataFrame({"name": dataset.name, "field_id": ids}, index=field.index)
+    return field.assign(**texts.fillna(known))
 
 
 def _measured(field: gpd.GeoDataFrame, dataset: Dataset) -> gpd.GeoDataFrame:

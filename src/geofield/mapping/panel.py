@@ -50,7 +50,9 @@ def with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float)
     entries = _legend_entries(dataset)
     step, rows = _legend_size(entries, width)
     legend_right = 16 + step * math.ceil(len(entries) / rows)
-    figures = [written(text, _figure_size(n)) for n, text in enumerate(figures_in_words(dataset))]
+    # The first one holds the field's name.
+    sizes = itertools.chain([16], itertools.repeat(14))
+    figures = list(map(written, figures_in_words(dataset), sizes))
     beside = legend_right + max(font.getlength(text) for text, font in figures) + 16 <= width
     below = (
         [] if beside else [(t, font) for text, font in figures for t in _wrapped(text, font, width)]
@@ -88,11 +90,6 @@ def with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float)
         place = (16, image.height - 12 - 16 * number)
         draw.text(place, line, font=credit_font, fill=(190, 195, 200), anchor="ls")
     return image
-
-
-def _figure_size(number: int) -> int:
-    """The size of the letters of a line of figures: the first one holds the field's name."""
-    return 16 if number == 0 else 14
 
 
 def _legend_size(entries: Sequence[tuple[str, str, Dash | None]], width: int) -> tuple[int, int]:
