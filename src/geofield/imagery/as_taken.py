@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import rasterio
 import rasterio.shutil
 from rasterio.enums import ColorInterp
+from rasterio.io import MemoryFile
 from rasterio.windows import Window
 
 _MASK_BAND = (
@@ -33,10 +33,9 @@ def as_taken(dataset: Any, fill: float | None, *, alpha: bool) -> Iterator[Any]:
     if not (tagged or filled):
         yield dataset
         return
-    view = f"/vsimem/{uuid.uuid4().hex}.vrt"
-    rasterio.shutil.copy(dataset, view, driver="VRT")
-    try:
-        with rasterio.open(view, "r+") as plain:
+    with MemoryFile(ext=".vrt") as view:
+        rasterio.shutil.copy(dataset, view.name, driver="VRT")
+        with rasterio.open(view.name, "r+") as plain:
             if tagged:
                 plain.colorinterp = [
                     ColorInterp.undefined if each is ColorInterp.alpha else each
@@ -44,10 +43,8 @@ def as_taken(dataset: Any, fill: float | None, *, alpha: bool) -> Iterator[Any]:
                 ]
             if filled:
                 plain.nodata = fill
-        with rasterio.open(view) as plain:
+        with rasterio.open(view.name) as plain:
             yield plain
-    finally:
-        rasterio.shutil.delete(view)
 
 
 @contextmanager
@@ -58,8 +55,7 @@ def masked_by_values(dataset: Any, bands: Sequence[int], window: Window) -> Iter
     VRT may, nothing is seen where each holds its own.
     """
     values = [dataset.nodatavals[band] for band in bands]
-    there = [each for each in values if each is not None and not np.isnan(each)]
-    if len(set(there)) < 2:
+    if len({each for each in values if each is not None and not np.isnan(each)}) < 2:
         yield dataset
         return
     shown = dataset.read([band + 1 for band in bands], window=window)
@@ -67,18 +63,13 @@ def masked_by_values(dataset: Any, bands: Sequence[int], window: Window) -> Iter
         np.ones(band.shape, bool) if each is None else band == each
         for band, each in zip(shown, values, strict=True)
     ]
-    name = f"/vsimem/{uuid.uuid4().hex}"
     height, width = dataset.shape
     profile = {"driver": "GTiff", "width": width, "height": height, "count": 1, "dtype": "uint8"}
-    with rasterio.open(f"{name}.tif", "w", tiled=True, SPARSE_OK=True, **profile) as mask:
-        mask.write(np.where(np.all(nothing, axis=0), 0, 255).astype(np.uint8), 1, window=window)
-    rasterio.shutil.copy(dataset, f"{name}.vrt", driver="VRT")
-    with rasterio.open(f"{name}.vrt") as plain:
-        text = re.sub("<NoDataValue>.*?</NoDataValue>", "", plain.tags(ns="xml:VRT")["xml:VRT"])
-    text = text.replace("</VRTDataset>", _MASK_BAND.format(f"{name}.tif"))
-    try:
+    with MemoryFile(ext=".vrt") as view, MemoryFile() as there:
+        with there.open(tiled=True, SPARSE_OK=True, **profile) as mask:
+            mask.write(np.where(np.all(nothing, axis=0), 0, 255).astype(np.uint8), 1, window=window)
+        rasterio.shutil.copy(dataset, view.name, driver="VRT")
+        text = re.sub("<NoDataValue>.*?</NoDataValue>", "", view.read().decode())
+        text = text.replace("</VRTDataset>", _MASK_BAND.format(there.name))
         with rasterio.open(text) as plain:
             yield plain
-    finally:
-        for kind in ("tif", "vrt"):
-            rasterio.shutil.delete(f"{name}.{kind}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rasterio
@@ -74,19 +73,11 @@ def stage_rows(path: Path, block: Block, rows: Rows) -> int:
             file.write(np.moveaxis(part, -1, 0), window=window)
             absent_px = int(np.count_nonzero(~there))
             if absent_px and not missing_px:
-                _begin_mask(file, start)
+                file.write_mask(True)  # hides nothing of the rows before
             missing_px += absent_px
             if missing_px:
-                file.write_mask(there.astype(np.uint8) * 255, window=window)
+                file.write_mask(there, window=window)
     return missing_px
-
-
-def _begin_mask(file: Any, rows: int) -> None:
-    """Write a mask that hides nothing of so many rows."""
-    for start in range(0, rows, 256):
-        shape = (min(256, rows - start), file.width)
-        window = Window(0, start, shape[1], shape[0])
-        file.write_mask(np.full(shape, 255, np.uint8), window=window)
 
 
 def stage_to_cog(staged: Path, target: Path, tags: Mapping[str, str]) -> None:

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rasterio.shutil
 from rasterio.enums import ColorInterp
 from rasterio.errors import RasterioError
@@ -91,7 +90,7 @@ def write_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> P
                     if role not in ("red", "green", "blue"):
                         staged.set_band_description(i + 1, role)
                 if not scene.valid.all():
-                    staged.write_mask(np.where(scene.valid, 255, 0).astype(np.uint8))
+                    staged.write_mask(scene.valid)
                 staged.update_tags(**tags_of(scene))
             with memory.open() as staged:
                 write_cog(staged, temporary)
