@@ -43,7 +43,9 @@ def joined(shapes: NDArray[np.object_], crs: CRS) -> NDArray[np.object_]:
 
     Of other CRS they are handed back as they are.
     """
-    return _where_jumping(shapes, _joined) if crs.is_geographic else np.asarray(shapes, object)
+    if not crs.is_geographic:
+        return np.asarray(shapes, dtype=object)
+    return _where_jumping(shapes, lambda whole: [_as_one(each) for each in whole])
 
 
 def seamless(shapes: NDArray[np.object_]) -> CRS:
@@ -103,10 +105,6 @@ def _split(whole: NDArray[np.object_]) -> list[Any]:
     west = shapely.transform(shapely.intersection(whole, _WEST), lambda xy: xy - (360.0, 0.0))
     east = shapely.intersection(whole, _EAST)
     return [_collected(*parts) for parts in zip(east, west, strict=True)]
-
-
-def _joined(whole: NDArray[np.object_]) -> list[Any]:
-    return [_as_one(each) for each in whole]
 
 
 def _as_one(whole: Any) -> Any:

@@ -39,7 +39,11 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
     if place.suffix.lower() == ".zip" and place.is_file():
         with unpacked(place) as folder:
             inside = read_dataset(folder, crs=crs)
-            return inside if inside.points is None else _with_points_in_memory(inside)
+            if inside.points is None:
+                return inside
+            # Their file will be gone.
+            points = {schema.TRACK_POINTS.name: inside.table(schema.TRACK_POINTS.name)}
+            return replace(inside, tables={**inside.tables, **points}, points=None)
     found = detect(place)
     place = product_file(place, found)
     reader = found.load_reader()
@@ -48,12 +52,6 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
     if not found.asks_crs:
         raise FormatError(f"{found.title} files say their CRS themselves.", hint="Leave out --crs.")
     return reader(place, crs=parse_crs(crs))
-
-
-def _with_points_in_memory(dataset: Dataset) -> Dataset:
-    """The same where the file of the points will be gone."""
-    points = {schema.TRACK_POINTS.name: dataset.table(schema.TRACK_POINTS.name)}
-    return replace(dataset, tables={**dataset.tables, **points}, points=None)
 
 
 def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:

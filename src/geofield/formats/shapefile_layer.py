@@ -207,13 +207,8 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
         encoding="UTF-8",
         DBF_DATE_LAST_UPDATE=day or "1970-01-01",
     )
-    if day is None:
-        _leave_undated(file.with_suffix(".dbf"))
+    if day is None:  # the day of the last change stays empty
+        with file.with_suffix(".dbf").open("r+b") as table:
+            table.seek(1)
+            table.write(b"\0\0\0")
     return [place.with_name(place.name + end) for end in (".shp", ".shx", ".dbf", ".prj", ".cpg")]
-
-
-def _leave_undated(table: Path) -> None:
-    """Leave the day of the last change empty in a dBase file."""
-    with table.open("r+b") as file:
-        file.seek(1)
-        file.write(b"\0\0\0")

@@ -227,7 +227,11 @@ class TileCache:
             return self._done(work)
         except sqlite3.DatabaseError as error:
             if not _is_damage(error):
-                raise _unusable(self.path, error) from None
+                raise ImageryError(
+                    f"The tile cache {self.path} cannot be used: {error}.",
+                    hint="Check free space and rights there, choose another with --cache-dir, or "
+                    "--no-cache.",
+                ) from None
             self.close()
             self._set_aside()
             return self._done(work)
@@ -300,10 +304,3 @@ def _format(body: bytes) -> str:
 def _is_damage(error: sqlite3.DatabaseError) -> bool:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     return code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) or "no such table" in str(error)
-
-
-def _unusable(path: Path, error: sqlite3.Error) -> ImageryError:
-    return ImageryError(
-        f"The tile cache {path} cannot be used: {error}.",
-        hint="Check free space and rights there, choose another with --cache-dir, or --no-cache.",
-    )

@@ -15,16 +15,10 @@ from geofield.imagery.client import BrokenBodyError
 #: Red, green, blue (rows, columns, 3) and whether each pixel is there (None: all are).
 Pixels = tuple[NDArray[np.uint8], NDArray[np.bool_] | None]
 
-
 #: Side of the smallest tile that a source can have, pixels.
 _LEAST_PX = 64
-
 #: A small file that says it is a picture of gigabytes.
 _BOMBS = (Image.DecompressionBombWarning, Image.DecompressionBombError)
-
-
-class WrongSizeError(ImageryError):
-    """The tiles are sound, but not of the size the source is said to have."""
 
 
 def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
@@ -34,7 +28,8 @@ def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
     ------
     BrokenBodyError
         Not a picture, or one that ends too early.
-    WrongSizeError
+    ImageryError
+        The tile is sound, but not of the size that the source is said to have.
     """
     try:
         with warnings.catch_warnings():
@@ -42,7 +37,7 @@ def decode_tile(body: bytes, kind: str, size_px: tuple[int, int]) -> Pixels:
             image: Image.Image = Image.open(io.BytesIO(body))
             if image.size != size_px:
                 tile = image.width == image.height and image.width >= _LEAST_PX
-                raise WrongSizeError(
+                raise ImageryError(
                     f"The source sends tiles of {image.width} x {image.height} px, not "
                     f"{size_px[0]} x {size_px[1]} px.",
                     hint="Name it in the settings file, as [fetch.sources.NAME], with "

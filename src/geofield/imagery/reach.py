@@ -7,6 +7,7 @@ the user allowed by name (``--allow``, or ``allow`` in the settings); anything e
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -52,13 +53,11 @@ class Reach:
             hint=f"If you trust it: --allow {place}",
         )
 
-    def _folders(self) -> list[Path]:
-        folders = []
+    def _folders(self) -> Iterator[Path]:
         for each in self.allowed:
             if _host(each.removeprefix(_CURL)) is None and not each.startswith(("/vsi", "<")):
-                place = Path(each)
-                folders.append(place.resolve() if place.is_dir() else place.resolve().parent)
-        return folders
+                place = Path(each).resolve()
+                yield place if place.is_dir() else place.parent
 
 
 def _host(address: str) -> tuple[str, int] | None:

@@ -31,7 +31,7 @@ from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading,
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
-from geofield.imagery.scaling import Limits, scaled_bands
+from geofield.imagery.scaling import scaled_bands
 from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource, Scene, outside
 from geofield.wording import counted
@@ -266,29 +266,18 @@ class SceneReader:
             roles: tuple[str, ...] = ("red", "green", "blue")
             bands, limits, own = values.astype(np.uint8), None, None
         else:
-            roles = there.shown_roles
-            wanted = scaling or self.scaling, nir_scaling
-            bands, (limits, own), more = self._scaled(values, roles, valid, *wanted)
-            notes += more
+            roles, scaling = there.shown_roles, scaling or self.scaling
+            # What an earlier reading did to the pixels is kept, not repeated.
+            bands, limits, own = values, self.scaled_before, None
+            if values.dtype != np.uint8 or scaling not in (None, self.scaled_before):
+                bands, limits, own, more = scaled_bands(values, roles, valid, scaling, nir_scaling)
+                notes += more
         bands = np.where(valid, bands, np.uint8(0))
         return Scene(grid, bands, roles, valid, self.source, limits, notes, there.guesses, own)
 
     def _for(self, box: tuple[int, int, int, int]) -> SceneReader:
         """The reader of a part (left, top, right, bottom, pixels): what it has and is guessed."""
         return self
-
-    def _scaled(
-        self,
-        values: NDArray[Any],
-        roles: tuple[str, ...],
-        valid: NDArray[np.bool_],
-        scaling: Limits,
-        nir_scaling: Limits,
-    ) -> tuple[NDArray[np.uint8], tuple[Limits, Limits], tuple[str, ...]]:
-        if values.dtype == np.uint8 and scaling in (None, self.scaled_before):
-            # What an earlier reading did to the pixels is kept, not repeated.
-            return values, (self.scaled_before, None), ()
-        return scaled_bands(values, roles, valid, scaling, nir_scaling)
 
     def _pixels(
         self, window: Window, shape: tuple[int, int]

@@ -26,7 +26,7 @@ def scaled_bands(
     valid: NDArray[np.bool_],
     scaling: Limits,
     nir_scaling: Limits,
-) -> tuple[NDArray[np.uint8], tuple[Limits, Limits], tuple[str, ...]]:
+) -> tuple[NDArray[np.uint8], Limits, Limits, tuple[str, ...]]:
     """Bands in 8 bits, the limits of the colours and of near infrared, and what was done.
 
     Parameters
@@ -51,7 +51,7 @@ def scaled_bands(
         scaled[near] = to_uint8(values[near], own)
         if own is not None:
             notes.append(f"Near infrared {own[0]:.6g} to {own[1]:.6g} became 0 to 255.")
-    return scaled, (limits, own), tuple(notes)
+    return scaled, limits, own, tuple(notes)
 
 
 def scale_limits(bands: NDArray[Any], valid: NDArray[np.bool_]) -> Limits:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin
@@ -27,15 +27,6 @@ _RASTER = ("image/tiff", "image/vnd.stac.geotiff", "image/jp2", "application/x-g
 _SINGLE = ("red", "green", "blue", "nir")
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
-    """One item: the picture to read and what is said of it."""
-
-    path: str
-    bands: tuple[str, ...] | None
-    source: ImagerySource
-
-
 def is_stac(path: Path) -> bool:
     """Whether a file is a STAC item or a collection of items (and not plain GeoJSON)."""
     document = _document(path)
@@ -55,7 +46,7 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
     ImageryError
         No item has a picture.
     """
-    reach, point = options.reach.of(path), options.point
+    options, point = replace(options, reach=options.reach.of(path)), options.point
     document = _document(path)
     features = document.get("features", [document])
     if point is not None:
@@ -68,16 +59,13 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
             raise PointOutsideError(message)
         features = here
     features = sorted(features, key=lambda f: _date(f) or "", reverse=True)
-    items = [item for item in (_item(f, path, reach) for f in features) if item is not None]
+    items = [item for item in (_item(f, path, options) for f in features) if item is not None]
     if not items:
         raise ImageryError(
             f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
             hint="Give items with assets of the role `data` or `visual`.",
         )
-    first = items[0]
-    source = options.source or first.source
-    known = replace(options, bands=options.bands or first.bands, source=source, reach=reach)
-    return open_collection([item.path for item in items], known, name=path.name)
+    return open_collection([picture for picture, _ in items], items[0][1], name=path.name)
 
 
 def _document(path: Path) -> Any:
@@ -103,7 +91,10 @@ def _date(feature: Mapping[str, Any]) -> str | None:
     return str(value) if value else None
 
 
-def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
+def _item(
+    feature: Mapping[str, Any], path: Path, options: OpenOptions
+) -> tuple[str, OpenOptions] | None:
+    """The picture of an item, and what is known of it; None without one."""
     rasters = {
         name: asset for name, asset in feature.get("assets", {}).items() if _is_picture(asset)
     }
@@ -112,7 +103,7 @@ def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
     chosen, roles = _chosen(rasters)
     places = [_place(asset, feature, path) for asset in chosen]
     for place in places:
-        reach.require(place, path.name)
+        options.reach.require(place, path.name)
     properties = feature.get("properties", {})
     providers = [p.get("name", "") for p in properties.get("providers", [])]
     licence = str(properties.get("license", ""))
@@ -122,8 +113,9 @@ def _item(feature: Mapping[str, Any], path: Path, reach: Reach) -> Item | None:
         attribution=", ".join(filter(None, providers)),
         licence="" if licence in ("proprietary", "various", "other") else licence,
     )
-    whole = places[0] if len(places) == 1 else stacked(places, roles or (), reach)
-    return Item(whole, roles, source)
+    whole = places[0] if len(places) == 1 else stacked(places, roles or (), options.reach)
+    known = replace(options, bands=options.bands or roles, source=options.source or source)
+    return whole, known
 
 
 def _is_picture(asset: Mapping[str, Any]) -> bool:

@@ -5,7 +5,7 @@ Writers take names, order, types, units and the short Shapefile names from there
 :func:`conform` (`tables`) brings any table into that shape.
 """
 
-from geofield.schema.columns import Column, ColumnType, GeometryType, Layer
+from geofield.schema.columns import Column, ColumnType, Layer
 from geofield.schema.layers import (
     ALTERNATIVES,
     FIELD,
@@ -49,7 +49,6 @@ __all__ = [
     "TURNS",
     "Column",
     "ColumnType",
-    "GeometryType",
     "Layer",
     "conform",
     "empty",

@@ -15,10 +15,7 @@ _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 def page_file(name: str) -> bytes:
     """The bytes of a file of this folder, such as ``vendor/ol.js``."""
-    place = resources.files(__name__)
-    for part in name.split("/"):
-        place = place / part
-    return place.read_bytes()
+    return resources.files(__name__).joinpath(*name.split("/")).read_bytes()
 
 
 def inlined(*names: str) -> str:

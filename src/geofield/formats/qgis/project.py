@@ -108,31 +108,23 @@ def _system(crs: CRS) -> ET.Element:
 def _layer_tree(
     name: str, layers: list[schema.Layer], gpkg_name: str, scene: Path | None
 ) -> ET.Element:
-    leaves = [
-        node(
-            "layer-tree-layer",
-            id=_ID.format(layer.name),
-            name=layer.title,
-            source=_source(gpkg_name, layer.name),
-            providerKey="ogr",
-            checked="Qt::Checked" if LOOKS[layer.name].visible else "Qt::Unchecked",
-            expanded="1" if layer.name == "obstacles" else "0",
-        )
-        for layer in layers
-    ]
+    leaves = [_leaf(each.name, each.title, _source(gpkg_name, each.name), "ogr") for each in layers]
     group = node("layer-tree-group", *leaves, name=name, expanded="1", checked="Qt::Checked")
-    if scene is None:
-        return node("layer-tree-group", group)
-    picture = node(
+    picture = [] if scene is None else [_leaf("scene", "Picture", f"./{scene.name}", "gdal")]
+    return node("layer-tree-group", group, *picture)
+
+
+def _leaf(name: str, title: str, source: str, provider: str) -> ET.Element:
+    shown = name not in LOOKS or LOOKS[name].visible
+    return node(
         "layer-tree-layer",
-        id=_ID.format("scene"),
-        name="Picture",
-        source=f"./{scene.name}",
-        providerKey="gdal",
-        checked="Qt::Checked",
-        expanded="0",
+        id=_ID.format(name),
+        name=title,
+        source=source,
+        providerKey=provider,
+        checked="Qt::Checked" if shown else "Qt::Unchecked",
+        expanded="1" if name == "obstacles" else "0",
     )
-    return node("layer-tree-group", group, picture)
 
 
 def _source(gpkg_name: str, layer: str) -> str:
