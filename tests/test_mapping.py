@@ -13,6 +13,7 @@ from shapely import box
 from geofield import theme
 from geofield.mapping import draw_map
 from geofield.mapping import fonts as map_fonts
+from geofield.model.map_words import figures_in_words
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import load_settings
@@ -71,6 +72,13 @@ def test_the_map_is_the_same_twice_and_needs_no_picture(
     assert min(plain.size) > 300
     colours = np.asarray(plain).reshape(-1, 3)
     assert (np.abs(colours.astype(int) - theme.rgb(theme.OUTLINE)).max(axis=1) < 40).sum() > 200
+
+
+def test_the_map_counts_what_is_driven_around_apart_from_the_rest(plan: Plan) -> None:
+    """Of ten, two of them possible, it said "8 obstacles (2 possible)", as if they were six."""
+    assert plan.obstacles is not None
+    line = f"{len(plan.obstacles) - 1} obstacles, 1 rejected"
+    assert figures_in_words(plan.to_dataset())[1] == line
 
 
 def test_a_field_alone_is_drawn_too(simulated: SimulatedField) -> None:

@@ -32,6 +32,8 @@ GEOD = Geod(ellps="WGS84")
 #: Arms of the cross that the scale is measured with: long against the digits of a coordinate,
 #: short against the earth.
 _ARM_M = 50.0
+#: A CRS may stretch lengths by so much more one way than the other: datums differ by less.
+_UNEVEN = 1e-4
 
 #: Latitude at which the Web Mercator square ends, degrees.
 WEB_MERCATOR_MAX_LAT = 85.0511287798066
@@ -186,6 +188,11 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
     The side of the square with a square metre's area, from geodesics of a hundred metres, so that
     the datum counts as well; good to 1e-10. Over a field the scale of its middle is enough: half a
     kilometre from there it differs by less than 5 millionths.
+
+    Raises
+    ------
+    CRSError
+        Places are outside the CRS's area, or no one scale holds there in all directions.
     """
     at_x, at_y = np.asarray(x, np.float64), np.asarray(y, np.float64)
     lon, lat = transformer(crs, LONLAT).transform(
@@ -197,7 +204,18 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
             f"Coordinates are outside the area of {authority_name(crs)}.",
             hint="Check the CRS: the data may be in another one.",
         )
-    scale = 2.0 * _ARM_M / side_of_cross_m(lon, lat)
+    along, across, turn = _cross(lon, lat)
+    # The axes of the ellipse that a circle becomes; a conformal CRS leaves it one.
+    apart = np.hypot((along / across - across / along) / 2.0, np.cos(turn))
+    middle = (along / across + across / along) / 2.0
+    uneven = np.sqrt((middle + apart) / (middle - apart)).max(initial=1.0) - 1.0
+    if uneven > _UNEVEN:
+        raise CRSError(
+            f"{authority_name(crs)} stretches lengths here by {uneven:.2%} more one way than the "
+            "other: distances and directions in it are not those on the ground.",
+            hint="Reproject to the UTM zone: GeoSeries.to_crs(series.estimate_utm_crs()).",
+        )
+    scale = 2.0 * _ARM_M / np.sqrt(along * across * np.abs(np.sin(turn)))
     return float(scale) if scale.ndim == 0 else scale
 
 
@@ -206,10 +224,16 @@ def side_of_cross_m(lon: Any, lat: Any) -> Any:
 
     The ends of the first are in the first two rows, those of the second, across it, in the others.
     """
+    along, across, turn = _cross(lon, lat)
+    return np.sqrt(along * across * np.abs(np.sin(turn)))
+
+
+def _cross(lon: Any, lat: Any) -> tuple[Any, Any, Any]:
+    """The lengths of two geodesics, metres, and the angle between them, radians."""
     azimuth_x, _, along_x = GEOD.inv(lon[0], lat[0], lon[1], lat[1])
     azimuth_y, _, along_y = GEOD.inv(lon[2], lat[2], lon[3], lat[3])
-    sine = np.sin(np.radians(np.subtract(azimuth_y, azimuth_x)))
-    return np.sqrt(np.abs(np.multiply(along_x, along_y) * sine))
+    turn = np.radians(np.subtract(azimuth_y, azimuth_x))
+    return np.asarray(along_x), np.asarray(along_y), turn
 
 
 def ground_scale_of(shapes: Any, crs: CRS) -> Any:

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import shapely
 
-from geofield.errors import CRSError, FieldError, GeofieldError
+from geofield.errors import CRSError, FieldError, FieldWarning, GeofieldError
 from geofield.field import field_from_boundary
 
 LAT, LON = 50.0, 10.0
@@ -27,6 +27,12 @@ def test_the_parcel_at_the_point_in_any_crs(crs):
     assert field.crs.utm_zone == "32N"
     truth = parcels().to_crs(32632).geometry.iloc[0]
     assert field.area_ha * 1e4 == pytest.approx(truth.area, rel=1e-3)
+
+
+def test_a_parcel_of_an_old_datum_is_told():
+    india = parcels().translate(67.0, -22.0).to_crs(24378)
+    with pytest.warns(FieldWarning, match="The boundary: Positions in EPSG:24378 are good to 22 m"):
+        field_from_boundary(india.to_frame("geometry"), lat=28.0, lon=77.0)
 
 
 def test_a_parcel_by_name_or_number():

@@ -436,6 +436,28 @@ def test_oblong_pixels_are_reprojected(tmp_path: Path) -> None:
     assert scene.grid.ground_resolution_m == pytest.approx(0.5, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("code", "corner", "told"),
+    [
+        # By PROJ's register 22 m, and no grid that would make it better.
+        (24378, (3_500_000.0, 900_000.0), r"Positions in EPSG:24378 are good to 22 m"),
+        ("+proj=tmerc +lon_0=9 +ellps=bessel", (2e4, 53e5), "does not say how its datum lies"),
+        ("+proj=tmerc +lon_0=9 +ellps=GRS80", (2e4, 53e5), None),
+        (26910, (5e5, 42e5), None),  # NAD83, which PROJ takes for WGS 84
+        (2056, (26e5, 12e5), None),
+    ],
+)
+def test_a_datum_that_is_metres_off_is_told(
+    tmp_path: Path, code: Any, corner: tuple[float, float], told: str | None
+) -> None:
+    """British and German pictures lie 1 or 2 m off where PROJ has no grid, which nothing told."""
+    place = Affine(RESOLUTION, 0, corner[0], 0, -RESOLUTION, corner[1])
+    crs = rasterio.CRS.from_user_input(code)
+    scene = read_scene(write(tmp_path / "old.tif", ground(), crs=crs, transform=place))
+    assert len(scene.guesses) == (told is not None)
+    assert told is None or re.match(f".*{told}", scene.guesses[0])
+
+
 def test_ground_control_points_place_a_picture(tmp_path: Path) -> None:
     corners = [(0, 0), (0, 128), (96, 128), (96, 0)]
     gcps = [

@@ -15,6 +15,7 @@ import shapely
 from pyproj import CRS, Geod, Transformer
 
 from geofield.crs import ground_areas_m2, ground_scale, metric_crs
+from geofield.errors import CRSError
 from geofield.tracks import plan_tracks
 from geofield_command import run_geofield
 
@@ -214,3 +215,13 @@ def test_a_national_grid_of_another_datum_counts_as_well():
     x, y = to_crs.transform(lon, lat)
     apart = np.hypot(x1 - x0, y1 - y0) / ground_scale(crs, x, y)
     assert apart == pytest.approx(1000.0, abs=MM)
+
+
+@pytest.mark.parametrize(
+    ("code", "place"), [(5070, (-120.0, 47.0)), (3035, (-8.0, 39.0)), (4087, (10.0, 60.0))]
+)
+def test_a_grid_that_has_no_one_scale_is_refused(code, place):
+    """In Portugal passes in that of Europe ran at 44.2 degrees for 45, 5.93 m apart for 6."""
+    x, y = Transformer.from_crs(4326, code, always_xy=True).transform(*place)
+    with pytest.raises(CRSError, match=f"EPSG:{code} stretches .*\n?.*UTM"):
+        plan_tracks(shapely.box(x, y, x + 300, y + 300), crs=code, spacing_m=6.0, direction=45.0)

@@ -50,6 +50,18 @@ def run(*arguments: str | Path) -> dict[str, Any]:
     return json.loads(result.stdout)
 
 
+def test_a_datum_that_is_metres_off_is_told_of_parcels_and_obstacles(tmp_path: Path) -> None:
+    india = gpd.GeoDataFrame(geometry=[shapely.box(77.001, 28.0, 77.003, 28.002)], crs=4326)
+    india = india.to_crs(24378)
+    india.to_file(tmp_path / "parcel.gpkg")
+    india.centroid.buffer(2.0).to_file(tmp_path / "trees.gpkg")
+    files = [str(tmp_path / "parcel.gpkg"), "--obstacles", str(tmp_path / "trees.gpkg")]
+    result = CliRunner().invoke(cli, ["tracks", *files, "-o", str(tmp_path / "plan.gpkg")])
+    words = "Positions in EPSG:24378 are good to 22 m"
+    assert f"Note: {words}" in result.stderr
+    assert f"Note: trees.gpkg: {words}" in result.stderr
+
+
 def test_a_heading_just_west_of_north_is_not_shown_as_180(tmp_path: Path) -> None:
     outlines(1).to_file(tmp_path / "parcel.gpkg")
     plan = tmp_path / "plan.gpkg"

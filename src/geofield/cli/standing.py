@@ -37,6 +37,10 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
 
     Of one field the stage itself tells of points without a radius.
     """
+    import shapely
+    from pyproj import CRS
+
+    from geofield.datum import datum_notes
     from geofield.farm.standing import LAYERS, WITHOUT_SHAPE, obstacles_of, unsized_points
     from geofield.model.obstacles import POINT_RADIUS_M
 
@@ -45,6 +49,8 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
     standing = obstacles_of(job.obstacles, job.obstacles_crs)
     if layers := standing.attrs[LAYERS]:
         say_note(f"{job.obstacles.name}: what all its layers hold is avoided: {', '.join(layers)}.")
+    for note in datum_notes(CRS(standing.crs), *shapely.get_coordinates(standing.geometry).T):
+        say_note(f"{job.obstacles.name}: {note}")
     lost = standing.attrs[WITHOUT_SHAPE]
     if lost:
         rows = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from geofield import schema
-from geofield.crs import is_metric
+from geofield.crs import is_utm
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
@@ -38,7 +38,7 @@ def read_obstacles(
     layer : str, optional
         When not given or when the file has one layer only: `obstacles`, else the first one.
     metric : bool
-        Reproject to the UTM zone where the file is in degrees.
+        Reproject to the UTM zone where the file is in another CRS.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_obstacles(
     refuse_nowhere(frame.geometry.to_numpy(), path.name)
     if frame.crs is None:
         raise CRSError(f"{path.name} has no CRS.", hint="Set it in QGIS: Set layer CRS.")
-    if metric and len(frame) and not is_metric(frame.crs):
+    if metric and len(frame) and not is_utm(frame.crs):
         frame = frame.to_crs(frame.estimate_utm_crs())
     return frame
 

@@ -18,6 +18,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import LONLAT, authority_name, parse_crs, transformer
+from geofield.datum import datum_notes
 from geofield.errors import CRSError, FormatError
 from geofield.farm.place_files import RawPlaces, raw_of, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
@@ -228,6 +229,7 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
         )
     every = pa.concat_arrays(outlines)
     _refuse_degrees(raw, source, np.concatenate(xs), np.concatenate(ys))
+    notes += datum_notes(source, np.concatenate(xs), np.concatenate(ys))
     lon, lat = transformer(source, LONLAT).transform(np.concatenate(xs), np.concatenate(ys))
     if source.is_geographic:  # longitudes from 0 to 360, as of joined parcels
         lon = np.where((lon > 180.0) & (lon < 360.0), lon - 360.0, lon)

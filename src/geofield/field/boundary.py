@@ -11,6 +11,7 @@ from shapely import Polygon
 
 from geofield.crossings import in_words, mended
 from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transformer
+from geofield.datum import datum_notes
 from geofield.errors import CRSError, FieldError, FieldWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
@@ -187,6 +188,8 @@ def _smallest(chosen: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: bool) -> Field:
     target = metric_crs(lon, lat, own=own)
     polygon = shapely.force_2d(row.geometry.iloc[0])
+    for note in datum_notes(own, *shapely.get_coordinates(polygon)[0]):
+        warnings.warn(f"The boundary: {note}", FieldWarning, stacklevel=3)
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
         point = shapely.Point(transformer(LONLAT, own).transform(lon, lat)) if pointed else None

@@ -18,6 +18,7 @@ from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
 from geofield.crs import GEOD, LONLAT, metric_crs, transformer
+from geofield.datum import datum_notes
 from geofield.errors import CRSError
 from geofield.grid import Grid
 from geofield.imagery.gdal import display_name, to_rasterio
@@ -105,17 +106,19 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
         with WarpedVRT(dataset, src_crs=to_rasterio(crs), crs=to_rasterio(target)) as warped:
             grid = Grid(warped.width, warped.height, warped.transform, target)
         guess = f"Placed by its {len(gcps)} ground control points alone."
-        return Place(grid, WarpOrigin(crs), guesses=(guess,))
+        told = datum_notes(crs, *rough.to_native(0, 0))
+        return Place(grid, WarpOrigin(crs), guesses=(guess, *told))
     native = Grid(dataset.width, dataset.height, transform, crs)
     aspect, skew_deg = pixel_shape(native, point)
+    guesses = datum_notes(crs, *native.to_native(native.width_px / 2, native.height_px / 2))
     if aspect <= MAX_ASPECT and skew_deg <= MAX_SKEW_DEG:
-        return Place(native)
+        return Place(native, guesses=guesses)
     why = f"its pixels are skewed by {skew_deg:.0f} degrees"
     if aspect > MAX_ASPECT:
         why = f"its pixels are {aspect:.2f} times longer one way"
     grid = _square_grid(native, point)
     note = f"Reprojected from {crs.name} to {grid.crs.name}: {why} on the ground."
-    return Place(grid, WarpOrigin(crs, transform), (note,))
+    return Place(grid, WarpOrigin(crs, transform), (note,), guesses)
 
 
 def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:

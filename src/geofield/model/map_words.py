@@ -22,8 +22,8 @@ def figures_in_words(dataset: Dataset) -> list[str]:
     if math.isfinite(certainty):
         lines[0] += f"   outline {certainty:.0%} certain"
     idle = {s: int((obstacles["status"] == s).sum()) for s in schema.NOT_AVOIDED}
-    others = ", ".join(f"{n} {status}" for status, n in idle.items() if n)
-    lines.append(counted(len(active(obstacles)), "obstacle") + (f" ({others})" if others else ""))
+    others = [f"{n} {status}" for status, n in idle.items() if n]
+    lines.append(", ".join([counted(len(active(obstacles)), "obstacle"), *others]))
     if len(tracks):
         heading = f"{heading_in_words(field['heading_deg'])}\N{DEGREE SIGN}"
         lines.append(
