@@ -247,6 +247,23 @@ def ground_areas_m2(shapes: Any, crs: CRS) -> NDArray[np.float64]:
     return _on_the_ground(shapely.area, shapes, crs, 2)
 
 
+def areas_anywhere_m2(shapes: Any, crs: CRS) -> NDArray[np.float64]:
+    """True areas of geometries in any CRS, each measured in the metric CRS of its place."""
+    found = np.asarray(shapes, dtype=object)
+    areas = np.zeros(len(found))
+    some = np.flatnonzero(shapely.area(found) > 0.0)
+    # A corner, not the middle: in degrees that is far off where a shape reaches over 180.
+    corners, row = shapely.get_coordinates(found[some], return_index=True)
+    first = corners[np.searchsorted(row, np.arange(len(some)))]
+    lon, lat = transformer(crs, LONLAT).transform(first[:, 0], first[:, 1])
+    own = crs if is_utm(crs) else None
+    zones = np.array([metric_crs(*place, own).srs for place in zip(lon, lat, strict=True)])
+    for zone in np.unique(zones):
+        mine, metric = some[zones == zone], parse_crs(str(zone))
+        areas[mine] = ground_areas_m2(reproject(found[mine], crs, metric), metric)
+    return areas
+
+
 def ground_lengths_m(shapes: Any, crs: CRS) -> NDArray[np.float64]:
     """True lengths of lines, and of the borders of polygons, metres on the ground."""
     return _on_the_ground(shapely.length, shapes, crs, 1)

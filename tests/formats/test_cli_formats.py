@@ -249,6 +249,24 @@ def test_import_says_when_the_crs_is_in_doubt(tmp_path):
     assert read_dataset(tmp_path / "a.gpkg").name == "A"
 
 
+def test_info_adds_up_the_fields_of_a_farm_wherever_they_lie(tmp_path):
+    """Of two fields it told the first one's area, and a farm of several zones was refused."""
+    import geopandas as gpd
+    import shapely
+    from pyproj import Geod
+
+    places = [shapely.box(lon, 48.0, lon + 0.004, 48.002) for lon in (17.9, 18.1, 179.998)]
+    geod, true_ha = Geod(ellps="WGS84"), 0.0
+    for each in places:
+        true_ha += geod.geometry_area_perimeter(shapely.segmentize(each, 1e-4))[0] / 1e4
+    gpd.GeoDataFrame(geometry=places, crs=4326).to_file(tmp_path / "parcels.gpkg")
+    run(cli, "batch", tmp_path / "parcels.gpkg", "--spacing", "40", "--out", tmp_path / "farm")
+    told = json.loads(run(info, tmp_path / "farm", "--json").output)
+    assert told["fields together"]["area (ha)"] == pytest.approx(true_ha, rel=1e-5)
+    assert "metric CRS" not in told
+    assert told["rows"]["field"] == 3
+
+
 def test_bad_options_are_usage_errors(plan_file, tmp_path):
     done = CliRunner().invoke(
         export, [str(plan_file), "-f", "kml", "--out", str(tmp_path), "--option", "x"]

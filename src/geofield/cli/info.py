@@ -62,7 +62,7 @@ def _facts(file: Path, crs: str | None) -> dict[str, Any]:
 def _vector(file: Path, crs: str | None) -> dict[str, Any]:
     import numpy as np
 
-    from geofield.crs import authority_name
+    from geofield.crs import areas_anywhere_m2, authority_name
     from geofield.formats import detect, read_dataset
     from geofield.formats.arrow import to_lonlat
     from geofield.model.field import Field
@@ -75,14 +75,19 @@ def _vector(file: Path, crs: str | None) -> dict[str, Any]:
         "file": str(file),
         "format": found.title,
         "name": dataset.name,
-        "metric CRS": f"{authority_name(dataset.crs)} ({dataset.crs.name})",
+        "CRS" if len(field) > 1 else "metric CRS": (
+            f"{authority_name(dataset.crs)} ({dataset.crs.name})"
+        ),
         "rows": {
             layer.name: len(dataset.table(layer.name))
             for layer in dataset.layers(working=True)
             if dataset.has(layer.name)
         },
     }
-    if len(field):
+    if len(field) > 1:
+        areas_m2 = areas_anywhere_m2(field.geometry.to_numpy(), dataset.crs)
+        facts["fields together"] = {"area (ha)": round(float(areas_m2.sum()) / 1e4, 4)}
+    elif len(field):
         shape = field.geometry.iloc[0]
         # In metres: across 180 degrees the outline goes round the world in degrees.
         inside = np.array([shape.representative_point()], dtype=object)
