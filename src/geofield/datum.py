@@ -53,10 +53,10 @@ def _notes(srs: str, lon: int, lat: int) -> tuple[str, ...]:
         return ()
     told = f"Positions in {authority_name(crs)} are good to {good_m:g} m, by PROJ's word"
     better = [way for way in ways.unavailable_operations if 0.0 <= way.accuracy < good_m]
-    if not better or not better[0].grids:
+    grids = [grid.short_name for way in better[:1] for grid in way.grids]
+    if not grids:
         return (f"{told}.",)
-    grid = better[0].grids[0].short_name
-    return (f"{told}. With its grid to {better[0].accuracy:g} m: pyproj sync --file {grid}",)
+    return (f"{told}. With its grid to {better[0].accuracy:g} m: pyproj sync --file {grids[0]}",)
 
 
 def _is_wgs84(crs: CRS, lon: float, lat: float) -> bool:

@@ -189,7 +189,7 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: 
     target = metric_crs(lon, lat, own=own)
     polygon = shapely.force_2d(row.geometry.iloc[0])
     for note in datum_notes(own, *shapely.get_coordinates(polygon)[0]):
-        warnings.warn(f"The boundary: {note}", FieldWarning, stacklevel=3)
+        warn(f"The boundary: {note}", FieldWarning, stacklevel=3)
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
         point = shapely.Point(transformer(LONLAT, own).transform(lon, lat)) if pointed else None
