@@ -7,6 +7,7 @@ has the type that its schema says, whether or not there is a row to guess it fro
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ import shapely
 from geofield import schema
 from geofield.crs import LONLAT
 from geofield.errors import FormatError, FormatWarning
-from geofield.formats.arrow import arrow_values, cut_lonlat, exact_geometry, write_file
+from geofield.formats.arrow import arrow_values, cut_lonlat, disk_hint, exact_geometry, write_file
 from geofield.model import Dataset
 from geofield.notes import warn
 
@@ -207,8 +208,20 @@ def write_shapefile(layer: ShapefileLayer, place: Path, day: str | None) -> list
         encoding="UTF-8",
         DBF_DATE_LAST_UPDATE=day or "1970-01-01",
     )
+    if not _is_whole(file, len(layer.shapes)):
+        raise FormatError(f"{file.name} could not be written whole.", hint=disk_hint(file))
     if day is None:  # the day of the last change stays empty
         with file.with_suffix(".dbf").open("r+b") as table:
             table.seek(1)
             table.write(b"\0\0\0")
     return [place.with_name(place.name + end) for end in (".shp", ".shx", ".dbf", ".prj", ".cpg")]
+
+
+def _is_whole(file: Path, rows: int) -> bool:
+    """Whether all of a Shapefile is there: of a disk that is full at its end GDAL does not tell."""
+    index, table = file.with_suffix(".shx"), file.with_suffix(".dbf")
+    with file.open("rb") as shapes, table.open("rb") as records:
+        (words,) = struct.unpack(">24xi", shapes.read(28).ljust(28, b"\0"))
+        count, start, width = struct.unpack("<4xIHH", records.read(12).ljust(12, b"\0"))
+    sizes = [each.stat().st_size for each in (file, index, table)]
+    return count == rows and sizes == [2 * words, 100 + 8 * rows, start + rows * width + 1]
