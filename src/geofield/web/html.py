@@ -159,18 +159,17 @@ def _picture(
     """The picture as a data address, and where it lies."""
     from geofield.imagery.display import TiledPicture, shown_scene
 
-    if scene is not None:
-        data, kind, bounds = shown_scene(scene, dataset.crs, LONG_SIDE_PX)
-    elif dataset.scene_path is not None and dataset.scene_path.exists():
+    if scene is None and dataset.scene_path is not None and dataset.scene_path.exists():
         picture = TiledPicture.open(dataset.scene_path, dataset.crs)
-        if not picture.has_data(tuple(dataset.table(schema.FIELD.name).total_bounds)):
+        if picture.has_data(tuple(dataset.table(schema.FIELD.name).total_bounds)):
+            scene = picture.reduced(LONG_SIDE_PX)
+        else:
             name = dataset.scene_path.name
             words = f"The picture {name} holds no data at {dataset.name}: the page shows none."
             warn(words, ImageryWarning, stacklevel=3)
-            return None, None
-        data, kind, bounds = shown_scene(picture.reduced(LONG_SIDE_PX), dataset.crs, LONG_SIDE_PX)
-    else:
+    if scene is None:
         return None, None
+    data, kind, bounds = shown_scene(scene, dataset.crs, LONG_SIDE_PX)
     return f"data:{kind};base64,{base64.b64encode(data).decode()}", bounds
 
 

@@ -69,7 +69,12 @@ def _fields(path: Path) -> tuple[Path, list[ET.Element]]:
 
 def _dataset(field: ET.Element, file: Path) -> Dataset:
     _unwrap(field)
-    boundaries = list(_boundaries(field))
+    boundaries = [
+        {"name": field.get("C"), "geometry": shape}
+        for element in field.findall("PLN")
+        if element.get("A") == PolygonType.BOUNDARY
+        for shape in _polygons(element)
+    ]
     outline = shapely.union_all([_sound(row["geometry"]) for row in boundaries])
     lines, lines_told = guidance_lines(field, outline)
     layers = {
@@ -113,13 +118,6 @@ def _unwrap(field: ET.Element) -> None:
     if len(lons) and np.ptp(lons) > 180.0:
         for point, lon in zip(points, lons, strict=True):
             point.set("D", repr(float(lon % 360.0)))
-
-
-def _boundaries(field: ET.Element) -> Iterable[dict[str, Any]]:
-    for element in field.findall("PLN"):
-        if element.get("A") == PolygonType.BOUNDARY:
-            for shape in _polygons(element):
-                yield {"name": field.get("C"), "geometry": shape}
 
 
 def _told(field: ET.Element) -> Iterable[str]:

@@ -96,10 +96,8 @@ class XYZSource(TileSource):
 
 def quadkey(tile: Tile) -> str:
     """The quadkey of a tile: one digit 0..3 per zoom."""
-    digits = []
-    for bit in range(tile.zoom - 1, -1, -1):
-        digits.append(str((tile.column >> bit & 1) + 2 * (tile.row >> bit & 1)))
-    return "".join(digits)
+    bits = range(tile.zoom - 1, -1, -1)
+    return "".join(str((tile.column >> bit & 1) + 2 * (tile.row >> bit & 1)) for bit in bits)
 
 
 def key_variable(name: str) -> str:
