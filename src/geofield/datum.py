@@ -29,12 +29,13 @@ def datum_notes(crs: CRS, x: ArrayLike, y: ArrayLike) -> tuple[str, ...]:
     known = np.flatnonzero(np.isfinite(lon) & np.isfinite(lat))
     if not len(known):
         return ()
-    # Within a degree the same ways are there; PROJ takes some time to list them.
-    return _notes(crs.srs, round(lon[known[0]]), round(lat[known[0]]))
+    # Near by the same ways are there; PROJ takes some time to list them.
+    here = float(lon[known[0]]), float(lat[known[0]])
+    return _notes(crs.srs, round(here[0], 1), round(here[1], 1))
 
 
 @lru_cache(maxsize=256)
-def _notes(srs: str, lon: int, lat: int) -> tuple[str, ...]:
+def _notes(srs: str, lon: float, lat: float) -> tuple[str, ...]:
     crs = CRS(srs)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # pyproj's own words for a missing grid
@@ -52,11 +53,12 @@ def _notes(srs: str, lon: int, lat: int) -> tuple[str, ...]:
     if good_m <= _GOOD_M or _is_wgs84(crs, lon, lat):
         return ()
     told = f"Positions in {authority_name(crs)} are good to {good_m:g} m, by PROJ's word"
-    better = [way for way in ways.unavailable_operations if 0.0 <= way.accuracy < good_m]
-    grids = [grid.short_name for way in better[:1] for grid in way.grids]
-    if not grids:
-        return (f"{told}.",)
-    return (f"{told}. With its grid to {better[0].accuracy:g} m: pyproj sync --file {grids[0]}",)
+    for way in ways.unavailable_operations:
+        for grid in way.grids:
+            if 0.0 <= way.accuracy < good_m:
+                fetch = f"pyproj sync --file {grid.short_name}"
+                return (f"{told}. With its grid to {way.accuracy:g} m: {fetch}",)
+    return (f"{told}.",)
 
 
 def _is_wgs84(crs: CRS, lon: float, lat: float) -> bool:
