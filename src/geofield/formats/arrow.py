@@ -101,8 +101,6 @@ def exact_geometry(of: Layer, table: gpd.GeoDataFrame) -> NDArray[np.object_]:
         For a missing or empty geometry, or one of another type.
     """
     geometry = np.asarray(table.geometry.to_numpy(), dtype=object)
-    if not len(geometry):
-        return geometry
     wanted, kind = TYPE_IDS[of.geometry], shapely.get_type_id(geometry)
     geometry = promoted(of, geometry)
     wrong = (shapely.get_type_id(geometry) != wanted) | shapely.is_empty(geometry)

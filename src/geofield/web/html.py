@@ -129,7 +129,7 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
         )
     picture, bounds = _picture(dataset, scene)
     bounds = bounds or margin_bounds(polygon)
-    certainty, doubts = row.get("certainty"), row.get("doubts")
+    doubts = row["doubts"]
     return {
         **tracks_view(tracks, float(row["area_ha"])),
         "name": dataset.name,
@@ -137,10 +137,8 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
         "field": outline_view(
             polygon,
             method=str(row["method"]),
-            certainty=None if certainty is None else float(certainty),
-            doubts=[part for part in str(doubts).split("; ") if part]
-            if isinstance(doubts, str)
-            else (),
+            certainty=float(row["certainty"]),
+            doubts=doubts.split("; ") if isinstance(doubts, str) and doubts else (),
             frame=frame_lines(dataset),
         ),
         "doubts": list(dataset.provenance.obstacle_doubts),
