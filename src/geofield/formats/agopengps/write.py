@@ -127,8 +127,6 @@ def _rows(vertices: FloatArray, headings: FloatArray) -> list[str]:
 def _track_lines(dataset: Dataset, plane: LocalPlane) -> list[str]:
     lines = ["$TrackLines"]
     tracks = dataset.table(schema.TRACKS.name)
-    if not len(tracks):
-        return lines
     shapes = exact_geometry(schema.TRACKS, tracks)
     placed = to_lonlat(shapes, dataset.crs)
     for number, bent, shape in zip(tracks["track_no"], are_bent(shapes), placed, strict=True):
@@ -165,8 +163,6 @@ def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
     obstacles = avoided(dataset)
     lines = ["$Flags", str(len(obstacles))]
     shapes = np.asarray(obstacles.geometry.to_numpy(), dtype=object)
-    if not len(shapes):
-        return lines
     centres = shapely.centroid(shapes)
     field = shapely.union_all(dataset.table(schema.FIELD.name).geometry.to_numpy())
     inside = shapely.intersection(shapes, field)
