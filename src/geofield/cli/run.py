@@ -171,10 +171,10 @@ def _say_tracks(tracks: Tracks) -> None:
         f"{segments['length_m'].sum() / 1000:.2f} km, "
         f"heading {heading_in_words(tracks.heading_deg)} degrees"
     )
-    if tracks.turns is not None:
-        _say_turns(tracks.turns)
     if tracks.direction_why:
         say(f"           {tracks.direction_why}")
+    if tracks.turns is not None:
+        _say_turns(tracks.turns)
 
 
 def _say_turns(turns: Any) -> None:
