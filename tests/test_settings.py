@@ -83,6 +83,18 @@ def test_wrong_settings_are_named(text: str, message: str) -> None:
         load_settings()
 
 
+@pytest.mark.parametrize(
+    "content", [b'[fetch]\ncache_dir = "D:\\Daten"\n', "# Größe\n".encode("cp1252")]
+)
+def test_settings_as_windows_has_paths_and_letters_are_told_how_to_be_written(
+    content: bytes,
+) -> None:
+    Path("geofield.toml").write_bytes(content)
+    with pytest.raises(SettingsError, match="not valid TOML") as told:
+        load_settings()
+    assert "in UTF-8; paths in it are written with / or in single quotes" in str(told.value.hint)
+
+
 def test_settings_do_not_change() -> None:
     with pytest.raises(ValueError, match="frozen"):
         Settings().tracks.spacing_m = 3.0  # type: ignore[misc]

@@ -41,6 +41,8 @@ def written(kind: str, folder: Path) -> Path:
         POINTS.to_csv(path, index=False)
     elif kind == "german.csv":
         POINTS.to_csv(path, index=False, sep=";", decimal=",", encoding="utf-8-sig")
+    elif kind == "german.txt.csv":
+        POINTS.to_csv(path, index=False, sep="\t", decimal=",", encoding="utf-8-sig")
     elif kind == "plain.parquet":
         POINTS.to_parquet(path)
     elif kind == "parquet":
@@ -56,7 +58,18 @@ def written(kind: str, folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     "kind",
-    ["csv", "german.csv", "wkt.csv", "plain.parquet", "parquet", "gpkg", "shp", "geojson", "fgb"],
+    [
+        "csv",
+        "german.csv",
+        "german.txt.csv",
+        "wkt.csv",
+        "plain.parquet",
+        "parquet",
+        "gpkg",
+        "shp",
+        "geojson",
+        "fgb",
+    ],
 )
 def test_every_kind_of_file_gives_the_same_places(kind: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():

@@ -97,7 +97,7 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
         mark = max(";\t,", key=first.count)
         names = [name.strip().strip('"') for name in first.split(mark)]
         # 35,0754;33,5311 is how spreadsheets write it in half of Europe.
-        comma = mark == ";" and re.search(rb"[;\n]-?\d+,\d+", head) is not None
+        comma = mark != "," and re.search(rb"[;\t\n]-?\d+,\d+", head) is not None
         table = pc.read_csv(
             path,
             read_options=pc.ReadOptions(column_names=names, skip_rows=1),
@@ -114,7 +114,7 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         if "Empty CSV" in str(error):
             raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS) from None
-        hint = "Save it as UTF-8."
+        hint = "Save it as UTF-8 (Excel: CSV UTF-8)."
         if "Expected" in str(error) and b"\0" not in head:
             hint = "Each row has as many values as the first: quote texts that hold commas."
         raise FormatError(f"{path} cannot be read: {error}.", hint=hint) from None

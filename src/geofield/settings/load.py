@@ -249,4 +249,7 @@ def _read_toml(path: str | Path | None) -> dict[str, Any]:
     except OSError as error:
         raise SettingsError(f"The settings file {file} cannot be read: {error.strerror}.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise SettingsError(f"The settings file {file} is not valid TOML: {error}.") from None
+        raise SettingsError(
+            f"The settings file {file} is not valid TOML: {error}.",
+            hint="It is text in UTF-8; paths in it are written with / or in single quotes.",
+        ) from None
