@@ -20,7 +20,7 @@ import shapely.affinity
 from pyproj import CRS
 
 import geofield as gf
-from geofield.errors import FieldWarning
+from geofield.errors import FieldWarning, FormatError
 from geofield.farm.edits import put_edits
 from geofield.farm.put_back import _put, put_back
 from geofield.farm.store import Store
@@ -273,6 +273,27 @@ def test_any_id_can_be_reviewed(folder: Path) -> None:
     assert set(farm.status["field_id"]) == set(ids)
     assert farm.status["reviewed"].all()
     assert set(farm.obstacles["status"]) == {"rejected"}
+
+
+def test_a_disk_that_takes_two_ids_for_one_name_loses_no_plan(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Windows, macOS and sticks do not tell North.gpkg from north.gpkg."""
+    store = Store.of(folder / "farm")
+    save_plan(gf.read_farm(folder / "farm")["b"], folder / "b.gpkg")
+    _put(store, "north", folder / "b.gpkg")
+    before = (folder / "farm" / "reviewed" / "north.gpkg").read_bytes()
+    is_file = Path.is_file
+
+    def alike(path: Path) -> bool:
+        there = path.parent.iterdir() if path.parent.is_dir() else ()
+        return is_file(path) or path.name.lower() in {each.name.lower() for each in there}
+
+    monkeypatch.setattr(Path, "is_file", alike)
+    with pytest.raises(FormatError, match="is the plan of another field"):
+        _put(store, "North", folder / "b.gpkg")
+    assert [each.name for each in (folder / "farm" / "reviewed").iterdir()] == ["north.gpkg"]
+    assert (folder / "farm" / "reviewed" / "north.gpkg").read_bytes() == before
 
 
 def test_a_column_that_has_another_name_in_the_file(tmp_path: Path) -> None:

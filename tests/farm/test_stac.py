@@ -13,6 +13,7 @@ import pytest
 import shapely
 
 import geofield as gf
+from geofield.farm.finish import renew
 from geofield.farm.stac import write_stac
 from geofield.farm.store import Store
 from geofield.model import ImagerySource
@@ -65,6 +66,12 @@ def test_it_is_written_the_same_again(folder):
     write_stac(Store.of(folder), name="home")
     assert (folder / "collection.json").read_bytes() == before
     assert json.loads(before)["extent"]["temporal"]["interval"][0][0] == "2020-05-01T00:00:00Z"
+
+
+def test_a_farm_on_windows_goes_by_the_name_of_its_folder(folder, tmp_path):
+    farm = shutil.copytree(folder, tmp_path / r"C:\Users\ann\home")
+    renew(Store.of(farm))
+    assert json.loads((farm / "collection.json").read_text())["id"] == "home"
 
 
 def test_boxes_across_180_degrees_do_not_go_round_the_world(tmp_path):

@@ -11,6 +11,7 @@ from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
 from geofield.formats.gpkg_guests import bring_guests, keep_project
+from geofield.imagery.gdal import display_name
 from geofield.staging import staged_folder
 
 
@@ -61,7 +62,7 @@ def _forget_change(store: Store) -> None:
 
 
 def _catalogue(store: Store) -> list[str]:
-    return write_stac(store, name=store.shown.rstrip("/").rsplit("/", 1)[-1])[:1]
+    return write_stac(store, name=display_name(store.shown))[:1]
 
 
 def _overview(store: Store) -> list[str]:

@@ -171,6 +171,12 @@ def _put(store: Store, field_id: str, file: Path) -> None:
     """Keep a reviewed plan, in the place of the one that is there, which stays beside it."""
     there = None if store.folder is None else store.folder / file_of(field_id)
     if there is not None and there.is_file():
+        if file_of(field_id) not in reviewed_files(store):
+            raise FormatError(
+                f"Where {file_of(field_id)} would lie is the plan of another field: this disk does "
+                "not tell capitals from small letters.",
+                hint="Give one of the two fields another id in the file of places.",
+            )
         refuse_locked(there)
         store.put(f"{REVIEWED}/{earlier_of(there).name}", there.read_bytes())
     store.put(file_of(field_id), file.read_bytes())
