@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -233,6 +234,24 @@ def test_streams_that_are_closed(sample: Path, tmp_path: Path, closed: str) -> N
     with rasterio.open(out) as cut:
         assert cut.read().std() > 1
         assert cut.checksum(1)
+
+
+@pytest.mark.parametrize("code_page", ["cp1252", "cp866"])
+def test_letters_that_a_code_page_lacks_end_no_work(
+    sample: Path, tmp_path: Path, code_page: str
+) -> None:
+    """As a pipe on Windows has one: a name was the end of `info`, in a traceback."""
+    plan = tmp_path / "Höfe ł 農場.gpkg"
+    shutil.copyfile(sample / "field_1.gpkg", plan)
+    environment = {**os.environ, "PYTHONIOENCODING": code_page}
+    said = [
+        subprocess.run(
+            [GEOFIELD, *words], env=environment, capture_output=True, check=True
+        ).stdout.decode(code_page)
+        for words in (["info", plan], ["info", plan, "--json"], ["formats"])
+    ]
+    assert r"\u0142 \u8fb2\u5834.gpkg" in said[0]
+    assert json.loads(said[1])["file"] == str(plan)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell")

@@ -3,6 +3,7 @@
 Data goes to stdout. With ``--progress json`` each line of stderr that is a JSON object tells a
 program one thing: ``{"progress": {"done": 1, "total": 4, "what": "field"}}``, ``{"note": "..."}``
 or, at the end, ``{"error": {"message": "...", "hint": "..."}}``. Other lines are for a person.
+JSON is ASCII: a program reads it right whatever code page Windows gives a pipe.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _LOG.addHandler(logging.NullHandler())
 
 def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
     """Data for other programs: one JSON document on stdout."""
-    click.echo(json.dumps(value, indent=2, ensure_ascii=False, default=str))
+    click.echo(json.dumps(value, indent=2, default=str))
 
 
 def say(message: str, **style: Any) -> None:
@@ -99,7 +100,7 @@ def _watch_stdin() -> None:
 
 
 def _tell(value: Mapping[str, Any]) -> None:
-    click.echo(json.dumps(value, ensure_ascii=False, default=str), err=True)
+    click.echo(json.dumps(value, default=str), err=True)
 
 
 @contextmanager

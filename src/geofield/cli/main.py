@@ -9,6 +9,7 @@ import atexit
 import errno
 import gc
 import importlib
+import io
 import os
 import re
 import sys
@@ -162,13 +163,16 @@ def _refuse_bytes(words: list[str]) -> None:
 
 
 def _open_streams() -> None:
-    """Streams that the caller closed lead nowhere.
+    """Streams that the caller closed lead nowhere, and all take every letter.
 
     Otherwise a file that is opened next takes their number, and what is printed goes into it.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A letter that the code page of a pipe on Windows lacks ends no work, as on stderr.
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def main(args: list[str] | None = None) -> None:
