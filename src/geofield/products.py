@@ -125,7 +125,7 @@ def write_report(
     report = make_report(dataset, **facts)
     text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
     path = folder / REPORT_FILE
-    path.write_text(text + "\n", encoding="utf-8")
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
     return [path]
 
 

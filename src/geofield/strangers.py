@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
+from urllib.parse import quote
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
@@ -43,9 +44,14 @@ MAX_DEPTH = 200
 @contextmanager
 def database(path: Path, *, timeout_s: float = 5.0) -> Iterator[sqlite3.Connection]:
     """A SQLite file, for reading alone."""
-    uri = f"{path.absolute().as_uri()}?mode=ro"
-    with closing(sqlite3.connect(uri, uri=True, timeout=timeout_s)) as connection:
+    with closing(sqlite3.connect(for_reading(path), uri=True, timeout=timeout_s)) as connection:
         yield connection
+
+
+def for_reading(path: Path) -> str:
+    """The address of a SQLite file that is not written; SQLite knows none with a server in it."""
+    plain = path.absolute().as_posix()
+    return f"file://{'' if plain.startswith('/') else '/'}{quote(plain, safe='/:')}?mode=ro"
 
 
 def is_geopackage(path: Path) -> bool:

@@ -47,5 +47,5 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     if written < len(frame):  # on a full disk, of which GDAL does not tell
         raise FormatError(f"{path.name} could not be written whole.", hint=disk_hint(path))
     beside = path.with_suffix(".prj")
-    beside.write_text(dataset.crs.to_wkt("WKT1_ESRI") + "\n", encoding="utf-8")
+    beside.write_text(dataset.crs.to_wkt("WKT1_ESRI") + "\n", encoding="utf-8", newline="\n")
     return [path, beside]

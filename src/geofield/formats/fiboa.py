@@ -104,7 +104,8 @@ def _write_geojson(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:
         "schemas": {COLLECTION: list(SCHEMAS)},
         "features": features,
     }
-    path.write_text(json.dumps(collection, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(collection, ensure_ascii=False, indent=1)
+    path.write_text(f"{text}\n", encoding="utf-8", newline="\n")
 
 
 def _write_parquet(path: Path, rows: list[dict[str, Any]], shapes: Any) -> None:

@@ -105,7 +105,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         shown = dataset if options.get("picture", True) else replace(dataset, scene_path=None)
         project = qgz_bytes(project_xml(shown, path.name), stem, stamp)
         add_project(connection, stem, project, stamp)
-    with path.open("rb") as file:
+    with path.open("r+b") as file:  # Windows waits for nothing that is open for reading alone
         os.fsync(file.fileno())
     if not options.get("project", True):
         return [path]

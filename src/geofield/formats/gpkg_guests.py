@@ -18,6 +18,7 @@ from geofield.formats.gpkg_read import own_layers
 from geofield.formats.qgis.as_written import is_as_written, is_project_as_written
 from geofield.notes import warn
 from geofield.staging.generations import keep_earlier
+from geofield.strangers import for_reading
 
 #: Of QGIS: their rows are brought one by one.
 _OF_QGIS = {"layer_styles", "qgis_projects"}
@@ -59,7 +60,7 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
     """
     with closing(sqlite3.connect(plan_file, isolation_level=None, uri=True)) as connection:
         connection.execute("PRAGMA synchronous = OFF")
-        connection.execute("ATTACH ? AS old", (f"{earlier.absolute().as_uri()}?mode=ro",))
+        connection.execute("ATTACH ? AS old", (for_reading(earlier),))
         try:
             kinds = dict(connection.execute("SELECT table_name, data_type FROM old.gpkg_contents"))
         except sqlite3.DatabaseError:

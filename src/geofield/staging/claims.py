@@ -26,7 +26,8 @@ from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
 _LEVELS = 2
-#: Inode and time of the last writing of files, by path from the folder.
+#: Size and time of the last writing of files, by path from the folder. Not the inode: on sticks and
+#: network shares its number changes while nobody writes.
 Seen = dict[Path, tuple[int, int]]
 
 
@@ -126,7 +127,7 @@ def seen(target: Path, places: Iterable[Path] | None = None) -> Seen:
         except OSError:
             continue
         if stat.S_ISREG(facts.st_mode):
-            found[place.relative_to(target)] = (facts.st_ino, written_ns(place, facts))
+            found[place.relative_to(target)] = (facts.st_size, written_ns(place, facts))
     return found
 
 

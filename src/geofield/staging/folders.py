@@ -60,6 +60,11 @@ def cannot_write(target: Path, error: OSError) -> FormatError:
     if error.errno == errno.ENOSPC:
         return FormatError(f"The disk is full: {place}.", hint="Free some space, then repeat.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        if error.filename2 is not None:  # Windows replaces nothing that is open
+            return FormatError(
+                f"{os.fsdecode(error.filename2)} cannot be replaced ({error.strerror}).",
+                hint="Close it in the program that has it open, then repeat.",
+            )
         if place.is_file() and not os.access(place, os.R_OK):
             return FormatError(
                 f"{place} cannot be read ({error.strerror}).",

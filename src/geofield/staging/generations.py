@@ -9,6 +9,7 @@ from pathlib import Path
 
 from geofield.errors import FormatError
 from geofield.staging import staged_folder
+from geofield.strangers import database
 
 SUFFIX = ".bak"
 
@@ -52,11 +53,7 @@ def undo(plan_file: Path) -> None:
 def copy_whole(source: Path, target: Path) -> None:
     """A GeoPackage with all that was written to it, also where a program left a log beside it."""
     try:
-        uri = f"{source.absolute().as_uri()}?mode=ro"
-        with (
-            closing(sqlite3.connect(uri, uri=True)) as old,
-            closing(sqlite3.connect(target)) as new,
-        ):
+        with database(source) as old, closing(sqlite3.connect(target)) as new:
             old.backup(new)
             # A copy that nobody has open needs no log beside it.
             new.execute("PRAGMA journal_mode = DELETE")

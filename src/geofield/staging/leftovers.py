@@ -11,12 +11,12 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 
 from geofield.errors import FormatError
@@ -32,8 +32,8 @@ _GONE = PREFIX + "gone-"
 _OLD_S = 3600.0
 _PATIENCE_S = 30.0
 _SWEEPING_S = 0.5
-#: Not on Windows: there leftovers wait until they are old.
-_LOCKS = find_spec("fcntl") is not None
+#: The byte that is locked on Windows, where nobody else can read it: behind all that is written.
+_FAR = 1 << 30
 
 
 @contextmanager
@@ -84,10 +84,10 @@ def alone(target: Path) -> Iterator[bool]:
     FormatError
         When another one does not finish.
     """
-    if not _LOCKS:
-        yield False
+    certain = sys.platform != "win32"  # no folder can be opened there
+    if not certain:
+        yield certain
         return
-    certain = True
     folder = os.open(target, os.O_RDONLY)
     try:
         until = time.monotonic() + _PATIENCE_S
@@ -122,18 +122,18 @@ def sweep(target: Path, *, certain: bool) -> None:
             continue
         try:
             with (folder / _LOCK).open("r+") as lock:
-                if not _LOCKS:
-                    _sweep_old(folder)
-                    continue
                 _hold(lock.fileno())
                 if (folder / MOVING).exists():
                     _finish(folder, target)
-                discard(folder)
         except FileNotFoundError:
             if not (certain and _is_removed(folder)):
                 _sweep_old(folder)
-        except OSError:
+        except (BlockingIOError, PermissionError):
             continue  # locked by the living, or not ours to remove
+        except OSError:
+            _sweep_old(folder)  # a file system without locks
+        else:
+            discard(folder)  # its lock is closed: Windows removes nothing that is open
 
 
 def _is_removed(folder: Path) -> bool:
@@ -157,15 +157,15 @@ def discard(staging: Path) -> None:
 
 
 def is_living(staging: Path) -> bool:
-    """Whether the process that made a folder still runs; not known, and so false, on Windows."""
+    """Whether the process that made a folder still runs; not known, and so false, without locks."""
     until = time.monotonic() + _SWEEPING_S
     while True:
         try:
             with (staging / _LOCK).open("r+") as lock:
-                if _LOCKS and lock.read(1):
+                if lock.read(1):
                     _hold(lock.fileno())
                 return False
-        except BlockingIOError:
+        except (BlockingIOError, PermissionError):
             # Perhaps only held by one who sweeps it away.
             if time.monotonic() > until:
                 return True
@@ -176,7 +176,17 @@ def is_living(staging: Path) -> bool:
 
 def _hold(file: int) -> None:
     """Take the lock of an open file; refused with `BlockingIOError` when it is taken."""
-    if _LOCKS:
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(file, _FAR, os.SEEK_SET)
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except PermissionError as error:
+            raise BlockingIOError(*error.args) from None
+        finally:
+            os.lseek(file, 0, os.SEEK_SET)
+    else:
         import fcntl
 
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

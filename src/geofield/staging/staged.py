@@ -14,7 +14,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import FormatError, OutputExistsError
@@ -140,10 +140,11 @@ def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
     except BaseException:
         # BaseException: nothing that comes between two moves may leave a mixture.
         for place, kept in reversed(moved):
-            if kept is None:
-                place.unlink(missing_ok=True)
-            else:
-                kept.replace(place)
+            with suppress(OSError):  # the one that another program has open was not replaced
+                if kept is None:
+                    place.unlink(missing_ok=True)
+                else:
+                    kept.replace(place)
         (staging / MOVING).unlink()
         raise
 

@@ -42,7 +42,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     if not dataset.has(schema.FIELD.name):
         raise FormatError("A web page needs one field; there are 0.")
     path = folder / f"{stem}.html"
-    path.write_text(document(dataset), encoding="utf-8")
+    path.write_text(document(dataset), encoding="utf-8", newline="\n")
     return [path]
 
 
@@ -72,7 +72,7 @@ class PlanPage:
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page as a file that opens in any browser."""
         with staged_file(path, overwrite=overwrite) as place:
-            place.write_text(self.text, encoding="utf-8")
+            place.write_text(self.text, encoding="utf-8", newline="\n")
         return Path(path)
 
 
