@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import io
 import json
 import os
 import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import closing
 from pathlib import Path, PureWindowsPath
-from typing import Any
+from threading import Event
+from typing import Any, ClassVar
 
 import pytest
 
 from geofield.errors import FormatError, OutputExistsError
+from geofield.farm import pool
+from geofield.imagery import reach
 from geofield.simulate import SimulatedField
 from geofield.staging import claimed, leftovers, staged_folder
 from geofield.strangers import for_reading
@@ -99,9 +104,45 @@ def test_two_commands_at_once_know_of_each_other_there(tmp_path: Path) -> None:
 class _OnWindows(PureWindowsPath):
     """A path there that says where it is."""
 
+    asked: ClassVar[set[str]] = set()
+
     def absolute(self) -> _OnWindows:
         """Itself."""
         return self
+
+    def resolve(self) -> _OnWindows:
+        """Itself, as the server told."""
+        self.asked.add(self.drive)
+        return self
+
+    def is_dir(self) -> bool:
+        """Whether it has no suffix."""
+        return not self.suffix
+
+
+def test_a_server_that_only_a_file_names_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    _OnWindows.asked.clear()
+    monkeypatch.setattr(reach, "Path", _OnWindows)
+    assert not reach.Reach((r"C:\farm\a.vrt",)).holds(r"\\stranger\share\b.tif")
+    assert not reach.Reach((r"C:\farm\a.vrt",)).holds("//stranger/share/b.tif")
+    assert _OnWindows.asked == {"C:"}
+    assert reach.Reach((r"\\nas\farm\a.vrt",)).holds(r"\\nas\farm\b.tif")
+    assert not reach.Reach((r"\\nas\farm\a\a.vrt",)).holds(r"\\nas\farm\b.tif")
+
+
+def test_ctrl_c_in_a_console_there_is_not_for_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, Any] = {}
+
+    def started(_: Any, **given: Any) -> None:
+        asked.update(given)
+        raise OSError("not started")
+
+    monkeypatch.setattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 512, raising=False)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    monkeypatch.setattr(tempfile, "TemporaryFile", io.BytesIO)  # nobody is there to close it
+    with pytest.raises(OSError, match="not started"):
+        next(pool.Pool(1).run(iter(["a task"]), "orders", Event()))  # type: ignore[arg-type,list-item]
+    assert asked["creationflags"] == 512
 
 
 @pytest.mark.parametrize(

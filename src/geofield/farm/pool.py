@@ -136,6 +136,7 @@ class _Worker:
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": path},
             # Ctrl+C of a terminal goes to all processes of its group.
             start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # of Windows
         )
         worker = cls(process, errors)
 
