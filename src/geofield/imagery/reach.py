@@ -37,7 +37,7 @@ class Reach:
             return any(host == _host(each.removeprefix(_CURL)) for each in self.allowed)
         if text.startswith("/vsi") or "://" in text:
             return text in self.allowed
-        place, folders = Path(text), self._folders()
+        place, folders = Path(text), list(self._folders())
         if place.drive.startswith("\\\\") and place.drive not in {each.drive for each in folders}:
             return False  # Windows tells a server that is asked for a file who asks
         return any(place.resolve().is_relative_to(folder) for folder in folders)

@@ -14,7 +14,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from geofield.errors import FormatError, OutputExistsError
@@ -140,11 +140,15 @@ def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
     except BaseException:
         # BaseException: nothing that comes between two moves may leave a mixture.
         for place, kept in reversed(moved):
-            with suppress(OSError):  # the one that another program has open was not replaced
+            try:
                 if kept is None:
                     place.unlink(missing_ok=True)
                 else:
                     kept.replace(place)
+            except PermissionError:
+                # Windows replaces nothing that is open; what was to come last is as it was then.
+                if place != moved[-1][0]:
+                    raise
         (staging / MOVING).unlink()
         raise
 
