@@ -49,6 +49,8 @@ def main() -> None:
     words = served()
     if words is None:
         return
+    # A stream asks once whether one can seek in what it leads to: that is another thing now.
+    sys.stdout = open(1, "w", encoding=sys.stdout.encoding, closefd=False)  # noqa: SIM115
     from geofield.cli import main as command
     from geofield.farm import pool, worker
 

@@ -162,15 +162,15 @@ def _refuse_bytes(words: list[str]) -> None:
             ) from None
 
 
-def _open_streams() -> None:
-    """Streams that the caller closed lead nowhere, and all take every letter.
+def _open_streams(*, own: bool) -> None:
+    """Streams that the caller closed lead nowhere; those of our `own` process take all letters.
 
     Otherwise a file that is opened next takes their number, and what is printed goes into it.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper):
+    if own and isinstance(sys.stdout, io.TextIOWrapper):
         # A letter that the code page of a pipe on Windows lacks ends no work, as on stderr.
         sys.stdout.reconfigure(errors="backslashreplace")
 
@@ -211,7 +211,7 @@ def _run(args: list[str] | None) -> None:
     """Run the command line; always leaves by an exception."""
     # What libraries make while they load stays to the end: going through it is 7 % of a start.
     gc.set_threshold(10_000)
-    _open_streams()
+    _open_streams(own=args is None)
     # OpenBLAS's threads spin for 25 ms behind every product of matrices that small; it is told
     # before NumPy loads it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
