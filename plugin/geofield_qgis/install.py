@@ -103,8 +103,14 @@ class Installer(QObject):
         # An environment knows its own path, so it is made in its place; the old one waits.
         shutil.rmtree(self._before, ignore_errors=True)
         self._target.parent.mkdir(parents=True, exist_ok=True)
-        if self._target.exists():
-            self._target.rename(self._before)
+        try:
+            if self._target.exists():
+                self._target.rename(self._before)
+        except OSError:  # Windows moves nothing that runs
+            self.failed.emit(
+                tr("The engine there is in use: close geofield's panel in QGIS, then repeat.")
+            )
+            return
         inside = engine.command_in(self._target).with_name(
             "python.exe" if sys.platform == "win32" else "python"
         )

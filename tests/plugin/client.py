@@ -282,9 +282,19 @@ def install(requirements, wheels):
         told.setdefault("folders", []).append(
             sorted(each.name for each in engine.own_environment().parent.iterdir())
         )
+
+    def refused(*_):
+        raise PermissionError("in use")
+
+    # As Windows does with what runs.
+    rename, own.Path.rename, in_use = own.Path.rename, refused, []
+    installer = own.Installer()
+    installer.failed.connect(in_use.append)
+    installer.start()
+    own.Path.rename = rename
     found = engine.find_engine()
     own.remove()
-    return {**told, "found": found}
+    return {**told, "found": found, "in_use": in_use}
 
 
 def setting(name, value):

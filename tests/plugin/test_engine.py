@@ -170,6 +170,8 @@ def test_the_engine_is_installed_by_its_hash(qgis, tmp_path):
     assert "HASH" in again.upper()
     assert answer["there"] == [False, True, True]
     assert answer["folders"] == [[], ["engine"], ["engine"]]
+    (in_use,) = answer["in_use"]
+    assert "is in use: close" in in_use
     assert answer["found"].endswith("/geofield/engine/bin/geofield")
     assert answer["network"]["HTTPS_PROXY"] == "http://anna:p%40ss%20word@proxy.farm:3128"
     assert "1080 MB" in answer["consent"]

@@ -390,6 +390,11 @@
     </message>
     <message>
       <location filename="install.py" />
+      <source>The engine there is in use: close geofield's panel in QGIS, then repeat.</source>
+      <translation>Die Engine dort ist in Gebrauch: schließen Sie das Fenster von geofield in QGIS und wiederholen Sie.</translation>
+    </message>
+    <message>
+      <location filename="install.py" />
       <source>It ended unexpectedly.</source>
       <translation>Es endete unerwartet.</translation>
     </message>
