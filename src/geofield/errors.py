@@ -197,7 +197,8 @@ class OutputExistsError(FormatError):
 class GeofieldWarning(UserWarning):
     """Base of every warning that geofield gives.
 
-    >>>     >>> with warnings.catch_warnings():
+    >>> import warnings
+    >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", gf.GeofieldWarning)
     ...     scene = gf.read_scene("sample_data/field_1.tif")
     """

@@ -65,6 +65,7 @@ def masked_by_values(dataset: Any, bands: Sequence[int], window: Window) -> Iter
     ]
     height, width = dataset.shape
     profile = {"driver": "GTiff", "width": width, "height": height, "count": 1, "dtype": "uint8"}
+    profile["transform"] = dataset.transform
     with MemoryFile(ext=".vrt") as view, MemoryFile() as there:
         with there.open(tiled=True, SPARSE_OK=True, **profile) as mask:
             mask.write(np.where(np.all(nothing, axis=0), 0, 255).astype(np.uint8), 1, window=window)
