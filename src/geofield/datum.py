@@ -55,7 +55,7 @@ def _notes(srs: str, lon: float, lat: float) -> tuple[str, ...]:
     told = f"Positions in {authority_name(crs)} are good to {good_m:g} m, by PROJ's word"
     for way in ways.unavailable_operations:
         for grid in way.grids:
-            if 0.0 <= way.accuracy < good_m:
+            if 0.0 <= way.accuracy <= good_m / 2.0:  # worth fetching
                 fetch = f"pyproj sync --file {grid.short_name}"
                 return (f"{told}. With its grid to {way.accuracy:g} m: {fetch}",)
     return (f"{told}.",)
