@@ -25,6 +25,7 @@ from geofield.tracks.blocks import obstacle_shapes
 from geofield.tracks.by_hand import on_layout, with_drawn, with_own
 from geofield.tracks.clip import Crossings, Pieces, clip_tracks
 from geofield.tracks.direction import Baseline, find_baseline
+from geofield.tracks.enclosed import tell_enclosed
 from geofield.tracks.fewest import fewest_tracks
 from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.headland import (
@@ -240,7 +241,7 @@ def plan_tracks(
         **optional,
     )
     tracks = with_drawn(tracks, said.drawn, min_segment_m) if said.drawn else tracks
-    return with_own(tracks, said.edits)
+    return tell_enclosed(with_own(tracks, said.edits))
 
 
 def clip_shapes(
