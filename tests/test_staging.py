@@ -193,6 +193,19 @@ def test_links_in_the_output_folder_lead_nowhere(tmp_path: Path) -> None:
     assert (outside / "precious").read_text() == "mine"
 
 
+def test_what_is_replaced_keeps_its_mode(tmp_path: Path) -> None:
+    # Shared with a group, or with nobody: neither is the next run's to change.
+    for name, mode in (("shared.txt", 0o664), ("mine.txt", 0o600)):
+        (tmp_path / name).touch()
+        (tmp_path / name).chmod(mode)
+    with staged_folder(tmp_path, overwrite=True) as folder:
+        for name in ("shared.txt", "mine.txt"):
+            (folder / name).write_text("new")
+    assert (tmp_path / "shared.txt").stat().st_mode & 0o777 == 0o664
+    assert (tmp_path / "mine.txt").stat().st_mode & 0o777 == 0o600
+    assert (tmp_path / "mine.txt").read_text() == "new"
+
+
 def test_a_file_that_cannot_be_read_is_told_as_such(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import subprocess
 import warnings
@@ -56,6 +57,19 @@ def plans() -> list[gf.Plan]:
         plan_at(500_400.0, 5_500_100.0, 32632, "north/2", farmer="Özil", yield_t=7.25),
         plan_at(300_000.0, 5_300_000.0, 32633, "east"),
     ]
+
+
+@pytest.mark.parametrize("umask", [0o002, 0o077])
+def test_files_may_be_read_by_whom_the_user_lets(
+    plans: list[gf.Plan], tmp_path: Path, umask: int
+) -> None:
+    usual = os.umask(umask)
+    try:
+        Farm(plans).write(tmp_path / "farm")
+    finally:
+        os.umask(usual)
+    files = [path for path in (tmp_path / "farm").rglob("*") if path.is_file()]
+    assert {path.stat().st_mode & 0o777 for path in files} == {0o666 & ~umask}
 
 
 def test_plans_come_back_equal(plans: list[gf.Plan], tmp_path: Path) -> None:

@@ -8,11 +8,11 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import tempfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from geofield.errors import FormatError
 from geofield.staging import cannot_write
@@ -84,16 +84,15 @@ class Store:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             # Readers pass over names that begin with a dot.
-            handle, temporary = tempfile.mkstemp(prefix=".", suffix=_HALF, dir=target.parent)
+            half = target.with_name(f".{uuid4().hex}{_HALF}")
             try:
-                with os.fdopen(handle, "wb") as stream:
+                with half.open("xb") as stream:
                     stream.write(data)
                     stream.flush()
                     os.fsync(stream.fileno())
-                Path(temporary).chmod(0o644)
-                Path(temporary).replace(target)
+                half.replace(target)
             except BaseException:
-                Path(temporary).unlink(missing_ok=True)
+                half.unlink(missing_ok=True)
                 raise
         except OSError as error:
             raise cannot_write(target, error) from error

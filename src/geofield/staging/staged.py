@@ -14,7 +14,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import FormatError, OutputExistsError
@@ -135,6 +135,8 @@ def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
                 kept = old / place.relative_to(target)
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 _keep(place, kept)
+                with suppress(OSError):  # a file system without modes
+                    shutil.copymode(place, source)
             moved.append((place, kept))
             source.replace(place)
     except BaseException:
