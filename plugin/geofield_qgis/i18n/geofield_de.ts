@@ -1105,7 +1105,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Latitude of a point in the field; not needed for the only parcel of --boundary, or one named.</source>
+      <source>Latitude of a point in the field, such as 35.0754 or '35 4.524 N'; not needed for the only parcel of --boundary, or one named.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1115,7 +1115,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Longitude of a point in the field; not needed for the only parcel of --boundary, or one named.</source>
+      <source>Longitude of a point in the field, such as 33.5311 or '33 31.866 E'; not needed for the only parcel of --boundary, or one named.</source>
       <translation type="unfinished" />
     </message>
     <message>

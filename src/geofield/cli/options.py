@@ -18,6 +18,7 @@ import click
 from pydantic.fields import FieldInfo
 
 from geofield.cli.console import say, say_note
+from geofield.cli.degrees import Degrees
 from geofield.errors import SettingsError
 from geofield.settings import (
     LonLat,
@@ -58,25 +59,6 @@ name_option = click.option(
 )
 
 
-class Degrees(click.FloatRange):
-    """An angle between plus and minus a limit; not a number is no angle."""
-
-    name = "degrees"
-
-    def __init__(self, limit: float) -> None:
-        super().__init__(-limit, limit)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The angle as a float."""
-        try:
-            angle = float(value)
-        except ValueError:
-            angle = math.nan
-        if not math.isfinite(angle):
-            self.fail(f"{value!r} is not an angle: write degrees, such as 35.0754.", param, ctx)
-        return super().convert(angle, param, ctx)
-
-
 class Number(click.FloatRange):
     """A number between two others, which not a number and what has no end are not."""
 
@@ -102,12 +84,15 @@ class NearestChoice(click.Choice[str]):
 
 def point_or_parcel_options(command: Command) -> Command:
     """Add ``--lat`` and ``--lon``, which a parcel of the user's own may stand for."""
-    for name, what, limit in (("lon", "Longitude", 180), ("lat", "Latitude", 90)):
+    for name, what, letters, such in (
+        ("lon", "Longitude", "EW", "33.5311 or '33 31.866 E'"),
+        ("lat", "Latitude", "NS", "35.0754 or '35 4.524 N'"),
+    ):
         command = click.option(
             f"--{name}",
-            type=Degrees(limit),
-            help=f"{what} of a point in the field; not needed for the only parcel of --boundary, "
-            "or one named.",
+            type=Degrees(letters),
+            help=f"{what} of a point in the field, such as {such}; not needed for the only parcel "
+            "of --boundary, or one named.",
         )(command)
     return command
 

@@ -10,8 +10,9 @@ import click
 from click.core import ParameterSource
 
 from geofield.cli.console import echo_json, progress_bar, say_note
+from geofield.cli.degrees import Degrees
 from geofield.cli.files import FOLDER, OLD_FILE, claim_file, output_option
-from geofield.cli.options import Degrees, Number, acknowledge_option, stage_options
+from geofield.cli.options import Number, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
@@ -50,8 +51,8 @@ Examples (the first one on the project's own sample):
 """
 )
 @click.argument("source")
-@click.option("--lat", type=Degrees(90), help="Latitude of the centre.")
-@click.option("--lon", type=Degrees(180), help="Longitude of the centre.")
+@click.option("--lat", type=Degrees("NS"), help="Latitude of the centre.")
+@click.option("--lon", type=Degrees("EW"), help="Longitude of the centre.")
 @click.option(
     "--area",
     type=OLD_FILE,
