@@ -33,7 +33,7 @@ def angle_of(text: str, letters: str) -> float | None:
         return None
     if letter and (sign or letter not in letters):
         return None
-    angle = sum(float(part) / 60**place for place, part in enumerate(parts))
+    angle = sum(float(part) / 60.0**place for place, part in enumerate(parts))
     return -angle if letter == letters[1] or sign not in ("", "+") else angle
 
 
