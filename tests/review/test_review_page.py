@@ -12,9 +12,10 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
 import pytest
+import shapely
 from axe_core_python.selenium import Axe
 from browser import Page, chromium, served
 from selenium import webdriver
@@ -25,10 +26,12 @@ from selenium.webdriver.common.keys import Keys
 from shapely import Polygon
 
 from geofield.errors import TrackWarning
+from geofield.notes import listening
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import DirectionName
+from geofield.tracks import plan_route, plan_tracks
 
 GEOFIELD = str(Path(sys.executable).with_name("geofield"))
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
@@ -391,6 +394,35 @@ def test_what_is_told_together_is_all_in_german(page: Page, plan_path: Path) -> 
     page.button("reload")
     page.wait(lambda: "hier sind die Spuren neu geplant" in page.text("message"))
     assert "Das Bild ist nicht zu sehen" in page.text("message")
+
+
+def test_notes_of_tracks_are_in_german(page: Page) -> None:
+    square, wall = shapely.box(0, 0, 100, 60), shapely.box(48, -5, 52, 65)
+    ring = shapely.Point(50, 30).buffer(20).difference(shapely.Point(50, 30).buffer(15))
+    asked: list[tuple[list[Polygon], dict[str, Any]]] = [
+        ([ring], {"spacing_m": 5}),
+        ([], {"spacing_m": 6, "width_m": 4}),
+        ([], {"spacing_m": 6, "headland_m": 9}),
+        ([], {"spacing_m": 90, "offset_m": 59, "last_strip": "leave"}),
+        ([square.buffer(1)], {"spacing_m": 5}),
+    ]
+    notes = list[str]()
+    with listening():
+        for obstacles, settings in asked:
+            notes += plan_tracks(square, obstacles, crs=32636, direction=90, **settings).notes
+        parted = plan_tracks(square, [wall], crs=32636, spacing_m=6, headland_m=12)
+        notes += plan_route(parted).notes
+        notes += plan_route(plan_tracks(square, crs=32636, spacing_m=30), pattern="skip").notes
+    assert len(set(notes)) >= 7
+    page.run("localStorage.setItem('language', 'de')")
+    page.driver.refresh()
+    told = page.driver.execute_async_script(
+        "const [notes, done] = arguments;"
+        "import('/web/words.js').then(words => done(notes.map(note => words.told(note))));",
+        notes,
+    )
+    assert [text for text in told if text in notes] == []
+    assert "Wege zwischen Abschnitten" in " ".join(told)
 
 
 def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:

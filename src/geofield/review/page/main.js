@@ -344,7 +344,7 @@ async function start() {
     inTurn(apply);
   };
   $("export").onclick = () => applied(() => act(() => api.exportAs($("export-format").value),
-    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes].join("\n"))));
+    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes.map(text => told(text))].join("\n"))));
   $("save-as").onclick = async () => {
     const name = $("save-name").value.trim();
     if (!name) $("save-name").focus();
