@@ -492,6 +492,23 @@ def test_obstacles_in_another_crs_and_of_other_kinds() -> None:
         plan_tracks(field, nameless, crs=CRS, spacing_m=4.0)
 
 
+def test_an_obstacle_of_several_kinds_of_shapes_is_each_of_them() -> None:
+    """As QGIS makes them when layers are merged or collected: they ended in a traceback."""
+    fence = shapely.LineString([(X + 70, Y - 5), (X + 70, Y + 45)])
+    shapes = [box(20, 9, 30, 21), fence]
+    apart = gpd.GeoDataFrame({"radius_m": [1.0, 1.0]}, geometry=shapes, crs=CRS)
+    nested = shapely.GeometryCollection([shapely.GeometryCollection([fence])])
+    mixed = shapely.GeometryCollection([shapes[0], nested])
+    one = gpd.GeoDataFrame({"radius_m": [1.0]}, geometry=[mixed], crs=CRS)
+    expected, found = (
+        plan_tracks(box(0, 0, 100, 40), each, crs=CRS, spacing_m=4.0) for each in (apart, one)
+    )
+    assert found.segments.geometry.geom_equals_exact(expected.segments.geometry, 1e-9).all()
+    assert set(found.gaps["obstacle_no"]) == {1}
+    with pytest.raises(TrackError, match="Obstacle 1 is a LineString without a radius"):
+        plan_tracks(box(0, 0, 100, 40), [mixed], crs=CRS, spacing_m=4.0)
+
+
 @pytest.mark.parametrize("settings", [{}, {"min_segment_m": 5.0}])
 def test_an_obstacle_over_the_whole_field(settings: dict[str, Any]) -> None:
     with pytest.warns(TrackWarning, match="covers the field" + ".*5 m" * len(settings)):

@@ -6,6 +6,7 @@ from typing import Any
 
 import geopandas as gpd
 import numpy as np
+import pandas as pd
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -62,6 +63,9 @@ def obstacle_shapes(
         return ObstacleShapes(np.empty((0, 3)), none, np.empty(0, dtype=object), none)
     frame = _as_table(obstacles, crs, outline)
     frame = active(numbered(frame))
+    while (mixed := (frame.geom_type == "GeometryCollection") & ~frame.is_empty).any():
+        parts = frame[mixed].explode(ignore_index=True)
+        frame = pd.concat([frame[~mixed], parts], ignore_index=True)
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     missing = shapely.is_missing(geometry) | shapely.is_empty(geometry)
     if missing.any():
