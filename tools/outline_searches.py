@@ -61,8 +61,7 @@ def searched(case: Case) -> list[Searched]:
     include: tuple[tuple[float, float], ...] = ()
     exclude: tuple[tuple[float, float], ...] = ()
     for turn in range(1 + CORRECTIONS):
-        candidates = search.candidates(include, exclude)
-        taken = search.likeliest(include, exclude)
+        candidates, taken = search.answer(include, exclude)
         if taken is None:
             break
         polygons = [one.polygon for one in candidates]

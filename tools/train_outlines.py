@@ -63,9 +63,8 @@ from tiny_vit import pretrained
 from torch import Tensor, nn
 from torch.nn import functional
 
-from geofield.field.morphology import filled
+from geofield.field.morphology import filled, part_at
 from geofield.field.network import ANSWER_PX, BANDS, POINTS, SIDE_PX, normalised, points_maps
-from geofield.field.segmentation import part_at
 
 SEED = 3
 BATCH, RATE, DECAY, AVERAGE = 64, 2e-3, 2e-2, 0.998

@@ -68,8 +68,7 @@ from outline_cases import FOLDS, TABLES, left_out
 from outline_searches import Searched, all_searched
 from scipy.optimize import minimize
 
-from geofield.field.candidate import Candidate
-from geofield.field.likely import MOST_CERTAIN, evidence_of
+from geofield.field.likely import MOST_CERTAIN, Candidate, evidence_of
 from geofield.field.quality import TRUSTED
 from geofield.field.ranking import (
     BEND,

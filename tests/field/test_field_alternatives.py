@@ -10,10 +10,8 @@ import pytest
 import shapely
 
 from geofield.field import extract_field
-from geofield.field.alternatives import other_outlines
-from geofield.field.candidate import Candidate
-from geofield.field.doubt import doubtful
-from geofield.field.likely import Likely
+from geofield.field.answer import doubtful
+from geofield.field.likely import Candidate, Likely, other_outlines
 from geofield.field.search import WindowSearch, search_field
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -76,7 +74,7 @@ def test_imagined_outlines_hold_the_point_and_change_nothing_that_is_found_later
     one = simulate_field(seed, SimulationSettings(width_px=256, height_px=256))
     at = one.scene.pixel_of(lat=one.lat, lon=one.lon)
     asked, unasked = search_field(one.scene, *at), search_field(one.scene, *at)
-    first = asked.candidates()
+    first, _ = asked.answer()
     imagined = asked.imagined()
     assert imagined
     for each in imagined:
@@ -85,9 +83,9 @@ def test_imagined_outlines_hold_the_point_and_change_nothing_that_is_found_later
     # Some of them are none that were found.
     assert {each.polygon for each in imagined} - {each.polygon for each in first}
     beside = ((asked.seed_px[0] + 9.0, asked.seed_px[1] + 5.0),)
-    later = asked.candidates((), beside)
+    later, _ = asked.answer((), beside)
     assert [each.polygon for each in later] == [
-        each.polygon for each in unasked.candidates((), beside)
+        each.polygon for each in unasked.answer((), beside)[0]
     ]
 
 

@@ -14,10 +14,9 @@ import shapely
 from geofield.errors import FieldError
 from geofield.field import FieldSearch, extract_field
 from geofield.field.border import measure
-from geofield.field.candidate import Candidate
 from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
-from geofield.field.likely import likeliest
+from geofield.field.likely import Candidate, likeliest
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import Ranking, exact, log_odds, trained
 from geofield.field.said import Said

@@ -220,7 +220,7 @@ def test_a_point_corrects_the_outline_that_was_shown(field, monkeypatch):
     place = field.scene.pixel_of(lat=field.lat, lon=field.lon)
     search = search_field(field.scene, *place)
     inner = field.field.polygon_px(field.scene.grid).buffer(-4).exterior.coords[1]
-    search.likeliest((), (search.place(*inner),))
+    search.answer((), (search.place(*inner),))
     first, second = corrected
     assert first is None
     assert np.array_equal(second, covered(ring(shown[0]), second.shape))

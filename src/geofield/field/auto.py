@@ -3,28 +3,25 @@
 A network that sees the points says how likely each place belongs to the field (`looks`). Its ground
 at a few levels of likelihood becomes straight outlines (`answer`), what a person said changes those
 that were taken before (`mend`; all in `search`). The best is taken by what the picture shows along
-them (`border`, `ranking`, `likely`), others that may be meant are offered (`alternatives`), and all
-are carried to the picture's own pixels (`refine`).
+them (`border`, `ranking`), others that may be meant are offered (both in `likely`), and all are
+carried to the picture's own pixels (`refine`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.field.alternatives import other_outlines
-from geofield.field.likely import Likely
+from geofield.field.likely import Likely, other_outlines
 from geofield.field.morphology import inner, plump
-from geofield.field.refine import carried, enlarged
+from geofield.field.points import Points
+from geofield.field.refine import carried
 from geofield.field.search import WindowSearch, search_field
 from geofield.model import Scene
 from geofield.model.segmentation import Segmentation
-
-Points = Sequence[tuple[float, float]]
 
 #: A border weaker than this, in units of what the field has inside, is none.
 _WEAK = 1.6
@@ -60,15 +57,14 @@ def segment(
     if search is None:
         search = search_field(scene, x_px, y_px)
     belong, apart = (tuple(search.place(*at) for at in one) for one in (include, exclude))
-    taken = search.likeliest(belong, apart)
+    found, taken = search.answer(belong, apart)
     if taken is None:
         # Nothing stands out of anything: one surface fills the picture.
         return Segmentation(scene.valid, ("no border was found anywhere",), (("certainty", 0.0),))
     # Who gives further points does not choose between grounds any more.
     ask = not (belong or apart) and taken.certainty < _SURE
     more = search.imagined() if ask else ()
-    found = [*search.candidates(belong, apart), *more]
-    likely = [taken, *other_outlines(taken, found)]
+    likely = [taken, *other_outlines(taken, [*found, *more])]
     outlines = [one.candidate.polygon for one in likely]
     points = (search.seed_px, *belong), apart
     masks = carried(scene, outlines, search.factor, *points, times=search.seen.times)
@@ -83,7 +79,8 @@ def _told(
 ) -> Segmentation:
     """An outline on the picture's own pixels, with what is to be told of it."""
     things = plump(likely.candidate.holes | search.things)
-    holes = inner(enlarged(things, search.factor, mask.shape), mask)
+    large = things.repeat(search.factor, axis=0).repeat(search.factor, axis=1)
+    holes = inner(large[: mask.shape[0], : mask.shape[1]], mask)
     figures = likely.candidate.figures
     contrast = math.exp(figures["strength_50_above_inside"])
     weakest = math.exp(figures["strength_25_above_inside"])

@@ -5,6 +5,8 @@ The study named non-linear diffusion as the smoothing it lacked.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,12 +56,4 @@ def diffuse(
 def diffused(scene: Scene) -> Scene:
     """A scene with every band diffused."""
     bands = np.stack([np.rint(diffuse(band)).clip(0, 255) for band in scene.bands])
-    return Scene(
-        scene.grid,
-        bands.astype(np.uint8),
-        scene.roles,
-        scene.valid,
-        scene.source,
-        scene.scaling,
-        scene.notes,
-    )
+    return replace(scene, bands=bands.astype(np.uint8))

@@ -21,12 +21,12 @@ from geofield.errors import (
     refuse_unknown,
 )
 from geofield.field.diffusion import diffused
-from geofield.field.outline import straight_outline
+from geofield.field.morphology import fill_holes, part_at_any
+from geofield.field.outline import largest_valid, straight_outline
 from geofield.field.part import Part
 from geofield.field.plausible import look
 from geofield.field.points import EXACT_PX, drawn, obeying
 from geofield.field.quality import judge
-from geofield.field.segmentation import fill_holes, part_at_any
 from geofield.field.views import FieldSearch
 from geofield.grid import Grid
 from geofield.methods import FIELD
@@ -78,8 +78,8 @@ def extract_field(
         Further points, degrees: ground that belongs to the field, ground that does not. What
         they say is obeyed.
     method : str
-        ``auto`` uses colour, near infrared, texture and edges; ``study`` is the study's
-        threshold (METHOD.md, section 2).
+        ``auto`` asks a network, and what the picture shows along borders in all its bands;
+        ``study`` is the study's threshold (METHOD.md, section 2).
     regions : sequence of int
         Of method ``study``: take these numbered regions instead of the one at the point.
     holes : {"fill", "keep"}, optional
@@ -275,10 +275,4 @@ def _with_data(scene: Scene) -> Scene:
 
 
 def _to_metric(outline_px: Polygon, grid: Grid) -> Polygon:
-    polygon = shapely.transform(outline_px, grid.to_metric_array)
-    if not polygon.is_valid:
-        polygon = max(
-            (p for p in shapely.get_parts(shapely.make_valid(polygon)) if isinstance(p, Polygon)),
-            key=lambda p: p.area,
-        )
-    return polygon
+    return largest_valid(shapely.transform(outline_px, grid.to_metric_array))

@@ -7,6 +7,7 @@ from typing import Any
 
 from geofield.errors import SettingsError
 from geofield.field.extract import extract_field
+from geofield.grid import Grid
 from geofield.model import Field, Scene
 from geofield.model.frame import along_frame
 from geofield.notes import listening, warn
@@ -47,27 +48,23 @@ def grow_field(
     """
     if not 0 < size_m <= largest_m:
         raise SettingsError(f"The window must grow from {size_m} m to {largest_m} m.")
-    covered: tuple[float, ...] | None = None
+    covered: Grid | None = None
     field: Field | None = None
     while True:
         scene = read(size_m)
-        bounds = _extent(scene)
-        if field is not None and bounds == covered and scene.valid.size > 1:
-            break  # all of the picture was searched
         # Two windows narrower than a pixel are the same pixel, not all of the picture.
-        ended = (bounds == covered and scene.valid.size > 1) or size_m >= largest_m
+        is_all = scene.grid == covered and scene.valid.size > 1
+        if field is not None and is_all:
+            break  # it was searched
+        ended = is_all or size_m >= largest_m
         # A window of one pixel, or of evenly white ground, is no empty picture yet.
         if ended or not scene.is_blank:
             with listening() as heard:
                 field = extract_field(scene, lat=lat, lon=lon, **options)
             if ended or not along_frame(field.polygon, field.crs, scene.grid):
                 break
-        covered = bounds
+        covered = scene.grid
         size_m = min(2 * size_m, largest_m)
     for note in heard:
         warn(str(note), type(note), stacklevel=2)
     return field, scene
-
-
-def _extent(scene: Scene) -> tuple[float, ...]:
-    return (*scene.grid.transform[:6], scene.grid.width_px, scene.grid.height_px)

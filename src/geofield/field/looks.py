@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
+from geofield.field.morphology import part_at
 from geofield.field.network import (
     ANSWER_PX,
     SIDE_PX,
     Features,
-    Points,
     features,
     log_odds,
     normalised,
 )
-from geofield.field.segmentation import part_at
+from geofield.field.points import Points
 from geofield.learned.network import Network
 from geofield.model import Scene
 

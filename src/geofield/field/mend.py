@@ -7,7 +7,7 @@ of what is wrong, so the border is about as far beyond the point as the side is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -18,11 +18,10 @@ from shapely import Polygon
 
 from geofield.errors import FieldError
 from geofield.field.frame import Frame
-from geofield.field.points import obeying, obeys
+from geofield.field.points import Points, obeying, obeys
 from geofield.field.straight import meeting, ring
 
 FloatArray = NDArray[np.float64]
-Points = Sequence[tuple[float, float]]
 
 #: Sides beside a point that are moved; by so many times its distance, pixels at least.
 _SIDES, _REACHES, _LEAST_PX = 2, (1.5, 2.0, 3.0), 1.0

@@ -7,16 +7,14 @@ Its answer is coarse: it says which ground; where exactly that ends is asked of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
+from geofield.field.points import Points
 from geofield.learned.network import Network
 
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
-Points = Sequence[tuple[float, float]]
 Features = tuple[FloatArray, ...]
 
 #: Sides of the picture that the network sees, and of its answer, pixels.

@@ -62,10 +62,15 @@ def mask_polygon(mask: BoolArray) -> Polygon:
     )
     shell, *holes = (shapely.linearrings(one) for one in geometry["coordinates"])
     polygon = Polygon(shell, holes)
-    if not polygon.is_valid:  # rings that touch at a corner
-        parts = shapely.get_parts(shapely.make_valid(polygon))
-        polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
-    return polygon
+    return largest_valid(polygon)  # rings may touch at a corner
+
+
+def largest_valid(polygon: Polygon) -> Polygon:
+    """A valid polygon as it is, of an invalid one the largest part."""
+    if polygon.is_valid:
+        return polygon
+    parts = shapely.get_parts(shapely.make_valid(polygon))
+    return max((p for p in parts if isinstance(p, Polygon)), key=lambda p: p.area)
 
 
 def straight_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
@@ -141,7 +146,9 @@ def _straight_ring(
     chain = _midpoints(corners)
     if len(chain) < 12:
         return corners[:-1]
-    chain = np.roll(chain, -_corner_index(chain), axis=0)
+    # The point farthest from the centre is surely a turn.
+    farthest = int(np.argmax(np.sum((chain - chain.mean(axis=0)) ** 2, axis=1)))
+    chain = np.roll(chain, -farthest, axis=0)
     closed = np.vstack([chain, chain[:1]])
     simple = shapely.get_coordinates(shapely.LineString(closed).simplify(tolerance))
     breaks = _indices(closed, simple)
@@ -160,18 +167,15 @@ def _straight_ring(
         vertices.extend(_corner(lines[i - 1], lines[i], turn, _CORNER_REACH * tolerance + 1.0))
     ring = np.clip(np.array(vertices), 0, [width, height])
     # Lines that became one leave vertices that say nothing.
-    return _drop_flat(ring, 0.3 * tolerance)
+    flat = shapely.LineString(np.vstack([ring, ring[:1]])).simplify(0.3 * tolerance)
+    turns = shapely.get_coordinates(flat)[:-1]
+    return turns if len(turns) >= 3 else None
 
 
 def _midpoints(corners: FloatArray) -> FloatArray:
     """Midpoints of the unit sides of a ring on pixel corners."""
     ring = shapely.get_coordinates(shapely.segmentize(shapely.LineString(corners), 1.0))
     return 0.5 * (ring[:-1] + ring[1:])
-
-
-def _corner_index(chain: FloatArray) -> int:
-    """A point that is surely a turn: the one farthest from the centre."""
-    return int(np.argmax(np.sum((chain - chain.mean(axis=0)) ** 2, axis=1)))
 
 
 def _indices(closed: FloatArray, simple: FloatArray) -> list[int]:
@@ -237,9 +241,3 @@ def _corner(before: Line, after: Line, turn: FloatArray, reach: float) -> list[F
     if np.hypot(*(feet[0] - feet[1])) < 0.75:
         return [0.5 * (feet[0] + feet[1])]
     return feet
-
-
-def _drop_flat(ring: FloatArray, tolerance: float) -> FloatArray | None:
-    closed = shapely.LineString(np.vstack([ring, ring[:1]])).simplify(tolerance)
-    vertices = shapely.get_coordinates(closed)[:-1]
-    return vertices if len(vertices) >= 3 else None

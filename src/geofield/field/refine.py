@@ -99,14 +99,6 @@ def within(outline: Polygon, shape: tuple[int, int]) -> BoolArray:
     return np.asarray(rasterize([(outline, 1)], shape, dtype=np.uint8) > 0)
 
 
-def enlarged(mask: BoolArray, factor: int, shape: tuple[int, ...]) -> BoolArray:
-    """A reduced picture's mask at the pixels of the picture itself, cut to its shape."""
-    if factor == 1:
-        return mask
-    large = np.repeat(np.repeat(mask, factor, axis=0), factor, axis=1)
-    return np.ascontiguousarray(large[: shape[0], : shape[1]])
-
-
 def aligned(
     outline: Polygon, layers: NDArray[np.float32], reach_px: float, frame: Frame
 ) -> Polygon:

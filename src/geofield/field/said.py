@@ -7,7 +7,6 @@ the last of them errs: what they do not correct was right, and they lie well wit
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,10 +15,10 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from geofield.field.points import Points
 from geofield.field.ranking import log_odds
 
 Mask = NDArray[np.uint8]
-Points = Sequence[tuple[float, float]]
 
 #: From here on a border is clear of the corrections, pixels.
 _CLEAR_PX = 12.0

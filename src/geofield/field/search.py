@@ -17,21 +17,19 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.answer import ANSWER, network_outlines
+from geofield.field.answer import ANSWER, doubtful, network_outlines
 from geofield.field.border import measure
-from geofield.field.candidate import Candidate
 from geofield.field.clearing import clear
-from geofield.field.doubt import doubtful
 from geofield.field.evidence import channels, whiten
 from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
-from geofield.field.likely import Likely, likeliest
+from geofield.field.likely import Candidate, Likely, likeliest
 from geofield.field.looks import Seen, seen
 from geofield.field.mend import forced, mended
+from geofield.field.morphology import part_at
 from geofield.field.points import obeys, without_last
 from geofield.field.ranking import Figures
 from geofield.field.said import Said
-from geofield.field.segmentation import part_at
 from geofield.field.straight import ring
 from geofield.model import Scene
 
@@ -122,11 +120,13 @@ class WindowSearch:
         likely = self.seen.probability(*points, self.frame.shape, self.factor, once=once)
         return likely if self.frame.inside is None else likely * self.frame.inside
 
-    def candidates(self, include: Points = (), exclude: Points = ()) -> list[Candidate]:
-        """Outlines that obey the points, the best first; none where nothing stands out.
+    def answer(
+        self, include: Points = (), exclude: Points = ()
+    ) -> tuple[list[Candidate], Likely | None]:
+        """Outlines that obey the points, the best first, and the one that is taken.
 
-        Where none can, for two points of both kinds share a pixel of the reduced picture, those
-        found without the last point: they are cut at full size.
+        None where nothing stands out. Where none can obey, for two points of both kinds share a
+        pixel of the reduced picture, those found without the last point: they are cut at full size.
 
         Parameters
         ----------
@@ -134,24 +134,17 @@ class WindowSearch:
             Further points that belong and that do not, pixel coordinates of the searched
             picture.
         """
-        return self._answer(include, exclude)[0]
-
-    def likeliest(self, include: Points = (), exclude: Points = ()) -> Likely | None:
-        """Which of the candidates is taken; None where there are none."""
-        return self._answer(include, exclude)[1]
-
-    def _answer(self, include: Points, exclude: Points) -> tuple[list[Candidate], Likely | None]:
         asked = include, exclude
         if asked in self.answered:
             return self.answered[asked]
         shorter = without_last(*asked)
-        found = best_first(self._found(*asked, self._before(shorter)))
+        found = self._found(*asked, self._before(shorter))
         taken = likeliest(found, self.learned.ranking) if found else None
         if taken is not None:
             best = taken.candidate.polygon, found[0].polygon
             self.taken[asked] = list(dict.fromkeys(best))
         elif shorter:
-            return self._answer(*shorter[0])
+            return self.answer(*shorter[0])
         self.answered.clear()
         self.answered[asked] = found, taken
         return found, taken
@@ -180,8 +173,8 @@ class WindowSearch:
 
     def _found(
         self, include: Points, exclude: Points, before: Sequence[Polygon]
-    ) -> dict[Polygon, Candidate]:
-        """Outlines that obey the points, after some that were taken without the last one."""
+    ) -> list[Candidate]:
+        """Outlines that obey the points, best first, after some taken without the last one."""
         likely = self.likely(include, exclude)
         points = (self.seed_px, *include), exclude
         taken = self.known[before[0]].mask if before else None
@@ -207,7 +200,7 @@ class WindowSearch:
             # A strip to a point is no field: only where nothing else obeys.
             for polygon in holes:
                 add(dict.fromkeys(forced(polygon, *points), holes[polygon]))
-        return found
+        return sorted(found.values(), key=lambda one: -one.score)
 
     def _before(self, shorter: Sequence[tuple[Points, Points]]) -> list[Polygon]:
         """What was taken before the last of the points; none without points."""
@@ -215,7 +208,7 @@ class WindowSearch:
             return []
         asked = next((one for one in shorter if one in self.taken), shorter[0])
         if asked not in self.taken:
-            self._answer(*asked)
+            self.answer(*asked)
         return self.taken.get(asked, [])
 
     def _scored(self, held: Sequence[Held], said: Said) -> Iterator[tuple[Held, Figures, float]]:
@@ -238,11 +231,6 @@ class WindowSearch:
     def _measured(self, polygon: Polygon, holes: BoolArray) -> Held:
         mask = covered(ring(polygon), self.frame.shape)
         return Held(polygon, holes, mask, measure(self.layers, polygon, self.frame))
-
-
-def best_first(found: Mapping[Polygon, Candidate]) -> list[Candidate]:
-    """Candidates by score."""
-    return sorted(found.values(), key=lambda one: -one.score)
 
 
 def search_field(

@@ -19,11 +19,11 @@ from shapely import Polygon, affinity
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field.learned import Learned, shipped
 from geofield.field.looks import Seen, seen
+from geofield.field.morphology import part_at
 from geofield.field.network import SIDE_PX
 from geofield.field.part import Part
 from geofield.field.points import Points, without_last
 from geofield.field.search import WindowSearch, search_field
-from geofield.field.segmentation import part_at
 from geofield.grid import Grid
 from geofield.model import Scene
 
@@ -138,7 +138,7 @@ class FieldSearch:
         except (FieldError, PointOutsideError):
             return False
         search = view.search
-        taken = search.likeliest(
+        _, taken = search.answer(
             *(tuple(search.place(*at) for at in places) for places in (belong, apart))
         )
         return taken is not None and not view.cuts(taken.candidate.polygon)
