@@ -15,7 +15,6 @@ import argparse
 import json
 import statistics
 import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -95,9 +94,7 @@ def scikit_image(scene: Scene) -> Circles:
 
 
 def phase_code(scene: Scene) -> Circles:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = find_circles(scene.grey / 255, (4, 18), polarity="dark", sensitivity=0.93)
+    found = find_circles(scene.grey / 255, (4, 18), polarity="dark", sensitivity=0.93)
     return np.column_stack([found.x_px, found.y_px]), found.radius_px
 
 

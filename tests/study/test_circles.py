@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from geofield.errors import ObstacleError, ObstacleWarning
+from geofield.errors import ObstacleError
 from geofield.study.phase_code import find_circles
 
 
@@ -49,7 +49,7 @@ def test_pictures_without_circles_give_none(kind):
         "tiny": np.random.default_rng(1).random((3, 3)),
         "one": np.zeros((1, 1)),
     }[kind]
-    assert len(find_circles(grey, (6, 14), warn=False)) == 0
+    assert len(find_circles(grey, (6, 14))) == 0
 
 
 def test_one_radius_is_a_range():
@@ -79,8 +79,3 @@ def test_other_bad_values_are_refused():
         find_circles(grey, (6, 14), polarity="grey")  # type: ignore[arg-type]
     with pytest.raises(ObstacleError, match="method"):
         find_circles(grey, (6, 14), method="three_stage")  # type: ignore[arg-type]
-
-
-def test_the_study_range_warns():
-    with pytest.warns(ObstacleWarning, match="4 to 18 px"):
-        find_circles(np.zeros((20, 20)), (4, 18))

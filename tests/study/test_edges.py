@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from geofield.errors import ObstacleError
-from geofield.study.edges import EDGE_METHODS, EdgeScan, edge_map, gradient
+from geofield.study.edges import EDGE_METHODS, EdgeScan, gradient
+
+
+def edge_map(grey, method="sobel", threshold=None):
+    scan = EdgeScan.of(grey, method)
+    return scan.at(scan.default_threshold if threshold is None else threshold)
 
 
 @pytest.mark.parametrize("method", ["sobel", "prewitt"])
@@ -57,6 +62,6 @@ def test_canny_edge_of_a_disc_is_a_closed_thin_ring():
 
 def test_unknown_method_and_colour_are_refused():
     with pytest.raises(ObstacleError, match="laplace"):
-        edge_map(np.zeros((5, 5)), "laplace")  # type: ignore[arg-type]
+        edge_map(np.zeros((5, 5)), "laplace")
     with pytest.raises(ObstacleError, match="one band"):
         edge_map(np.zeros((5, 5, 3)))

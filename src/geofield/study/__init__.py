@@ -12,11 +12,11 @@ To read from top to bottom, in the order of the thesis:
 2. `edges`: Sobel, Prewitt, Roberts and Canny edge maps with thresholds and thinning.
 3. `accumulator`, `peaks`, `phase_code`: edge pixels vote for circles; PhaseCode and TwoStage
    read centres and radii from the votes.
-4. `checks`: found twice, too bright.
-5. `strategies`: which threshold and which edge method to trust (single, T-range, Max-of-All,
-   DLC, consensus).
-6. `detectors`: all of that on a scene. Begin here to follow a call from the command line.
-7. `hough`: the longest straight edge of the field, which its tracks are parallel to.
+4. `strategies`: which threshold and which edge method to trust (single, T-range, Max-of-All,
+   DLC, consensus), each circle once.
+5. `detectors`: all of that on a scene, and what is too bright. Begin here to follow a call from
+   the command line.
+6. `hough`: the longest straight edge of the field, which its tracks are parallel to.
 
 Pixel coordinates within `edges` to `detectors` count from the centre of the top-left pixel.
 """

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from geofield.errors import ObstacleError, refuse_unknown
-from geofield.study.edges import as_unit, gradient
+from geofield.study.edges import as_unit, gradient, separable
 
 Polarity = Literal["dark", "bright"]
 RADIUS_STEP_PX = 0.5
@@ -39,20 +38,14 @@ class EdgePixels:
         return int(self.x_px.size)
 
 
-def gaussian_window(length: int, sigma_px: float) -> NDArray[np.float64]:
-    """Return one axis of a truncated, normalised Gaussian window of odd length."""
-    offset = np.arange(length) - (length - 1) / 2
-    window = np.exp(-(offset**2) / (2 * sigma_px**2))
-    return cast("NDArray[np.float64]", window / window.sum())
-
-
 def smooth(
     image: NDArray[np.float64], length: int, sigma_px: float, border: Literal["nearest", "constant"]
 ) -> NDArray[np.float64]:
-    """Smooth with a truncated Gaussian, the border pixel repeated or followed by zeros."""
-    window = gaussian_window(length, sigma_px)
-    rows = ndimage.correlate1d(image, window, axis=0, mode=border)
-    return cast("NDArray[np.float64]", ndimage.correlate1d(rows, window, axis=1, mode=border))
+    """Smooth with a Gaussian cut off at an odd length, the border repeated or followed by zeros."""
+    offset = np.arange(length) - (length - 1) / 2
+    window = np.exp(-(offset**2) / (2 * sigma_px**2))
+    window /= window.sum()
+    return separable(image, window, window, border)
 
 
 def otsu_threshold(values: NDArray[np.float64]) -> float:
@@ -75,12 +68,7 @@ def otsu_threshold(values: NDArray[np.float64]) -> float:
     return float(np.mean(np.flatnonzero(between == top)) / 255)
 
 
-def voting_pixels(
-    image: NDArray[np.generic],
-    *,
-    edge_threshold: float | None = None,
-    region: NDArray[np.bool_] | None = None,
-) -> EdgePixels:
+def voting_pixels(image: NDArray[np.generic], edge_threshold: float | None) -> EdgePixels:
     """Return the pixels whose Sobel gradient is strong enough to vote.
 
     Parameters
@@ -88,10 +76,8 @@ def voting_pixels(
     image : array, shape (rows, cols)
         Integers are scaled to 0..1. A logical picture is smoothed first (9 x 9 Gaussian,
         sigma 1.5): its own gradient knows eight directions only.
-    edge_threshold : float, optional
-        Share of the largest gradient magnitude, 0..1; default Otsu's of the magnitudes.
-    region : bool array, optional
-        Only these pixels vote.
+    edge_threshold : float or None
+        Share of the largest gradient magnitude, 0..1; None takes Otsu's of the magnitudes.
 
     Raises
     ------
@@ -105,8 +91,6 @@ def voting_pixels(
         grey = smooth(grey, 9, 1.5, "nearest")
     gx, gy = gradient(grey, "sobel")
     magnitude = np.sqrt(gx * gx + gy * gy)
-    if region is not None:
-        magnitude = np.where(region, magnitude, 0.0)
     top = float(magnitude.max(initial=0.0))
     # Rounding leaves some 1e-17 of gradient on a constant picture: that is no edge.
     if top <= 1e-12:
@@ -125,10 +109,10 @@ def voting_pixels(
     )
 
 
-def radii_between(low_px: float, high_px: float) -> NDArray[np.float64]:
-    """Return the radii that are voted for, half a pixel apart."""
-    count = int(np.floor((high_px - low_px) / RADIUS_STEP_PX + 1e-9)) + 1
-    return low_px + RADIUS_STEP_PX * np.arange(count, dtype=np.float64)
+def evenly(start: float, stop: float, step: float) -> NDArray[np.float64]:
+    """Return numbers a step apart, both ends included."""
+    count = int(np.floor((stop - start) / step + 1e-9)) + 1
+    return start + step * np.arange(count, dtype=np.float64)
 
 
 def accumulate(

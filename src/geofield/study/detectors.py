@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geofield.errors import ObstacleError, is_number
-from geofield.model.circles import Circles, inside
+from geofield.model.circles import Circles, disc_means, inside
 from geofield.model.scene import Scene
 from geofield.raster import gaps_filled
 from geofield.study.accumulator import otsu_threshold
-from geofield.study.checks import (
-    GREY_LIMIT,
-    dark_enough,
-    first_of_duplicates,
-    relative_grey_limit,
-)
 from geofield.study.edges import EdgeMethod
 from geofield.study.phase_code import CircleMethod, find_circles
 from geofield.study.strategies import (
@@ -28,6 +22,7 @@ from geofield.study.strategies import (
     StrategyResult,
     StudyStrategy,
     ThresholdRange,
+    first_of_duplicates,
     run_strategy,
 )
 
@@ -37,6 +32,8 @@ StudyDetector = StudyStrategy | Literal["study_text", "study_listing", "study_dl
 STUDY_RADIUS_PX = (4.0, 18.0)
 STUDY_SMOOTHED_RADIUS_PX = (4.0, 16.0)
 STUDY_EDGE_THRESHOLD = 0.27
+GREY_LIMIT = 127.37
+"""Mean grey level (0..255) above which the study calls a detection false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +83,7 @@ def detect_by_study(
     }
     if options.grey_check is not None and options.grey_check != "none":
         limit = _grey_limit(options.grey_check, grey, region)
-        dark = dark_enough(grey, circles, limit, scene.valid)
+        dark = disc_means(grey, circles, scene.valid) <= limit
         circles = circles.take(dark)
         share = None if share is None else share[dark]
         detection["grey_limit"] = limit
@@ -103,7 +100,6 @@ def _listing(
         polarity="dark",
         sensitivity=options.sensitivity,
         method=options.circle_method,
-        warn=False,
     )
     return _checked(circles, region)
 
@@ -122,7 +118,6 @@ def _text(
         sensitivity=options.sensitivity,
         edge_threshold=STUDY_EDGE_THRESHOLD,
         method=options.circle_method,
-        warn=False,
     )
     return _checked(circles, region)
 
@@ -148,18 +143,14 @@ def _scan(
         method=options.circle_method,
         smoothed_radius_px=STUDY_SMOOTHED_RADIUS_PX if preset else None,
     )
-    ranges: dict[EdgeMethod, ThresholdRange] | None = None
-    if options.threshold_range is not None:
-        span = options.threshold_range
-        ranges = {"sobel": span, "prewitt": span, "roberts": span, "canny": span}
     return run_strategy(
         grey / 255,
         region,
         "dlc" if preset else cast("StudyStrategy", strategy),
         how,
-        methods=None if options.edge_method is None else (options.edge_method,),
+        edge_method=options.edge_method,
         threshold=options.threshold,
-        ranges=ranges,
+        threshold_range=options.threshold_range,
         min_share=options.min_share,
         progress=progress,
     )
@@ -168,10 +159,11 @@ def _scan(
 def _grey_limit(
     check: GreyCheck | float, grey: NDArray[np.float64], region: NDArray[np.bool_]
 ) -> float:
+    """The mean grey level above which a disc is none: the study's, the field's, or a given one."""
     if check == "absolute":
         return GREY_LIMIT
     if check == "relative":
-        return relative_grey_limit(grey, region)
+        return float(grey[region].mean()) if region.any() else GREY_LIMIT
     if is_number(check):
         return float(check)
     raise ObstacleError(

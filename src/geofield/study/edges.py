@@ -23,7 +23,6 @@ from geofield.errors import ObstacleError, refuse_unknown
 EdgeMethod = Literal["sobel", "prewitt", "roberts", "canny"]
 EDGE_METHODS: tuple[EdgeMethod, ...] = get_args(EdgeMethod)
 
-FloatImage = NDArray[np.floating]
 BoolImage = NDArray[np.bool_]
 
 CANNY_SIGMA_PX = float(np.sqrt(2.0))
@@ -37,12 +36,10 @@ def as_unit(image: NDArray[np.generic]) -> NDArray[np.float64]:
     """Return a picture as float64, integers scaled so that their largest value is 1."""
     if image.ndim != 2:
         raise ObstacleError(f"An edge map needs one band (row, col), got shape {image.shape}.")
-    if image.dtype == np.bool_:
-        return image.astype(np.float64)
+    grey: NDArray[np.float64] = image.astype(np.float64)
     if np.issubdtype(image.dtype, np.integer):
-        grey: NDArray[np.float64] = image.astype(np.float64)
-        return grey / float(np.iinfo(image.dtype.name).max)
-    return image.astype(np.float64)
+        grey /= float(np.iinfo(image.dtype.name).max)
+    return grey
 
 
 def gradient(
@@ -68,9 +65,7 @@ def gradient(
     if method in ("sobel", "prewitt"):
         side = np.array([1.0, 2.0, 1.0]) / 4 if method == "sobel" else np.full(3, 1 / 3)
         step = np.array([-0.5, 0.0, 0.5])
-        gx = _separable(grey, along_rows=side, along_cols=step)
-        gy = _separable(grey, along_rows=step, along_cols=side)
-        return gx, gy
+        return separable(grey, side, step), separable(grey, step, side)
     if method == "roberts":
         padded = np.pad(grey, ((0, 1), (0, 1)), mode="edge")
         here, right = padded[:-1, :-1], padded[:-1, 1:]
@@ -82,13 +77,15 @@ def gradient(
     return cast("NDArray[np.float64]", gx), cast("NDArray[np.float64]", gy)
 
 
-def _separable(
-    grey: NDArray[np.float64], along_rows: FloatImage, along_cols: FloatImage
+def separable(
+    grey: NDArray[np.float64],
+    down: NDArray[np.float64],
+    across: NDArray[np.float64],
+    border: Literal["nearest", "constant"] = "nearest",
 ) -> NDArray[np.float64]:
-    rows = ndimage.correlate1d(grey, along_rows, axis=0, mode="nearest")
-    return cast(
-        "NDArray[np.float64]", ndimage.correlate1d(rows, along_cols, axis=1, mode="nearest")
-    )
+    """Correlate with a column and a row, the border pixel repeated or followed by zeros."""
+    rows = ndimage.correlate1d(grey, down, axis=0, mode=border)
+    return cast("NDArray[np.float64]", ndimage.correlate1d(rows, across, axis=1, mode=border))
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,49 +135,23 @@ class EdgeScan:
         scale = 6.0 if self.method == "roberts" else 4.0
         return float(np.sqrt(scale * self.strength.mean()))
 
-    def at(self, threshold: float | None = None) -> BoolImage:
+    def at(self, threshold: float) -> BoolImage:
         """Return the edge map at one threshold.
 
         Parameters
         ----------
-        threshold : float, optional
+        threshold : float
             Sobel, Prewitt, Roberts: absolute, on the gradient magnitude of a 0..1 picture.
             Canny: the high threshold, relative to the picture's maximum.
         """
-        t = self.default_threshold if threshold is None else float(threshold)
         if self.method != "canny":
-            return self.ridge & (self.strength > t * t)
-        weak = self.ridge & (self.strength > CANNY_LOW_SHARE * t)
+            return self.ridge & (self.strength > threshold * threshold)
+        weak = self.ridge & (self.strength > CANNY_LOW_SHARE * threshold)
         labels, count = ndimage.label(weak, structure=_EIGHT)
         strong = np.zeros(count + 1, dtype=bool)
-        strong[labels[weak & (self.strength > t)]] = True
+        strong[labels[weak & (self.strength > threshold)]] = True
         strong[0] = False
         return cast("BoolImage", strong[labels])
-
-
-def edge_map(
-    image: NDArray[np.generic], method: EdgeMethod = "sobel", threshold: float | None = None
-) -> BoolImage:
-    """Return the edges of a picture.
-
-    Parameters
-    ----------
-    image : array, shape (rows, cols)
-        Integers are scaled to 0..1.
-    method : {"sobel", "prewitt", "roberts", "canny"}
-    threshold : float, optional
-        See :meth:`EdgeScan.at`; default :attr:`EdgeScan.default_threshold`.
-
-    Returns
-    -------
-    bool array, shape (rows, cols)
-
-    Raises
-    ------
-    ObstacleError
-        For an unknown method or a picture that is not one band.
-    """
-    return EdgeScan.of(image, method).at(threshold)
 
 
 def _thinned(squared: NDArray[np.float64]) -> BoolImage:

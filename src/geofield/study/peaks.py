@@ -9,10 +9,9 @@ the dynamics", 1992).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 
 def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.intp], int]:
@@ -36,7 +35,10 @@ def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.in
     if height.size == 0 or float(height.max()) <= h:
         return labels, 0
     basin, tops = _basins(height)
-    neighbours = _Neighbours.of(*_passes(height, basin), tops.size)
+    first, second, level = _passes(height, basin)
+    both = np.concatenate([first, second]), np.concatenate([second, first])
+    passes = csr_matrix((np.concatenate([level, level]), both), shape=(tops.size, tops.size))
+    neighbours = passes.indptr.tolist(), passes.indices.tolist(), passes.data.tolist()
     tallest = np.argsort(-tops, kind="stable")
     # A basin belongs to one plateau at most: two that shared it would reach each other.
     label = np.zeros(tops.size, dtype=np.intp)
@@ -44,7 +46,7 @@ def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.in
     count = 0
     heights = tops.tolist()
     for peak in tallest[: int(np.count_nonzero(tops > h))].tolist():
-        plateau = _reach(peak, h, heights, neighbours)
+        plateau = _reach(peak, h, heights, *neighbours)
         if plateau is None:
             continue
         count += 1
@@ -55,32 +57,13 @@ def plateau_labels(height: NDArray[np.float64], h: float) -> tuple[NDArray[np.in
     return labels, count
 
 
-@dataclass(frozen=True, slots=True)
-class _Neighbours:
-    """Which basins touch, and how high the passes are: those of basin i from start i on."""
+def _reach(
+    peak: int, h: float, tops: list[float], start: list[int], other: list[int], level: list[float]
+) -> list[int] | None:
+    """Return the basins reachable without going down by more than h, or None if one is higher.
 
-    start: list[int]
-    other: list[int]
-    level: list[float]
-
-    @classmethod
-    def of(
-        cls,
-        first: NDArray[np.intp],
-        second: NDArray[np.intp],
-        level: NDArray[np.float64],
-        count: int,
-    ) -> _Neighbours:
-        here = np.concatenate([first, second])
-        order = np.argsort(here, kind="stable")
-        start = np.concatenate([[0], np.cumsum(np.bincount(here, minlength=count))])
-        other = np.concatenate([second, first])[order]
-        return cls(start.tolist(), other.tolist(), np.concatenate([level, level])[order].tolist())
-
-
-def _reach(peak: int, h: float, tops: list[float], neighbours: _Neighbours) -> list[int] | None:
-    """Return the basins reachable without going down by more than h, or None if one is higher."""
-    start, other, level = neighbours.start, neighbours.other, neighbours.level
+    The passes from basin i are numbered from start[i] on: to which other one, how high.
+    """
     top = tops[peak]
     seen = {peak}
     stack = [peak]

@@ -13,14 +13,14 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield import notes
-from geofield.errors import ObstacleError, ObstacleWarning, refuse_unknown
+from geofield.errors import ObstacleError, refuse_unknown
 from geofield.model.circles import Circles, checked_range
 from geofield.study.accumulator import (
+    RADIUS_STEP_PX,
     EdgePixels,
     Polarity,
     accumulate,
-    radii_between,
+    evenly,
     smooth,
     voting_pixels,
 )
@@ -39,8 +39,6 @@ def find_circles(
     sensitivity: float = DEFAULT_SENSITIVITY,
     edge_threshold: float | None = None,
     method: CircleMethod = "phase_code",
-    region: NDArray[np.bool_] | None = None,
-    warn: bool = True,
 ) -> Circles:
     """Find circles in a grey or logical picture.
 
@@ -49,8 +47,8 @@ def find_circles(
     image : array, shape (rows, cols)
         Integers are scaled to 0..1.
     radius_px : (low, high)
-        Radii in pixels. The transform is at its best with ``low > 5`` and ``high < 3 low``;
-        a range outside warns, since the study's own 4 to 18 is one.
+        Radii in pixels. The transform is at its best with ``low > 5`` and ``high < 3 low``,
+        which the study's own 4 to 18 are not.
     polarity : {"bright", "dark"}
         Of the circles against what is around them.
     sensitivity : float
@@ -58,10 +56,6 @@ def find_circles(
     edge_threshold : float, optional
         Share of the largest gradient above which pixels vote; default Otsu's.
     method : {"phase_code", "two_stage"}
-    region : bool array, optional
-        Only these pixels vote.
-    warn : bool
-        Whether a radius range outside the recommended one warns.
 
     Returns
     -------
@@ -73,32 +67,13 @@ def find_circles(
     ObstacleError
         For an impossible range, sensitivity, threshold, polarity or method.
     """
-    low, high = checked_range(radius_px)
+    radii = evenly(*checked_range(radius_px), RADIUS_STEP_PX)
     if not 0 <= sensitivity <= 1:
         raise ObstacleError(f"The sensitivity {sensitivity:g} is outside 0 to 1.")
     refuse_unknown(ObstacleError, "circle method", method, CIRCLE_METHODS)
-    if warn and (low <= 5 or high >= 3 * low):
-        notes.warn(
-            f"Radii of {low:g} to {high:g} px are outside the range the circular Hough "
-            "transform is reliable in (above 5 px, and less than threefold).",
-            ObstacleWarning,
-            stacklevel=2,
-        )
-    edges = voting_pixels(image, edge_threshold=edge_threshold, region=region)
+    edges = voting_pixels(image, edge_threshold)
     if len(edges) == 0:
         return Circles()
-    return circles_from_edges(edges, (low, high), polarity, sensitivity, method)
-
-
-def circles_from_edges(
-    edges: EdgePixels,
-    radius_px: tuple[float, float],
-    polarity: Polarity,
-    sensitivity: float,
-    method: CircleMethod = "phase_code",
-) -> Circles:
-    """Find circles from the pixels that vote; see :func:`find_circles`."""
-    radii = radii_between(*radius_px)
     weight = 1.0 / radii
     if method == "phase_code":
         span = float(np.log(radii[-1]) - np.log(radii[0])) or 1.0

@@ -19,8 +19,7 @@ from scipy.spatial import cKDTree
 
 from geofield.errors import ObstacleError, plain_number, refuse_unknown
 from geofield.model.circles import Circles, inside
-from geofield.study.accumulator import Polarity
-from geofield.study.checks import first_of_duplicates
+from geofield.study.accumulator import evenly
 from geofield.study.edges import EDGE_METHODS, EdgeMethod, EdgeScan
 from geofield.study.phase_code import DEFAULT_SENSITIVITY, CircleMethod, find_circles
 
@@ -47,16 +46,14 @@ class EdgeCircles:
     Attributes
     ----------
     radius_px : (low, high)
-    polarity, sensitivity, edge_threshold, method
-        See :func:`geofield.study.find_circles`.
+    sensitivity, method
+        See :func:`geofield.study.phase_code.find_circles`.
     smoothed_radius_px : (low, high) or None
         Radii of a second pass on the edge map smoothed by 3 x 3; None for no second pass.
     """
 
     radius_px: tuple[float, float]
-    polarity: Polarity = "bright"
     sensitivity: float = DEFAULT_SENSITIVITY
-    edge_threshold: float | None = None
     method: CircleMethod = "phase_code"
     smoothed_radius_px: tuple[float, float] | None = None
 
@@ -75,11 +72,8 @@ class EdgeCircles:
         return find_circles(
             edges,
             radius_px,
-            polarity=self.polarity,
             sensitivity=self.sensitivity,
-            edge_threshold=self.edge_threshold,
             method=self.method,
-            warn=False,
         )
 
 
@@ -112,9 +106,9 @@ def run_strategy(
     strategy: StudyStrategy,
     how: EdgeCircles,
     *,
-    methods: Iterable[EdgeMethod] | None = None,
+    edge_method: EdgeMethod | None = None,
     threshold: float | None = None,
-    ranges: dict[EdgeMethod, ThresholdRange] | None = None,
+    threshold_range: ThresholdRange | None = None,
     min_share: float = 0.1,
     progress: Progress | None = None,
 ) -> StrategyResult:
@@ -127,11 +121,11 @@ def run_strategy(
         The field; only circles with their centre in it count.
     strategy : {"single", "t_range", "max_of_all", "dlc", "consensus"}
     how : EdgeCircles
-    methods : iterable of str, optional
-        Edge methods; default Sobel for ``single`` and ``t_range``, all four otherwise.
+    edge_method : str, optional
+        Default Sobel for ``single`` and ``t_range``, all four otherwise.
     threshold : float, optional
         ``single``: the edge threshold; default the method's own.
-    ranges : dict of method to (start, stop, step), optional
+    threshold_range : (start, stop, step), optional
         The thresholds of a scan, stop included; default :data:`DEFAULT_RANGES`.
     min_share : float
         ``consensus``: the share of the settings that find anything which must see a circle.
@@ -144,46 +138,35 @@ def run_strategy(
         For an unknown strategy or method, or an impossible range.
     """
     refuse_unknown(ObstacleError, "strategy", strategy, STUDY_STRATEGIES)
+    if edge_method is not None:
+        refuse_unknown(ObstacleError, "edge method", edge_method, EDGE_METHODS)
+        methods: tuple[EdgeMethod, ...] = (edge_method,)
+    else:
+        methods = ("sobel",) if strategy in ("single", "t_range") else EDGE_METHODS
     plan: list[tuple[EdgeMethod, float | None]] = []
-    for method in _edge_methods(strategy, methods):
+    for method in methods:
         if strategy in ("single", "max_of_all"):
             plan.append((method, threshold if strategy == "single" else None))
         else:
-            steps = thresholds({**DEFAULT_RANGES, **(ranges or {})}[method])
-            plan.extend((method, float(t)) for t in steps)
+            span = DEFAULT_RANGES[method] if threshold_range is None else threshold_range
+            plan.extend((method, float(t)) for t in thresholds(span))
 
     counts: dict[str, list[tuple[float, int]]] = {}
-    best: tuple[int, EdgeMethod, float, Circles] | None = None
+    best = StrategyResult(Circles(), None, None, counts)
     seen: list[Circles] = []
-    for done, (method, at, circles) in enumerate(_scanned(grey, region, plan, how)):
+    for done, (method, at, circles) in enumerate(_scanned(grey, region, plan, how), start=1):
         counts.setdefault(method, []).append((at, len(circles)))
         # Strictly more: of equal counts the smallest threshold, the first method, stays.
-        if best is None or len(circles) > best[0]:
-            best = (len(circles), method, at, circles)
+        if best.method is None or len(circles) > len(best.circles):
+            best = StrategyResult(circles, method, at, counts)
         if len(circles):
             seen.append(circles)
         if progress is not None:
-            progress(done + 1, len(plan), f"{method} {at:.3f}")
+            progress(done, len(plan), f"{method} {at:.3f}")
     if strategy == "consensus":
-        circles, share = _agreed(seen, min_share)
-        return StrategyResult(circles, None, None, counts, share)
-    if best is None:
-        return StrategyResult(Circles(), None, None, counts)
-    return StrategyResult(best[3], best[1], best[2], counts)
-
-
-def _edge_methods(
-    strategy: StudyStrategy, methods: Iterable[EdgeMethod] | None
-) -> tuple[EdgeMethod, ...]:
-    """The edge methods that a strategy runs with."""
-    one = strategy in ("single", "t_range")
-    default: tuple[EdgeMethod, ...] = ("sobel",) if one else EDGE_METHODS
-    chosen = default if methods is None else tuple(methods)
-    if not chosen or (one and len(chosen) != 1):
-        raise ObstacleError(f"Strategy {strategy!r} needs {'one' if one else 'an'} edge method.")
-    for method in chosen:
-        refuse_unknown(ObstacleError, "edge method", method, EDGE_METHODS)
-    return chosen
+        circles = _agreed(seen, min_share)
+        return StrategyResult(circles, None, None, counts, circles.strength)
+    return best
 
 
 def _scanned(
@@ -225,14 +208,30 @@ def thresholds(span: ThresholdRange) -> NDArray[np.float64]:
         raise ObstacleError(
             f"The thresholds {start:g} to {stop:g} in steps of {step:g} are no range."
         )
-    count = int(np.floor((stop - start) / step + 1e-9)) + 1
-    return start + step * np.arange(count, dtype=np.float64)
+    return evenly(start, stop, step)
 
 
-def _agreed(seen: list[Circles], min_share: float) -> tuple[Circles, NDArray[np.float64]]:
-    """Merge circles of many settings; keep those that enough settings saw."""
+def first_of_duplicates(circles: Circles, tolerance_px: float = 0.5) -> NDArray[np.bool_]:
+    """Return which circles are no repetition of an earlier one with the same centre.
+
+    The study compares centres for equality; found on two maps of one picture they differ by
+    rounding, so centres within ``tolerance_px`` count as one.
+    """
+    keep = np.ones(len(circles), dtype=bool)
+    if len(circles) < 2:
+        return keep
+    centres = np.column_stack([circles.x_px, circles.y_px])
+    pairs = cKDTree(centres).query_pairs(tolerance_px, output_type="ndarray")
+    for first, second in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
+        if keep[first]:
+            keep[second] = False
+    return keep
+
+
+def _agreed(seen: list[Circles], min_share: float) -> Circles:
+    """Merge circles of many settings; keep those that enough settings saw: the strength."""
     if not seen:
-        return Circles(), np.empty(0)
+        return Circles()
     setting = np.repeat(np.arange(len(seen)), [len(circles) for circles in seen])
     x = np.concatenate([circles.x_px for circles in seen])
     y = np.concatenate([circles.y_px for circles in seen])
@@ -243,8 +242,7 @@ def _agreed(seen: list[Circles], min_share: float) -> tuple[Circles, NDArray[np.
     near = tree.query_ball_point(np.column_stack([x, y]), reach)
     alive = np.ones(x.size, dtype=bool)
     votes = np.array([np.unique(setting[members]).size for members in near])
-    rows: list[tuple[float, float, float, float]] = []
-    shares: list[float] = []
+    rows: list[list[float]] = []
     for i in np.lexsort((-strength, -votes)).tolist():
         if not alive[i]:
             continue
@@ -252,19 +250,8 @@ def _agreed(seen: list[Circles], min_share: float) -> tuple[Circles, NDArray[np.
         members = members[alive[members]]
         share = np.unique(setting[members]).size / len(seen)
         if share >= min_share:
-            rows.append(
-                (
-                    float(np.median(x[members])),
-                    float(np.median(y[members])),
-                    float(np.median(radius[members])),
-                    float(share),
-                )
-            )
-            shares.append(share)
+            rows.append([*(float(np.median(each[members])) for each in (x, y, radius)), share])
         alive[members] = False
         wide = tree.query_ball_point([x[i], y[i]], float(radius[i]))
         alive[np.asarray(wide)] = False
-    if not rows:
-        return Circles(), np.empty(0)
-    table = np.asarray(rows)
-    return Circles(*table.T), np.asarray(shares)
+    return Circles(*np.array(rows).reshape(-1, 4).T)
