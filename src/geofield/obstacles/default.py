@@ -35,12 +35,12 @@ from geofield.obstacles.picture import (
     part_of,
     search_region,
     tone_of,
+    turned,
     working_bands,
     working_factor,
 )
 from geofield.obstacles.standing import StandingMap
-from geofield.obstacles.upright import turned
-from geofield.raster import Window, windows
+from geofield.raster import windows
 
 Progress = Callable[[int, int, str], None]
 Polarity = Literal["dark", "bright", "both"]
@@ -161,6 +161,7 @@ def detect_by_default(
         keep &= np.asarray(away <= trees.radius_px)
     trees = trees.take(keep & (p >= least))
     trees = trees.take(np.lexsort((trees.x_px, trees.y_px)))
+    resampled = f"Resampled from {resolution:.2f} m to {resolution * factor:.2f} m per pixel."
     return Found(
         turn.circles_back(trees),
         turn.shapes_back(shapes),
@@ -168,7 +169,7 @@ def detect_by_default(
         {
             "method": f"network_{tone.bands}",
             "doubts": doubts,
-            "notes": [] if factor == 1.0 else [_resampled(resolution, factor)],
+            "notes": [] if factor == 1.0 else [resampled],
         },
     )
 
@@ -215,7 +216,8 @@ def _look(
                 cut = _cut(bands, scene.valid, region, ends, far_px, factor, polarity)
                 here = with_cut(here, cut, **network(NETWORK).facts["suppression"])
             here = here.scaled(1.0, *start)
-            crowns = crowns.joined(here.take(_in_core(here, window, factor)))
+            in_core = window.in_core(here.x_px * factor, here.y_px * factor)
+            crowns = crowns.joined(here.take(in_core))
             seen_px += int(region.sum())
             if area is not None and not scene.valid.all():
                 missing = area.mask(scene.grid, holes=False) & ~scene.valid
@@ -271,10 +273,6 @@ def _unseen(field_px: float, seen_px: int, gaps_px: int, resolution_m: float) ->
     return [f"{UNSEEN} {share} of the field: what stands there is not found."]
 
 
-def _in_core(crowns: Circles, window: Window, factor: float) -> NDArray[np.bool_]:
-    return window.in_core(crowns.x_px * factor, crowns.y_px * factor)
-
-
 def _of_polarity(crowns: Circles, bands: dict[str, Any], polarity: Polarity) -> Circles:
     """Return the crowns, working pixels, that are dark or bright against the ring around them."""
     if polarity == "both" or not len(crowns):
@@ -299,7 +297,3 @@ def _doubts(tone: Tone, resolution_m: float, radius_m: tuple[float, float]) -> l
             "levels): haze, or ground alone; trees may be missed."
         )
     return doubts
-
-
-def _resampled(resolution_m: float, factor: float) -> str:
-    return f"Resampled from {resolution_m:.2f} m to {resolution_m * factor:.2f} m per pixel."

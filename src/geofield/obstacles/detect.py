@@ -242,12 +242,8 @@ def _with_shapes(
     import pandas as pd
 
     crs = table.crs
-
-    def to_metric(c: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.column_stack(grid.to_crs(c[:, 0], c[:, 1], crs))
-
     rows = from_polygons(
-        shapely.transform(np.asarray(shapes, dtype=object), to_metric),
+        shapely.transform(shapes, lambda px: np.column_stack(grid.to_crs(px[:, 0], px[:, 1], crs))),
         crs,
         buffer_m=buffer_m,
         grid=grid,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol, cast, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.scene import Scene
+from geofield.model.upright import Turn
 from geofield.raster import Image, gaps_filled, pixel_centres, resample
 
 WORKING_RESOLUTION_M = 23 / 64
@@ -48,6 +49,42 @@ class PictureReader(Protocol):
 Picture = Scene | PictureReader
 
 
+def turned(picture: Picture, turn: Turn) -> Picture:
+    """Return a picture turned, a reader as one whose windows are."""
+    if not turn:
+        return picture
+    return turn.scene(picture) if isinstance(picture, Scene) else _Turned(picture, turn)
+
+
+@dataclass(frozen=True, slots=True)
+class _Turned:
+    """A reader whose windows are read turned."""
+
+    reader: PictureReader
+    turn: Turn
+
+    @property
+    def grid(self) -> Grid:
+        """Of the whole picture, turned."""
+        return self.turn.grid(self.reader.grid)
+
+    def read(
+        self,
+        window: tuple[int, int, int, int] | None = None,
+        *,
+        shape_px: tuple[int, int] | None = None,
+        scaling: tuple[float, float] | None = None,
+        nir_scaling: tuple[float, float] | None = None,
+    ) -> Scene:
+        """Read a window (column, row, width, height) of the turned picture."""
+        if window is not None:
+            window = self.turn.window_back(window)
+        if shape_px is not None and self.turn.exchanged:
+            shape_px = shape_px[1], shape_px[0]
+        part = self.reader.read(window, shape_px=shape_px, scaling=scaling, nir_scaling=nir_scaling)
+        return self.turn.scene(part)
+
+
 @dataclass(frozen=True, slots=True)
 class Tone:
     """What is known of a picture as a whole, so that all its parts are seen alike.
@@ -82,21 +119,19 @@ class Tone:
 
 def tone_of(picture: Picture) -> Tone:
     """Look at a small version of a picture."""
-    small = picture
-    if not isinstance(picture, Scene):
-        rows, cols = picture.grid.shape
-        step = max(rows, cols) / min(max(rows, cols), _OVERVIEW_PX)
-        small = picture.read(shape_px=(max(int(rows / step), 1), max(int(cols / step), 1)))
-    scene = cast("Scene", small)
+    scene = picture
+    if not isinstance(scene, Scene):
+        rows, cols = scene.grid.shape
+        smaller = max(max(rows, cols) / _OVERVIEW_PX, 1.0)
+        scene = scene.read(shape_px=(max(int(rows / smaller), 1), max(int(cols / smaller), 1)))
     step = max(max(scene.grid.shape) // _OVERVIEW_PX, 1)
     valid = scene.valid[::step, ::step]
-    bands, visible = "grey", [scene.grey[::step, ::step][valid]]
-    if scene.is_colour:
-        rgb = [scene.bands[scene.roles.index(r)] for r in ("red", "green", "blue")]
-        if any(not np.array_equal(rgb[0], other) for other in rgb[1:]):
-            bands = "rgb" if scene.nir is None else "nir"
-            visible = [band[::step, ::step][valid] for band in rgb]
-    low, high = np.percentile(np.concatenate(visible), [2, 98]) if valid.any() else (0, 255)
+    bands = "grey"
+    visible: list[NDArray[Any]] = [scene.grey]
+    if any(not np.array_equal(scene.rgb_bands[0], other) for other in scene.rgb_bands[1:]):
+        bands, visible = "rgb" if scene.nir is None else "nir", scene.rgb_bands
+    shown = np.concatenate([band[::step, ::step][valid] for band in visible])
+    low, high = np.percentile(shown, [2, 98]) if valid.any() else (0, 255)
     return Tone(bands, float(low), float(high), scene.scaling, scene.nir_scaling)
 
 
@@ -136,12 +171,9 @@ def working_bands(scene: Scene, tone: Tone, factor: float) -> dict[str, Image | 
     def band(values: NDArray[np.generic]) -> Image:
         return tone.normalised(resample(values.astype(np.float32), factor))
 
-    if tone.bands == "grey":
-        grey = band(scene.grey)
-        return {"red": grey, "green": grey, "blue": grey, "nir": 0.0, "has_nir": 0.0}
-    visible: dict[str, Image | float] = {
-        r: band(scene.bands[scene.roles.index(r)]) for r in ("red", "green", "blue")
-    }
+    grey = tone.bands == "grey"
+    red, green, blue = [band(scene.grey)] * 3 if grey else map(band, scene.rgb_bands)
+    visible: dict[str, Image | float] = {"red": red, "green": green, "blue": blue}
     if tone.bands == "nir" and scene.nir is not None:
         return visible | {"nir": band(scene.nir), "has_nir": 1.0}
     return visible | {"nir": 0.0, "has_nir": 0.0}
