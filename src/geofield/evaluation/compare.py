@@ -193,8 +193,7 @@ def _counting(frame: gpd.GeoDataFrame, area: Any) -> gpd.GeoDataFrame:
 def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
     """Centres (n, 2) and radii (n,), and whether there are radii at all."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
-    centre = shapely.centroid(geometry)
-    xy = np.column_stack([shapely.get_x(centre), shapely.get_y(centre)]).reshape(-1, 2)
+    xy = shapely.get_coordinates(shapely.centroid(geometry))
     radius = np.full(len(geometry), np.nan)
     if "radius_m" in frame.columns:
         radius = floats(frame, "radius_m")

@@ -104,8 +104,8 @@ def driving(
         How near to a true centre a track may not come.
     """
     crs = segments.crs
-    lines = _shapes(segments)
-    centres = shapely.centroid(_shapes(truth.to_crs(crs)))
+    lines = segments.geometry.to_numpy()
+    centres = shapely.centroid(truth.to_crs(crs).geometry.to_numpy())
     reach = reach_m * float(ground_scale_of(field, crs))
     all_discs = shapely.buffer(centres, reach, quad_segs=_QUARTER_SEGMENTS)
     here = shapely.covers(field, centres)
@@ -121,7 +121,7 @@ def driving(
         float(ground_lengths_m(inside, crs)),
         float(ground_lengths_m(lines, crs).sum()),
         float(ground_areas_m2(field, crs)),
-        float(ground_areas_m2(_given_up(_shapes(avoided), all_discs, field), crs)),
+        float(ground_areas_m2(_given_up(avoided.geometry.to_numpy(), all_discs, field), crs)),
         unseen(table, field),
     )
 
@@ -131,7 +131,7 @@ def unseen(obstacles: gpd.GeoDataFrame, field: shapely.Geometry) -> float:
     if not {"status", "confidence"} <= set(obstacles.columns):
         return 0.0
     possible = obstacles[obstacles["status"] == "possible"]
-    centres = shapely.centroid(_shapes(possible))
+    centres = shapely.centroid(possible.geometry.to_numpy())
     confidence = possible["confidence"].to_numpy(dtype="float64", na_value=0.0)
     return float(confidence[shapely.covers(field, centres)].sum())
 
@@ -145,7 +145,3 @@ def _given_up(
     false = shapely.union_all(footprints[~right])
     for_something = shapely.union_all(footprints[right])
     return shapely.intersection(shapely.difference(false, for_something), field)
-
-
-def _shapes(table: gpd.GeoDataFrame) -> NDArray[np.object_]:
-    return np.asarray(table.geometry.to_numpy(), dtype=object)

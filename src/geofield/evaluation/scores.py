@@ -44,17 +44,12 @@ class Score:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, NaN as None."""
-        values: dict[str, Any] = {}
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, float) and not np.isfinite(value):
-                value = None
-            if name == "interval":
-                value = {
-                    key: [None if not np.isfinite(v) else v for v in pair]
-                    for key, pair in value.items()
-                }
-            values[name] = value
+
+        def known(value: Any) -> Any:
+            return None if isinstance(value, float) and not np.isfinite(value) else value
+
+        values = {name: known(getattr(self, name)) for name in self.__slots__}
+        values["interval"] = {key: [*map(known, pair)] for key, pair in self.interval.items()}
         return values
 
 

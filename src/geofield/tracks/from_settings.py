@@ -54,19 +54,20 @@ def plan_with_settings(
     """
     metric_crs = metric(crs)
     _refuse_too_wide(polygon, settings.spacing_m)
+
+    def place(lonlat: tuple[float, ...] | None, what: str) -> tuple[float, float] | None:
+        return None if lonlat is None else _place(lonlat, metric_crs, polygon, what)
+
     direction: Any = settings.direction
     if settings.ab_lonlat is not None:
         a_b = settings.ab_lonlat
-        direction = [_place(end, metric_crs, polygon, "A-B line") for end in (a_b[:2], a_b[2:])]
-    through = settings.through_lonlat
+        direction = [place(end, "A-B line") for end in (a_b[:2], a_b[2:])]
     tracks = plan_tracks(
         polygon,
         obstacles,
         crs=metric_crs,
         direction=direction,
-        through=None
-        if through is None
-        else _place(through, metric_crs, polygon, "place to pass through"),
+        through=place(settings.through_lonlat, "place to pass through"),
         grid=grid,
         outside=outside,
         edits=edits,
@@ -78,14 +79,13 @@ def plan_with_settings(
     tracks = replaced(tracks, notes=(*tracks.notes, *told))
     if settings.route == "none":
         return tracks
-    start = settings.start_lonlat
     from geofield.tracks.route import plan_route
 
     return plan_route(
         tracks,
         pattern=settings.route,
         **{name: getattr(settings, name) for name in _OF_ROUTE},
-        start=None if start is None else _place(start, metric_crs, polygon, "start"),
+        start=place(settings.start_lonlat, "start"),
     )
 
 

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geofield.tracks.clip import TOUCH_M, Crossings, Pieces
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import FIELD, IntArray
-
-
-def gaps_between(pieces: Pieces) -> IntArray:
-    """Indices of the pieces that are followed by a gap and another piece of the same track."""
-    return np.flatnonzero(pieces.track[1:] == pieces.track[:-1])
 
 
 def gap_causes(pieces: Pieces, crossings: Crossings) -> tuple[IntArray, IntArray]:
@@ -20,9 +14,6 @@ def gap_causes(pieces: Pieces, crossings: Crossings) -> tuple[IntArray, IntArray
 
     The second is ``FIELD`` where the gap leaves the field. Pairs are unique and sorted.
     """
-    none = np.empty(0, dtype=np.int64)
-    if len(pieces) < 2:
-        return none, none
     is_field = crossings.owner == FIELD
     # A cause begins where an obstacle is entered or the field is left.
     begins = (np.where(is_field, -1, 1) * crossings.enters > 0) & ~crossings.free
@@ -50,9 +41,8 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     what all obstacles together cost. Owners beyond their count are no obstacles: what is barred
     by one of these is lost to none.
     """
-    lost: NDArray[np.float64] = np.zeros(obstacle_count)
     if not obstacle_count or not len(crossings.u):
-        return lost
+        return np.zeros(obstacle_count)
     once = slice(None) if crossings.above is None else np.flatnonzero(crossings.above)
     u, owner = crossings.u[once], crossings.owner[once]
     enters = crossings.enters[once].astype(np.int64)
@@ -65,5 +55,5 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     counted = (field_depth > 0) & (depth > 0) & ~barred
     share = np.where(counted, width / np.maximum(depth, 1), 0.0)
     before = np.concatenate(([0.0], np.cumsum(share)[:-1]))
-    lost += np.bincount(owner[mine], -enters[mine] * before[mine], obstacle_count)
+    lost = np.bincount(owner[mine], -enters[mine] * before[mine], obstacle_count)
     return np.maximum(lost, 0.0)

@@ -15,7 +15,7 @@ from geofield.model.rows import Rows
 from geofield.model.tracks import points_per_segment
 from geofield.tracks.clip import Crossings, Pieces
 from geofield.tracks.frame import FloatArray, TrackFrame
-from geofield.tracks.losses import gap_causes, gaps_between
+from geofield.tracks.losses import gap_causes
 from geofield.tracks.shapes import FIELD, IntArray
 
 BY_HAND = 0
@@ -86,7 +86,8 @@ def gap_table(
     crs: CRS,
 ) -> Rows:
     """Layer `gaps`, each with its causes in words and its lowest obstacle number."""
-    before = gaps_between(pieces)
+    # Pieces that are followed by another one of the same track.
+    before = np.flatnonzero(pieces.track[1:] == pieces.track[:-1])
     start, end = pieces.end[before], pieces.start[before + 1]
     track = pieces.track[before]
     gap_of_piece = np.zeros(len(pieces), dtype=np.int64)

@@ -80,7 +80,10 @@ def keep_joining(words: Words, x: FloatArray, y: FloatArray, angle: FloatArray) 
 def to_unit(
     start: FloatArray, goal: FloatArray, radius_m: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Goals seen from starts, in radii: poses of shape (n, 3) in, (x, y, angle) out."""
+    """Goals seen from starts, in radii: poses of shape (n, 3) in, (x, y, angle) out.
+
+    The x axis lies ahead of a start, y to its left.
+    """
     dx, dy = (goal[:, 0] - start[:, 0]) / radius_m, (goal[:, 1] - start[:, 1]) / radius_m
     cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
     return dx * cos + dy * sin, dy * cos - dx * sin, goal[:, 2] - start[:, 2]

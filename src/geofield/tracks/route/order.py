@@ -7,7 +7,6 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import TrackError
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import IntArray
 
@@ -21,8 +20,6 @@ def track_order(tracks: IntArray, skip: int) -> list[int]:
     With ``skip=1`` from track 1 to 3, as in the study, because a turn to the next track would need
     a smaller radius; with ``skip=0`` one after the other.
     """
-    if skip < 0:
-        raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
     order: list[int] = []
     for begin in range(min(skip + 1, len(tracks))):
         chosen = tracks[begin :: skip + 1].tolist()

@@ -268,9 +268,5 @@ def _turning(ring: FloatArray, *, inward: bool = False) -> _Corners:
     ahead = np.roll(ring, -1, axis=0) - ring
     ahead /= np.maximum(np.hypot(*ahead.T), 1e-12)[:, None]
     into = np.roll(ahead, 1, axis=0)
-    turns = (_cross(into, ahead) > 0.0) != inward
+    turns = (into[:, 0] * ahead[:, 1] - into[:, 1] * ahead[:, 0] > 0.0) != inward
     return _Corners(ring[turns], into[turns], ahead[turns])
-
-
-def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
-    return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])

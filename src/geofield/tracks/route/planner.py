@@ -26,6 +26,7 @@ from geofield.model.tracks import Tracks
 from geofield.notes import warn
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.outline import place_near, refuse_no_length
+from geofield.tracks.route.curves import to_unit
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
@@ -122,23 +123,21 @@ def plan_route(
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
     )
-    notes, count = tracks.notes, len(np.unique(track_no))
+    told, count = [], len(np.unique(track_no))
     if pattern == "skip" and 1 < count <= skip + 1:
-        note = (
+        told.append(
             f"Of {count} tracks {skip} cannot be left out at a turn: each is followed by the next."
         )
-        warn(note, TrackWarning, stacklevel=2)
-        notes = (*notes, note)
     cut_off = sum(turn.kind == "none" for turn in turns)
     if cut_off:
-        note = (
+        told.append(
             f"Obstacles or the border cut the field into parts: {counted(cut_off, 'way')} between "
             f"segments {'does' if cut_off == 1 else 'do'} not exist, and the route leaves "
             f"{'it' if cut_off == 1 else 'them'} out."
         )
+    for note in told:
         warn(note, TrackWarning, stacklevel=2)
-        notes = (*notes, note)
-    return replace(tracks, route=route, turns=table, notes=notes)
+    return replace(tracks, route=route, turns=table, notes=(*tracks.notes, *told))
 
 
 def _on_the_ground(
@@ -228,18 +227,10 @@ def _tables(
     whole = shapely.length(driven) / scale
     work_m = whole - early - late
     count = len(rows) + len(turns)
-    geometry = np.empty(count, dtype=object)
-    geometry[0::2] = _shortened(driven, late * scale, (whole - early) * scale)
     lines = [as_line(turn.places * scale) for turn in turns]
-    geometry[1::2] = lines
-    length = np.empty(count)
-    length[0::2] = work_m
-    length[1::2] = [turn.length_m for turn in turns]
-    kind = np.empty(count, dtype=object)
-    kind[0::2] = "work"
-    kind[1::2] = ["drive" if turn.kind == "drive" else "turn" for turn in turns]
-    direction = np.full(count, "forward", dtype=object)
-    direction[0::2] = np.where(backward, "backward", "forward")
+    length = _in_turn(work_m, [turn.length_m for turn in turns]).astype(np.float64)
+    kinds = ["drive" if turn.kind == "drive" else "turn" for turn in turns]
+    none = [None] * len(turns)
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)[rows]
     segment_no = tracks.segments["segment_no"].to_numpy(dtype=np.int64)[rows]
     crs = CRS(tracks.segments.crs)
@@ -247,14 +238,16 @@ def _tables(
         schema.ROUTE,
         {
             "sequence": np.arange(1, count + 1),
-            "kind": kind,
-            "direction": direction,
-            "track_no": _between(track_no, count),
-            "segment_no": _between(segment_no, count),
+            "kind": _in_turn(["work"] * len(rows), kinds),
+            "direction": _in_turn(
+                np.where(backward, "backward", "forward"), ["forward"] * len(turns)
+            ),
+            "track_no": _in_turn(track_no, none),
+            "segment_no": _in_turn(segment_no, none),
             "length_m": length,
             "start_m": np.cumsum(length) - length,
         },
-        geometry,
+        _in_turn(_shortened(driven, late * scale, (whole - early) * scale), lines),
         crs,
     )
     there = np.ones(count, dtype=bool)
@@ -302,17 +295,16 @@ def _shortened(
     return parts
 
 
-def _between(values: IntArray, count: int) -> list[int | None]:
-    """Numbers of the work, with nothing for the ways between."""
-    out: list[int | None] = [None] * count
-    out[0::2] = values.tolist()
+def _in_turn(work: Any, ways: list[Any]) -> NDArray[np.object_]:
+    """Values of the work, each but the last followed by that of the way to the next."""
+    out = np.empty(len(work) + len(ways), dtype=object)
+    out[0::2], out[1::2] = work, ways
     return out
 
 
 def _sides(exits: FloatArray, entries: FloatArray) -> list[str]:
     """To which side of the way out the next segment begins."""
-    offset = entries[:, :2] - exits[:, :2]
-    across = np.cos(exits[:, 2]) * offset[:, 1] - np.sin(exits[:, 2]) * offset[:, 0]
+    _, across, _ = to_unit(exits, entries, 1.0)
     return [
         "left" if value > 1e-6 else "right" if value < -1e-6 else "straight"
         for value in across.tolist()

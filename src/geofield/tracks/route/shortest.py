@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.route.curves import dubins_words
+from geofield.tracks.route.curves import dubins_words, to_unit
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.tour import improve_tour
 from geofield.tracks.shapes import IntArray
@@ -71,9 +71,7 @@ def _cramped(
 
 def _face_to_face(exits: FloatArray, entries: FloatArray) -> NDArray[np.bool_]:
     """Whether one end lies straight ahead of the other: what is between is driven around."""
-    offset = entries[:, :2] - exits[:, :2]
-    across = np.cos(exits[:, 2]) * offset[:, 1] - np.sin(exits[:, 2]) * offset[:, 0]
-    along = np.cos(exits[:, 2]) * offset[:, 0] + np.sin(exits[:, 2]) * offset[:, 1]
+    along, across, _ = to_unit(exits, entries, 1.0)
     return np.asarray((np.abs(across) < 1e-3) & (along > 0.0))
 
 

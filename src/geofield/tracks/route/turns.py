@@ -58,8 +58,8 @@ def straight_ways(exits: FloatArray, entries: FloatArray, passage: Passage) -> l
         return []
     free = passage.fits(np.asarray(shapely.linestrings(ends)))
     return [
-        _polyline(ends[row], fits=True) if clear else _drive(ends[row], passage)
-        for row, clear in enumerate(free.tolist())
+        _drive(each, each if clear else passage.shortest(*each), fits=True)
+        for each, clear in zip(ends, free.tolist(), strict=True)
     ]
 
 
@@ -69,8 +69,8 @@ def plan_turns(
     passage: Passage,
     *,
     radius_m: float,
-    curve: Curve = "dubins",
-    spare_m: FloatArray | None = None,
+    curve: Curve,
+    spare_m: FloatArray,
 ) -> list[Turn]:
     """Turns of a turning radius between poses (n, 3), metres and radians.
 
@@ -82,9 +82,8 @@ def plan_turns(
     loose: list[Turn | None] = [None] * count
     if not count:
         return []
-    spare = np.zeros((count, 2)) if spare_m is None else spare_m
     machine = _Machine(passage, radius_m, curve)
-    _single_curves(exits, entries, machine, spare, found, loose)
+    _single_curves(exits, entries, machine, spare_m, found, loose)
     for row in range(count):
         if found[row] is not None:
             continue
@@ -92,12 +91,10 @@ def plan_turns(
         way = passage.shortest(ends[0], ends[1])
         if way is not None and len(way) > 2:
             found[row] = _chain(exits[row], entries[row], way, machine)
-            if found[row] is None and spare[row].min() > 0.0:
-                found[row] = _lane_change(exits[row], entries[row], way, machine, spare[row])
+            if found[row] is None and spare_m[row].min() > 0.0:
+                found[row] = _lane_change(exits[row], entries[row], way, machine, spare_m[row])
         if found[row] is None:
-            found[row] = loose[row] or (
-                _no_way(ends) if way is None else _polyline(way, fits=False)
-            )
+            found[row] = loose[row] or _drive(ends, way, fits=False)
     return [turn for turn in found if turn is not None]
 
 
@@ -122,7 +119,7 @@ def _single_curves(
     exits: FloatArray,
     entries: FloatArray,
     machine: _Machine,
-    spare: FloatArray,
+    spare_m: FloatArray,
     found: list[Turn | None],
     loose: list[Turn | None],
 ) -> None:
@@ -137,7 +134,7 @@ def _single_curves(
     for place in range(min(_TRIED_WORDS, rank.shape[1])):
         word = rank[open_rows, place]
         # On one track a loop is never the way past an obstacle.
-        limit = np.where(spare[open_rows].min(axis=1) > 0.0, np.pi, np.inf)
+        limit = np.where(spare_m[open_rows].min(axis=1) > 0.0, np.pi, np.inf)
         apart = np.hypot(*(entries[open_rows, :2] - exits[open_rows, :2]).T) / radius_m
         best = cost[open_rows, word]
         usable = np.isfinite(best) & (best - apart < limit)
@@ -255,18 +252,11 @@ def _lane_change(
     return None
 
 
-def _drive(ends: FloatArray, passage: Passage) -> Turn:
-    """The shortest way, with corners."""
-    way = passage.shortest(ends[0], ends[1])
-    return _no_way(ends) if way is None else _polyline(way, fits=True)
-
-
-def _no_way(ends: FloatArray) -> Turn:
-    return Turn(ends, "none", 0.0, fits=False)
-
-
-def _polyline(places: FloatArray, *, fits: bool) -> Turn:
-    return Turn(places, "drive", _length(places), fits=fits)
+def _drive(ends: FloatArray, way: FloatArray | None, *, fits: bool) -> Turn:
+    """The shortest way between ends, with its corners, where there is one."""
+    if way is None:
+        return Turn(ends, "none", 0.0, fits=False)
+    return Turn(way, "drive", _length(way), fits=fits)
 
 
 def _length(places: FloatArray) -> float:
