@@ -24,6 +24,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import TrackWarning
 from geofield.notes import listening
@@ -399,7 +400,7 @@ def test_what_is_told_together_is_all_in_german(page: Page, plan_path: Path) -> 
 def test_notes_of_tracks_are_in_german(page: Page) -> None:
     square, wall = shapely.box(0, 0, 100, 60), shapely.box(48, -5, 52, 65)
     ring = shapely.Point(50, 30).buffer(20).difference(shapely.Point(50, 30).buffer(15))
-    asked: list[tuple[list[Polygon], dict[str, Any]]] = [
+    asked: list[tuple[list[BaseGeometry], dict[str, Any]]] = [
         ([ring], {"spacing_m": 5}),
         ([], {"spacing_m": 6, "width_m": 4}),
         ([], {"spacing_m": 6, "headland_m": 9}),
