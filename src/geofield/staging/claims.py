@@ -16,7 +16,6 @@ import stat
 import time
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from geofield.errors import OutputExistsError
@@ -31,16 +30,8 @@ _LEVELS = 2
 Seen = dict[Path, tuple[int, int]]
 
 
-@dataclass(frozen=True)
-class _Claim:
-    """What this process holds, and how it was found."""
-
-    folder: Path
-    sign: Path
-    before: Seen
-
-
-_MINE: list[_Claim] = []
+#: What this process holds, by the name of its sign: the folder, and what lay there before.
+_MINE: dict[str, tuple[Path, Seen]] = {}
 
 
 @contextmanager
@@ -57,21 +48,25 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
         Another process holds them.
     """
     target = Path(folder)
-    chosen = None if names is None else frozenset(names)
     with ExitStack() as held:
         held.enter_context(made_folder(target))
         with alone(target) as certain:
             sweep(target, certain=certain)
-            refuse_claimed(target, chosen)
+            refuse_claimed(target, names)
             try:
                 _fold_in_logs(target)
                 sign = held.enter_context(working_folder(target))
-                claim = _Claim(target.resolve(), sign, seen(target))
-                _write(sign, chosen)
+                before = seen(target)
+                said = {
+                    "names": None if names is None else sorted(names),
+                    "process": os.getpid(),
+                    "since": time.time(),
+                }
+                (sign / _CLAIM).write_text(json.dumps(said), encoding="utf-8")
             except OSError as error:
                 raise cannot_write(target, error) from error
-        _MINE.append(claim)
-        held.callback(_MINE.remove, claim)
+        _MINE[sign.name] = target.resolve(), before
+        held.callback(_MINE.pop, sign.name)
         yield
 
 
@@ -82,10 +77,9 @@ def refuse_claimed(folder: Path, names: Collection[str] | None) -> None:
     ------
     OutputExistsError
     """
-    # By name, which is drawn by lot: the same folder may be written in several ways.
-    mine = {claim.sign.name for claim in _MINE}
     for sign in folder.glob(PREFIX + "*"):
-        if sign.name in mine:
+        # By name, which is drawn by lot: the same folder may be written in several ways.
+        if sign.name in _MINE:
             continue
         try:
             said = json.loads((sign / _CLAIM).read_text(encoding="utf-8"))
@@ -106,9 +100,9 @@ def refuse_claimed(folder: Path, names: Collection[str] | None) -> None:
 def before_work(folder: Path) -> Seen:
     """What lay in a folder when this process began its work on it; now, without a claim."""
     place = folder.resolve()
-    for claim in _MINE:
-        if claim.folder == place:
-            return claim.before
+    for claimed_place, before in list(_MINE.values()):
+        if claimed_place == place:
+            return before
     return seen(folder)
 
 
@@ -166,12 +160,3 @@ def _fold_in_logs(folder: Path) -> None:
             continue
         with suppress(sqlite3.Error), closing(sqlite3.connect(file)) as connection:
             connection.execute("SELECT count(*) FROM sqlite_master")
-
-
-def _write(sign: Path, names: frozenset[str] | None) -> None:
-    said = {
-        "names": None if names is None else sorted(names),
-        "process": os.getpid(),
-        "since": time.time(),
-    }
-    (sign / _CLAIM).write_text(json.dumps(said), encoding="utf-8")
