@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from pydantic import ValidationError
 from shapely import Polygon
 
 from geofield import schema
 from geofield.crs import GEOD, LONLAT, transformer
-from geofield.errors import GeofieldError, SettingsError
+from geofield.errors import GeofieldError
 from geofield.model.evidence import outline_digest
 from geofield.model.obstacles import circle_polygons, from_polygons, next_number
 from geofield.settings import Settings, TrackSettings
-from geofield.settings.explain import explained
+from geofield.settings.explain import in_words
 from geofield.settings.tracks import said_over
 
 if TYPE_CHECKING:
@@ -154,10 +153,8 @@ def set_tracks(plan: Plan, command: Command) -> Plan:
     if unknown:
         raise EditError(f"Tracks have no setting {unknown[0]!r}.")
     settings = plan.settings or Settings()
-    try:
+    with in_words():
         tracks = TrackSettings(**said_over(settings.tracks.model_dump(), given))
-    except ValidationError as error:
-        raise SettingsError(explained(error)) from None
     # Known as a person's word in every later run.
     before, names = settings.tracks, set(plan.evidence.said_tracks)
     names |= {name for name, value in tracks if value != getattr(before, name)}

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import get_args
 
 from pydantic import ValidationError
 
+from geofield.errors import SettingsError
 from geofield.settings.machines import Machine
 from geofield.settings.section import nearest
 from geofield.settings.sections import HOMES, MODELS
 from geofield.settings.tracks import DirectionName
 
 
-def explained(error: ValidationError) -> str:
-    """What is wrong with settings: each by its name, with its value and what would be right."""
+@contextmanager
+def in_words() -> Iterator[None]:
+    """Say what is wrong with settings: each by its name, its value and what would be right."""
+    try:
+        yield
+    except ValidationError as error:
+        raise SettingsError(_explained(error)) from None
+
+
+def _explained(error: ValidationError) -> str:
     lines = []
     for problem in error.errors():
         name = ".".join(str(part) for part in problem["loc"])

@@ -8,10 +8,10 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError, create_model
+from pydantic import create_model
 
 from geofield.errors import SettingsError, refuse_other
-from geofield.settings.explain import explained
+from geofield.settings.explain import in_words
 from geofield.settings.machines import MACHINE_VALUES, Machine, machine_named
 from geofield.settings.section import Section, nearest
 from geofield.settings.sections import HOMES, MODELS, SECTIONS, Stage
@@ -45,7 +45,7 @@ def load_settings(
         Naming the setting, its value and what would be right.
     """
     merged: dict[str, dict[str, Any]] = {section: {} for section in _KNOWN}
-    try:
+    with in_words():
         for source in (_read_toml(path), _from_environment(), overrides or {}):
             _check_sections(source)
             for section, settings in source.items():
@@ -56,8 +56,6 @@ def load_settings(
                     else merged[section] | said
                 )
         return Settings(**merged)
-    except ValidationError as error:
-        raise SettingsError(explained(error)) from None
 
 
 def _check_sections(source: Mapping[str, Any]) -> None:
@@ -88,18 +86,16 @@ def _tracks_said(
 ) -> dict[str, Any]:
     """Settings of the tracks, with what a machine that is named brings along."""
     machine = said.get("machine")
-    if machine is None:
-        return said_over(earlier, said)
     if isinstance(machine, str):
-        machine = machine_named(machine, machines)
-    elif isinstance(machine, Mapping):
-        machine = Machine(**machine)
-    if isinstance(machine, Machine):
-        named = said["machine"] if isinstance(said["machine"], str) else None
-        said = {**machine.track_values(), **said, "machine": named}
-    # Nothing of another machine stays.
-    earlier = {name: value for name, value in earlier.items() if name not in MACHINE_VALUES}
-    return said_over(earlier, said)
+        said = {**machine_named(machine, machines).track_values(), **said}
+    elif isinstance(machine, Machine | Mapping):
+        said = {**Machine.model_validate(machine).track_values(), **said, "machine": None}
+    return said_over(earlier if machine is None else _without_machine(earlier), said)
+
+
+def _without_machine(tracks: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of the tracks without those of a machine, where another one is named."""
+    return {name: value for name, value in tracks.items() if name not in MACHINE_VALUES}
 
 
 def with_values(settings: Settings | None, **values: Any) -> Settings:
@@ -120,24 +116,20 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
     """
     refuse_other(settings, Settings | None, "settings", _SAY, SettingsError)
     settings = settings or Settings()
-    changed: dict[str, dict[str, Any]] = {}
+    changed: dict[Stage, dict[str, Any]] = {}
     for name, value in values.items():
         if name not in HOMES:
             raise SettingsError(f"There is no setting {name!r}.{nearest(name, HOMES)}")
         changed.setdefault(HOMES[name], {})[name] = value
-    try:
-        sections = {}
+    sections = {}
+    with in_words():
         for section, given in changed.items():
-            old = getattr(settings, section)
+            # What nobody said stays unsaid: an earlier plan's may stand there.
+            old = _said_in(getattr(settings, section))
             said = (
-                # What nobody said stays unsaid: an earlier plan's may stand there.
-                _tracks_said(_said_in(old), given, settings.machines)
-                if section == "tracks"
-                else {**dict(old), **given}
+                _tracks_said(old, given, settings.machines) if section == "tracks" else old | given
             )
-            sections[section] = type(old)(**said)
-    except ValidationError as error:
-        raise SettingsError(explained(error)) from None
+            sections[section] = MODELS[section](**said)
     return settings.model_copy(update=sections)
 
 
@@ -166,16 +158,11 @@ def as_before(
     said, known = _said_in(now), dict(getattr(earlier, section))
     if only is not None:
         known = {name: known[name] for name in known if name in only}
-    if section != "tracks":
-        values = known | said
-    else:
-        if said.get("machine") is not None:
-            known = {name: value for name, value in known.items() if name not in MACHINE_VALUES}
-        values = said_over(known, said)
-    try:
+    values = known | said
+    if section == "tracks":
+        values = said_over(known if said.get("machine") is None else _without_machine(known), said)
+    with in_words():
         return settings.model_copy(update={section: type(now)(**values)})
-    except ValidationError as error:
-        raise SettingsError(explained(error)) from None
 
 
 def _said_in(section: Section) -> dict[str, Any]:

@@ -41,14 +41,8 @@ class Machine(Section):
 
     def track_values(self) -> dict[str, Any]:
         """The settings of the tracks that follow from the machine."""
-        values = {
-            "width_m": self.width_m,
-            "overlap_m": self.overlap_m,
-            "turning_radius_m": self.turning_radius_m,
-            "offset_m": self.offset_m,
-            "clearance_m": self.width_m / 2.0 + self.overhang_m,
-        }
-        return {name: value for name, value in values.items() if value is not None}
+        values = self.model_dump(exclude={"overhang_m"}, exclude_none=True)
+        return values | {"clearance_m": self.width_m / 2.0 + self.overhang_m}
 
 
 def machine_named(name: str, machines: Mapping[str, Machine]) -> Machine:

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     Field,
     ModelWrapValidatorHandler,
     PositiveFloat,
@@ -22,12 +21,6 @@ DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_t
 
 #: Two ways to say where the first track lies.
 _PLACED = ("offset_m", "through_lonlat"), ("through_lonlat", "offset_m")
-
-
-def _as_text(value: Any) -> Any:
-    """A heading that was given as a number, as text."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return str(value) if number else value
 
 
 def _direction(value: str) -> str:
@@ -62,8 +55,9 @@ class TrackSettings(Section):
     )
     spacing_m: PositiveFloat = Field(2.0, description="Distance between tracks, metres.")
     step_m: PositiveFloat = Field(1.0, description="Distance between track points, metres.")
-    direction: Annotated[str, BeforeValidator(_as_text), AfterValidator(_direction)] = Field(
+    direction: Annotated[str, AfterValidator(_direction)] = Field(
         "dominant",
+        coerce_numbers_to_str=True,
         description="Of the tracks: dominant (the way most of the border runs), longest_edge, "
         "hough, fewest, fewest_turns, or a heading in "
         "degrees clockwise from true north.",

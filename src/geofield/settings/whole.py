@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Self
 
-from pydantic import Field, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 from pydantic.fields import FieldInfo
 
-from geofield.errors import SettingsError
-from geofield.settings.explain import explained
+from geofield.settings.explain import in_words
 from geofield.settings.export import ExportSettings
 from geofield.settings.field import FieldSettings
 from geofield.settings.imagery import FetchSettings, ImagerySettings
@@ -44,10 +43,8 @@ class Settings(Section):
     @classmethod
     def _in_words(cls, values: Any, check: ModelWrapValidatorHandler[Self]) -> Self:
         """Say what is wrong as all other ways to settings do."""
-        try:
+        with in_words():
             return check(values)
-        except ValidationError as error:
-            raise SettingsError(explained(error)) from None
 
 
 UNITS = ("_m", "_deg", "_px", "_ha")
