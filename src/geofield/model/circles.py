@@ -58,13 +58,13 @@ class Circles:
         return Circles(x, y, self.radius_px * factor, self.strength)
 
 
-def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tuple[float, float]:
+def checked_range(radius_px: tuple[float, float]) -> tuple[float, float]:
     """Return a radius range as two floats.
 
     Raises
     ------
     ObstacleError
-        If the range is empty, inverted, not finite or not above ``floor``.
+        If the range is empty, inverted, not finite or not above zero.
     """
     try:
         low, high = map(plain_number, radius_px)
@@ -72,7 +72,7 @@ def checked_range(radius_px: tuple[float, float], *, floor: float = 0.0) -> tupl
         raise ObstacleError(
             f"A radius range is two numbers; {radius_px!r} is none.", hint="For example (2, 9)."
         ) from None
-    if not (np.isfinite(low) and np.isfinite(high)) or low <= floor or high < low:
+    if not (np.isfinite(low) and np.isfinite(high)) or low <= 0.0 or high < low:
         raise ObstacleError(
             f"The radius range {low:g} to {high:g} is empty or impossible.",
             hint="Give the smaller radius first, both above zero, for example (2, 9).",

@@ -167,16 +167,15 @@ def from_polygons(
     )
 
 
-def active(obstacles: gpd.GeoDataFrame, *, careful: bool = False) -> gpd.GeoDataFrame:
-    """The rows that are driven around: neither rejected nor merely possible (these if `careful`).
+def active(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """The rows that are driven around: neither rejected nor merely possible.
 
     Of a table without a column `status` all rows are.
     """
     if "status" not in obstacles.columns:
         return obstacles
-    idle = ("rejected",) if careful else schema.NOT_AVOIDED
     status = obstacles["status"].astype("string").str.strip().str.lower()
-    return obstacles[~status.isin(idle).to_numpy(bool)]
+    return obstacles[~status.isin(schema.NOT_AVOIDED).to_numpy(bool)]
 
 
 def next_number(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> int:
