@@ -82,11 +82,8 @@ def _path(shapes: Sequence[Any], left: float, top: float, scale: float) -> str:
     rings = np.concatenate([shapely.get_rings(parts[areas]), parts[~areas]])
     xy, row = shapely.get_coordinates(rings, return_index=True)
     places = np.round((xy - [left, top]) * [scale, -scale], 1)
-    text = []
-    for number in range(len(rings)):
-        corners = places[row == number]
-        text.append("M" + "L".join(f"{x:g} {y:g}" for x, y in corners))
-    return "".join(text)
+    corners = (places[row == number] for number in range(len(rings)))
+    return "".join("M" + "L".join(f"{x:g} {y:g}" for x, y in ring) for ring in corners)
 
 
 def field_drawn(polygon: Any) -> Drawn:

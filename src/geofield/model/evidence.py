@@ -81,16 +81,16 @@ class Evidence:
 
     def to_json(self, of: Field, tracks: Mapping[str, Any] | None) -> dict[str, Any]:
         """Plain JSON values, with those of the field's quality and of the tracks."""
-        result: dict[str, Any] = {}
-        if self.point is not None:
-            result["point"] = {"lat": self.point[0], "lon": self.point[1]}
+        outline: dict[str, Any] = {}
         if self.outline is not None:
-            result["field"] = {"method": of.method, "outline_sha256": self.outline}
+            outline = {"method": of.method, "outline_sha256": self.outline}
         if of.quality is not None:
-            result.setdefault("field", {})["quality"] = _quality_json(of.quality)
+            outline["quality"] = _quality_json(of.quality)
         said = {"tracks": list(self.said_tracks)} if self.said_tracks else None
         shown = shapely.to_wkt(self.shown_px, rounding_precision=0) if self.shown_px else None
-        further = {
+        every = {
+            "point": self.point and {"lat": self.point[0], "lon": self.point[1]},
+            "field": outline or None,
             "shown_px": shown,
             "obstacles": dict(self.detection) or None,
             "written": None if self.written is None else self.written.to_json(),
@@ -100,8 +100,7 @@ class Evidence:
             "searched": self.searched,
             "tracks": None if tracks is None else dict(tracks),
         }
-        result |= {name: value for name, value in further.items() if value is not None}
-        return result
+        return {name: value for name, value in every.items() if value is not None}
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> Evidence:

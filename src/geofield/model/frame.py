@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale_of
@@ -24,21 +25,10 @@ _SPECK_M2 = 20.0
 _SPECK_PX = 25
 
 
-def picture_frame(grid: Grid, crs: CRS) -> Polygon:
-    """The four sides of a picture, in a CRS."""
-    w, h = grid.width_px, grid.height_px
-    x, y = grid.to_crs([0.0, w, w, 0.0], [0.0, 0.0, h, h], crs)
-    return Polygon(np.column_stack([x, y]))
-
-
 def shown_ground(valid: NDArray[np.bool_], pixel_m: float) -> Shown | None:
     """Where a picture has data, pixel coordinates; None where that is all of it.
 
-    Parameters
-    ----------
-    valid : bool array (rows, columns)
-    pixel_m : float
-        Side of a pixel on the ground, metres.
+    `valid` are its rows and columns, `pixel_m` is the side of a pixel on the ground, metres.
     """
     if valid.all():
         return None
@@ -49,16 +39,10 @@ def shown_ground(valid: NDArray[np.bool_], pixel_m: float) -> Shown | None:
     data = sieve(valid.astype(np.uint8), min(speck_px, valid.size))
     if data.all():
         return None
-    parts = [Polygon(*_rings(one)) for one, _ in shapes(data, data == 1)]
+    parts: list[Any] = [shape(one) for one, _ in shapes(data, data == 1)]
     # A slanting edge is a straight line, not its stairs.
     smooth: Shown = shapely.simplify(MultiPolygon(parts), 1.0)
     return smooth
-
-
-def _rings(one: dict[str, Any]) -> tuple[Any, list[Any]]:
-    """The outer ring of a GeoJSON polygon, and the others."""
-    outer, *holes = one["coordinates"]
-    return outer, holes
 
 
 def edge_strip(grid: Grid, crs: CRS, shown_px: Shown | None, near: float) -> BaseGeometry:
@@ -71,15 +55,7 @@ def along_frame(
 ) -> list[LineString]:
     """The stretches of an outline that are the picture's edge; none without a picture.
 
-    Parameters
-    ----------
-    polygon : Polygon
-    crs : CRS
-        Of the polygon.
-    grid : Grid or None
-        Of the picture.
-    shown_px : Polygon or MultiPolygon, optional
-        Where the picture has data, its pixel coordinates; all of it when not given.
+    `shown_px` is where the picture has data, its pixel coordinates; all of it when not given.
     """
     if grid is None:
         return []
@@ -101,7 +77,8 @@ def along_edge(polygon: Polygon, shown: Shown, near: float) -> list[LineString]:
 def _ground(grid: Grid, crs: CRS, shown_px: Shown | None) -> Shown:
     """What a picture shows, in a CRS."""
     if shown_px is None:
-        return picture_frame(grid, crs)
+        w, h = grid.width_px, grid.height_px
+        shown_px = Polygon([(0, 0), (w, 0), (w, h), (0, h)])
     return shapely.transform(
         shown_px, lambda xy: np.column_stack(grid.to_crs(xy[:, 0], xy[:, 1], crs))
     )

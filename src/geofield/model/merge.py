@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.model.obstacles import next_number
 from geofield.model.written import Written, matches, shapes_of_plain
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -33,8 +34,8 @@ class Changes:
 
     def in_words(self) -> str:
         """One line for people."""
-        noun = "obstacle" if self.kept == 1 else "obstacles"
-        words = [f"{self.kept} {noun} of yours kept", f"{self.found_again} found again"]
+        kept = f"{counted(self.kept, 'obstacle')} of yours kept"
+        words = [kept, f"{self.found_again} found again"]
         for count, what in ((self.new, "new"), (self.gone, "gone")):
             words += [f"{count} {what}"] if count else []
         if self.stay_deleted:

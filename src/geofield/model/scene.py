@@ -20,7 +20,9 @@ ROLES = ("red", "green", "blue", "nir", "grey", "other")
 
 #: Weights of red, green and blue in the grey picture (METHOD.md, section 2).
 GREY_WEIGHTS = (0.298, 0.587, 0.114)
-
+_RGB = ("red", "green", "blue")
+#: What shows brightness where there is no colour, the best first.
+_AS_GREY = ("grey", "green", "red", "blue", "other", "nir")
 
 #: The next step where something else stands for a picture.
 OPEN_IT = "Of a file read one: gf.read_scene(path)."
@@ -137,7 +139,7 @@ class Scene:
     @property
     def is_colour(self) -> bool:
         """Whether red, green and blue are all there."""
-        return {"red", "green", "blue"} <= set(self.roles)
+        return set(_RGB) <= set(self.roles)
 
     @property
     def nir(self) -> NDArray[np.uint8] | None:
@@ -152,27 +154,19 @@ class Scene:
     @property
     def rgb_bands(self) -> list[NDArray[np.uint8]]:
         """Red, green and blue one by one (rows, columns), as they lie in the scene."""
-        if self.is_colour:
-            index = [self.roles.index(role) for role in ("red", "green", "blue")]
-        else:
-            index = [self._grey_index()] * 3
-        return [self.bands[each] for each in index]
+        grey = next(role for role in _AS_GREY if role in self.roles)
+        roles = _RGB if self.is_colour else (grey,) * 3
+        return [self.bands[self.roles.index(role)] for role in roles]
 
     @property
     def grey(self) -> NDArray[np.float32]:
         """Brightness 0..255: ``0.298 R + 0.587 G + 0.114 B`` (METHOD.md, section 2)."""
         if not self.is_colour:
-            return np.asarray(self.bands[self._grey_index()], np.float32)
+            return np.asarray(self.rgb_bands[0], np.float32)
         grey = np.zeros(self.grid.shape, np.float32)
-        for role, weight in zip(("red", "green", "blue"), GREY_WEIGHTS, strict=True):
-            grey += np.float32(weight) * self.bands[self.roles.index(role)]
+        for band, weight in zip(self.rgb_bands, GREY_WEIGHTS, strict=True):
+            grey += np.float32(weight) * band
         return grey
-
-    def _grey_index(self) -> int:
-        for role in ("grey", "green", "red", "blue", "other", "nir"):
-            if role in self.roles:
-                return self.roles.index(role)
-        raise ImageryError("The picture has no band.")
 
     def crop(self, column: int, row: int, width_px: int, height_px: int) -> Scene:
         """The part of `width_px` by `height_px` from `column`, `row` on, cut at the edge."""

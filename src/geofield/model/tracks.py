@@ -196,9 +196,8 @@ class Tracks:
             middle = (self.outline.centroid.x, self.outline.centroid.y)
         elif len(segments):
             middle = tuple(shapely.get_coordinates(segments.geometry[0])[0].tolist())
-        numbers = segments.column("track_no")
         return TracksWritten.of(
-            numbers,
+            segments.column("track_no"),
             segments.geometry,
             heading_deg=self.heading_deg,
             spacing_m=self.spacing_m,

@@ -92,12 +92,10 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
                     hint="Correct the column, or leave the cell empty.",
                 ) from error
         if column.type == "int":
-            whole = series
-            if whole.dtype.kind == "i" and not whole.isna().any():
-                data[column.name] = whole.to_numpy(dtype="int64")
+            if series.dtype.kind == "i" and not series.isna().any():
+                data[column.name] = series.to_numpy(dtype="int64")
             else:
-                whole = _whole_numbers(of, column.name, whole)
-                data[column.name] = [None if pd.isna(v) else int(v) for v in whole.to_list()]
+                data[column.name] = _whole_numbers(of, column.name, series)
         elif column.type == "float":
             data[column.name] = series.to_numpy(dtype="float64", na_value=np.nan)
         elif column.type == "date":
