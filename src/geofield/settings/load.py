@@ -121,7 +121,7 @@ def with_values(settings: Settings | None, **values: Any) -> Settings:
         if name not in HOMES:
             raise SettingsError(f"There is no setting {name!r}.{nearest(name, HOMES)}")
         changed.setdefault(HOMES[name], {})[name] = value
-    sections = {}
+    sections: dict[str, Section] = {}
     with in_words():
         for section, given in changed.items():
             # What nobody said stays unsaid: an earlier plan's may stand there.
