@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import active
-from geofield.model.written import SAME_M, WrittenRow, same_shapes
+from geofield.model.written import SAME_M, Record, WrittenRow, same_shapes
 from geofield.notes import warn
 
 if TYPE_CHECKING:
@@ -25,21 +24,12 @@ _OURS = (*_WORDS, "radius_m", "buffer_m")
 _Said = tuple[tuple[str, Any], ...]
 
 
-def without_copies(
-    obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]
-) -> gpd.GeoDataFrame:
-    """A table in which no row lies exactly on another of its number, or of none.
+def without_copies(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFrame:
+    """A table of areas in which no row lies exactly on another of its number, or of none.
 
     What differs from what was written is a person's word about that thing, in whichever of the
     rows it stands: that row is the obstacle. Of rows that say different things those stand that
     are driven around. Either way it is told.
-
-    Parameters
-    ----------
-    obstacles : GeoDataFrame
-        Layer `obstacles`, with areas alone.
-    record : mapping of int to WrittenRow
-        What was written, by number.
     """
     first = _first_alike(obstacles)
     copied = np.flatnonzero(np.bincount(first, minlength=len(first)) > 1)

@@ -121,12 +121,9 @@ class Dataset:
         return name in self.tables and len(self.tables[name]) > 0
 
     def layers(self, *, working: bool = False) -> list[schema.Layer]:
-        """The layers to write, in the schema's order: all that are not optional, and these.
+        """The layers to write, in the schema's order: optional ones only where they have rows.
 
-        Parameters
-        ----------
-        working : bool
-            With those that only the plan's own file has.
+        With `working` those, too, that only the plan's own file has.
         """
         return [
             each

@@ -29,14 +29,8 @@ def known_by_shape(
     """The rows of a layer, each with the number of the track on which it was written.
 
     That is so where no row has a number, and where one has more lines than its track: a layer
-    dissolved into one row. The layer's other columns of such rows are empty.
-
-    Parameters
-    ----------
-    of : Layer
-        `tracks` or `segments`.
-    rows : GeoDataFrame
-    written : TracksWritten
+    dissolved into one row. The layer is `tracks` or `segments`; its other columns of such rows are
+    empty.
     """
     import pandas as pd
 
@@ -95,12 +89,8 @@ def _once(of: schema.Layer, rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     """Segments that all have numbers and lengths: of the track that they are of, else new ones.
 
-    For files that keep no record of what was written: the tracks, with their numbers, are it.
-
-    Parameters
-    ----------
-    tracks, segments : GeoDataFrame
-        Layers `tracks` and `segments` of one field.
+    For files that keep no record of what was written: the tracks of the field, with their numbers,
+    are it.
     """
     import pandas as pd
 
@@ -134,7 +124,7 @@ def numbered(tracks: gpd.GeoDataFrame, segments: gpd.GeoDataFrame) -> gpd.GeoDat
 def _lines_of(written: TracksWritten) -> tuple[list[int], NDArray[np.object_]]:
     """The segments that were written, and the numbers of their tracks."""
     every = [(no, one) for no, some in written.segments.items() for one in some]
-    lines = np.array([*(shapely.LineString(one) for _, one in every), None], object)[:-1]
+    lines = np.array([shapely.LineString(one) for _, one in every], object)
     return [no for no, _ in every], lines
 
 

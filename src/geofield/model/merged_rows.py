@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import active, circle_polygons, floats
-from geofield.model.written import SAME_M, WrittenRow, same_shapes, shapes_of_plain
+from geofield.model.written import SAME_M, Record, WrittenRow, same_shapes, shapes_of_plain
 from geofield.notes import warn
 from geofield.wording import counted, some_of
 
@@ -30,22 +30,13 @@ _TOLD = 20
 _Mask = NDArray[np.bool_]
 
 
-def parts_apart(
-    obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow] | None = None
-) -> gpd.GeoDataFrame:
+def parts_apart(obstacles: gpd.GeoDataFrame, record: Record | None = None) -> gpd.GeoDataFrame:
     """Obstacles of several parts as several obstacles; the further parts have the number still.
 
     What they are of is known by it: a size in the row is that of the whole, and none to draw
     the part by. Where nobody wrote that number, and what was written under one that no row has
     lies in the row, several were merged: what stands in it is said of none of them. Of other parts
     it is said, which is told where they are not driven around.
-
-    Parameters
-    ----------
-    obstacles : GeoDataFrame
-        Layer `obstacles` as another program left it.
-    record : mapping of int to WrittenRow, optional
-        What was written, by number.
     """
     several = shapely.get_num_geometries(obstacles.geometry.to_numpy()) > 1
     if not several.any():
@@ -64,19 +55,14 @@ def parts_apart(
     return table
 
 
-def unmerged(obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> gpd.GeoDataFrame:
+def unmerged(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFrame:
     """A table in which what was said of one thing is not said of those merged with it.
+
+    It holds areas alone, those of several parts apart.
 
     A part with the number of another, just as one was written whose number no row has, is that
     one. What such a one became a piece of is driven around if it was, and no size in the row makes
     it smaller. All that is told, and what the row still says of the one whose number it has.
-
-    Parameters
-    ----------
-    obstacles : GeoDataFrame
-        Layer `obstacles`, with areas alone, those of several parts apart.
-    record : mapping of int to WrittenRow
-        What was written, by number.
     """
     table = obstacles.reset_index(drop=True)
     taken = _Taken.of(table, record)
@@ -107,7 +93,7 @@ class _Taken(NamedTuple):
     same: _Mask
 
     @classmethod
-    def of(cls, table: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> _Taken:
+    def of(cls, table: gpd.GeoDataFrame, record: Record) -> _Taken:
         numbers = floats(table, "obstacle_no")
         there = set(numbers.tolist())
         gone = [row for row in record.values() if row.obstacle_no not in there]
@@ -131,7 +117,7 @@ class _Taken(NamedTuple):
         return _Taken(rows, self.at[some], self.same[some])
 
 
-def _known(table: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> _Mask:
+def _known(table: gpd.GeoDataFrame, record: Record) -> _Mask:
     """Which rows have a number that was written."""
     return np.isin(floats(table, "obstacle_no"), list(record))
 
@@ -149,7 +135,7 @@ def _write(table: gpd.GeoDataFrame, taken: _Taken) -> None:
     _tell(taken.rows, "each counts as it was written, under its own number")
 
 
-def _keep_sizes(table: gpd.GeoDataFrame, taken: _Taken, record: Mapping[int, WrittenRow]) -> None:
+def _keep_sizes(table: gpd.GeoDataFrame, taken: _Taken, record: Record) -> None:
     """Leave merged rows no radius whose circle does not hold what they took in.
 
     Programs that merge rows write means and sums into them. A margin without a number is none.

@@ -46,15 +46,7 @@ def lost_numbers(
 
     They are known by where they stand: without that they all were new, and what was deleted would
     be found again. Some must stand just as they were written, or it is a table drawn anew; in a
-    table of which others have their numbers, each.
-
-    Parameters
-    ----------
-    shapes : object array
-        Polygons.
-    numbers : float array
-        NaN where a row has none.
-    record : sequence of WrittenRow
+    table of which others have their numbers (NaN where a row has none), each.
     """
     lost = np.isnan(numbers)
     there = set(numbers.tolist())

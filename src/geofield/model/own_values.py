@@ -20,12 +20,6 @@ def own_values(layer: schema.Layer, table: gpd.GeoDataFrame) -> dict[int, dict[s
     """What a person wrote into columns of their own, plain JSON, by the position of the row.
 
     Empty cells are left out, and rows of nothing else.
-
-    Parameters
-    ----------
-    layer : Layer
-    table : GeoDataFrame
-        With the columns of the layer and further ones.
     """
     import pandas as pd
 
@@ -45,15 +39,7 @@ def own_values(layer: schema.Layer, table: gpd.GeoDataFrame) -> dict[int, dict[s
 def with_own_values(
     layer: schema.Layer, table: gpd.GeoDataFrame, said: Sequence[Mapping[str, Any] | None]
 ) -> gpd.GeoDataFrame:
-    """A table with such columns; as it is where there are none.
-
-    Parameters
-    ----------
-    layer : Layer
-    table : GeoDataFrame
-    said : sequence of mapping or None
-        For each row what stands in its cells, by name.
-    """
+    """A table with such columns, of each row what is `said` in it by name; as it is without any."""
     names = dict.fromkeys(name for own in said if own for name in own)
     if not names:
         return table

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +20,7 @@ from geofield.model.obstacles import (
     floats,
     still_round,
 )
-from geofield.model.written import WrittenRow, fitted_circles, same_shapes, shapes_of_plain
+from geofield.model.written import Record, fitted_circles, same_shapes, shapes_of_plain
 from geofield.notes import warn
 from geofield.wording import some_of
 
@@ -122,17 +121,10 @@ def widened(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     return obstacles.assign(radius_m=radius).set_geometry(shapes, crs=obstacles.crs)
 
 
-def as_areas(obstacles: gpd.GeoDataFrame, record: Mapping[int, WrittenRow]) -> gpd.GeoDataFrame:
+def as_areas(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFrame:
     """A table in which borders of areas that were written are these areas again, which is told.
 
     As a strip such a line would leave a way through the middle of the tree.
-
-    Parameters
-    ----------
-    obstacles : GeoDataFrame
-        Layer `obstacles`, with shapes of any kind.
-    record : mapping of int to WrittenRow
-        What was written, by number.
     """
     shapes = np.array(obstacles.geometry.array, dtype=object)
     lines = np.flatnonzero(shapely.get_dimensions(shapes) == 1)

@@ -36,6 +36,7 @@ from geofield.model.whole_layer import tell_all_reshaped, tell_none_left
 from geofield.model.written import (
     MOVED_M,
     PlainShape,
+    Record,
     Written,
     WrittenRow,
     from_earlier_version,
@@ -44,6 +45,7 @@ from geofield.model.written import (
     shapes_of_plain,
 )
 from geofield.notes import warn
+from geofield.wording import some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -213,9 +215,7 @@ def _fill_lost_numbers(rows: _Rows, record: list[WrittenRow]) -> None:
             rows.at["radius_m"][row] = one.radius_m
 
 
-def _known(
-    rows: _Rows, record: dict[int, WrittenRow]
-) -> tuple[NDArray[np.int64], list[WrittenRow]]:
+def _known(rows: _Rows, record: Record) -> tuple[NDArray[np.int64], list[WrittenRow]]:
     """The rows that the record is of, and what it says of each.
 
     Of two rows with one number it is of the one that is unchanged.
@@ -241,8 +241,8 @@ def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> N
             values[row] = word if word in allowed else None
         for said, names in unknown.items():
             warn(
-                f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {name} {said} is "
-                f"none of {', '.join(allowed)} and is not used.",
+                f"{some_of(names, 1)}: {name} {said} is none of {', '.join(allowed)} and is not "
+                "used.",
                 FormatWarning,
                 stacklevel=3,
             )
@@ -323,7 +323,7 @@ def _drawn(rows: _Rows, known: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _added(
-    rows: gpd.GeoDataFrame, record: dict[int, WrittenRow], first_no: int, grid: Grid | None
+    rows: gpd.GeoDataFrame, record: Record, first_no: int, grid: Grid | None
 ) -> gpd.GeoDataFrame:
     """Drawn rows as obstacles, one of each part."""
     radius, margin = floats(rows, "radius_m"), np.nan_to_num(floats(rows, "buffer_m"))
@@ -358,7 +358,7 @@ def _added(
 
 
 def _copied(
-    rows: gpd.GeoDataFrame, record: dict[int, WrittenRow], radius: FloatArray, margin: FloatArray
+    rows: gpd.GeoDataFrame, record: Record, radius: FloatArray, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Radius and margin that drawn rows were copied with; of others what stands in them.
 

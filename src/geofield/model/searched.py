@@ -24,13 +24,7 @@ def searched_in(field: Field) -> str:
 def unsearched(searched: str | None, outline: shapely.Polygon, crs: CRS) -> str:
     """The doubt about ground that an outline gained, in words; empty where there is none.
 
-    Parameters
-    ----------
-    searched : str or None
-        Of :func:`searched_in`; None where nobody recorded it.
-    outline : shapely.Polygon
-    crs : CRS
-        Its metric CRS.
+    `searched` is of :func:`searched_in`, None where nobody recorded it; `crs` is the outline's.
     """
     if searched is None:
         return ""

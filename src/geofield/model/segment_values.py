@@ -41,13 +41,6 @@ def values_in(
     """Read what stands beside segments, after what was known before.
 
     What was written for ground where no segment is now waits for one.
-
-    Parameters
-    ----------
-    segments : GeoDataFrame
-        Layer `segments`, edited or not.
-    known : sequence of SegmentValues
-    spacing_m : float
     """
     own = own_values(schema.SEGMENTS, segments)
     if not own and not known:
@@ -74,15 +67,7 @@ def values_in(
 def with_values(
     segments: gpd.GeoDataFrame, values: Sequence[SegmentValues], spacing_m: float
 ) -> gpd.GeoDataFrame:
-    """Segments with what a person wrote for the ground where they are.
-
-    Parameters
-    ----------
-    segments : GeoDataFrame
-        Layer `segments`.
-    values : sequence of SegmentValues
-    spacing_m : float
-    """
+    """Segments with what a person wrote for the ground where they are."""
     if not values:
         return segments
     at = _piece_of_each(segments.geometry.to_numpy(), values, spacing_m)

@@ -132,16 +132,8 @@ def edits_in(
     """Read what a person changed since the tracks were written, after what was known before.
 
     A layer without any row of a planned track is no word on any one of them, as if it were as it
-    was written; what was drawn in it counts, and so does all that was changed in the other.
-
-    Parameters
-    ----------
-    lines, segments : GeoDataFrame
-        Layers `tracks` and `segments`, edited or not. Where one track was changed in both, its
-        segments count: they are what is driven.
-    written : TracksWritten
-    known : TrackEdits
-        Edits of earlier, whose results are what was written.
+    was written; what was drawn in it counts, and so does all that was changed in the other. Where
+    one track was changed in both, its segments count: they are what is driven.
     """
     if written.are(lines, segments) and not any(one.own for one in known.edits):
         return replace(known, beside=values_in(segments, known.beside, written.spacing_m))

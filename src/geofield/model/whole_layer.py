@@ -27,14 +27,7 @@ _NOT_MEANT = (
 
 
 def tell_none_left(record: Collection[WrittenRow], left: gpd.GeoDataFrame) -> None:
-    """Tell where none is left of the obstacles that were written and driven around.
-
-    Parameters
-    ----------
-    record : collection of WrittenRow
-    left : GeoDataFrame
-        The obstacles that are there.
-    """
+    """Tell where none is left of the obstacles that were written and driven around."""
     gone = [one for one in record if one.status not in schema.NOT_AVOIDED]
     if len(gone) < _FEW or left["obstacle_no"].isin([one.obstacle_no for one in gone]).any():
         return
@@ -51,16 +44,7 @@ def tell_all_reshaped(
     was: NDArray[np.object_],
     reshaped: NDArray[np.bool_],
 ) -> None:
-    """Tell where all obstacles have other shapes than were written.
-
-    Parameters
-    ----------
-    before : sequence of WrittenRow
-    now, was : object array
-        The shape of each, and that which was written.
-    reshaped : bool array
-        Whether these differ.
-    """
+    """Tell where all obstacles are `reshaped`: `now` other than they were written, `was`."""
     if len(before) <= _FEW or not reshaped.all():
         return
     far_m = float(shapely.hausdorff_distance(now, was).max())

@@ -47,6 +47,10 @@ class WrittenRow(NamedTuple):
     shape: PlainShape
 
 
+#: What was written, by number.
+Record = Mapping[int, WrittenRow]
+
+
 @dataclass(frozen=True, slots=True)
 class Written:
     """The obstacles as they were written, and what a person took away."""
