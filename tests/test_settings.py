@@ -162,7 +162,8 @@ def test_a_variable_of_no_section_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setenv("GEOFIELD_TRACKS_SPACING_M", "3")
     with pytest.raises(SettingsError, match=r"GEOFIELD_TRACKS_SPACING_M.*sets nothing") as told:
         load_settings()
-    assert "GEOFIELD_TRACKS__SPACING_M" in str(told.value.hint)
+    name = "GEOFIELD_TRACKS__SPACING_M"
+    assert told.value.hint == f"Two underscores follow the section: {name}."
 
 
 def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:

@@ -194,7 +194,8 @@ def _from_environment() -> dict[str, Any]:
         if not separator and setting and first in _KNOWN:
             raise SettingsError(
                 f"{name} in the environment sets nothing.",
-                hint=f"Two underscores follow the section: {_PREFIX}{first}__{setting}".upper(),
+                hint="Two underscores follow the section: "
+                f"{_PREFIX}{first.upper()}__{setting.upper()}.",
             )
         if separator and section not in _KNOWN and not section.startswith("key_"):
             raise SettingsError(
