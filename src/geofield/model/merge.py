@@ -65,7 +65,7 @@ def merge(
     match = matches(fresh.geometry, places)
     taken_away = match >= len(earlier)
     fresh, match = fresh[~taken_away].reset_index(drop=True), match[~taken_away]
-    again = _first_of_each(match)
+    again = (match >= 0) & ~pd.Series(match).duplicated().to_numpy()
     numbers = np.zeros(len(fresh), dtype=np.int64)
     old = earlier["obstacle_no"].to_numpy(dtype=np.int64)
     numbers[again] = old[match[again]]
@@ -94,10 +94,3 @@ def _taken(series: pd.Series[Any], rows: NDArray[np.int64]) -> Any:
     # Whole numbers and truth values stay what they are beside missing ones.
     values = series.convert_dtypes() if series.dtype.kind in "iub" else series
     return pd.api.extensions.take(values.array, rows, allow_fill=True)
-
-
-def _first_of_each(match: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """The rows that are the first with their match."""
-    first = np.zeros(len(match), dtype=bool)
-    first[np.unique(match, return_index=True)[1]] = True
-    return first & (match >= 0)

@@ -312,9 +312,7 @@ def _bring_up_to_date(
 
 def _drawn(rows: _Rows, known: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which rows have no number of their own, or no status."""
-    drawn = np.isnan(rows.at["obstacle_no"]) | np.array(
-        [word is None for word in rows.at["status"]], bool
-    )
+    drawn = pd.isna(rows.at["obstacle_no"]) | pd.isna(rows.at["status"])
     order = np.concatenate([known, np.setdiff1d(np.arange(len(rows)), known)])
     _, first = np.unique(rows.at["obstacle_no"][order], return_index=True)
     second = np.ones(len(rows), dtype=bool)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def empty(of: Layer, crs: CRS) -> gpd.GeoDataFrame:
     """A table of a layer with all its columns and no rows."""
-    return table(of, {column.name: [] for column in of.columns}, [], crs)
+    return table(of, {}, [], crs)
 
 
 def table(

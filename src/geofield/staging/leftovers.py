@@ -193,11 +193,9 @@ def _hold(file: int) -> None:
 
 
 def _sweep_old(staging: Path) -> None:
-    try:
+    with suppress(OSError):
         if time.time() - staging.stat().st_mtime > _OLD_S:
             shutil.rmtree(staging, ignore_errors=True)
-    except OSError:
-        return
 
 
 def _finish(staging: Path, target: Path) -> None:
