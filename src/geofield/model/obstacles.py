@@ -97,12 +97,11 @@ def from_circles_px(
     Pixels count from the corner of the top-left pixel; `buffer_m` is the safety margin,
     `confidence` 0 to 1. The metric CRS is the grid's own when none is given.
     """
-    x_px, y_px = np.asarray(x_px, float), np.asarray(y_px, float)
-    radius_px = np.asarray(radius_px, float)
+    x_px, y_px, radius_px = (np.asarray(each, float) for each in (x_px, y_px, radius_px))
     target = grid.metric_crs if crs is None else crs
-    x, y = (np.asarray(v) for v in grid.to_crs(x_px, y_px, target))
-    lon, lat = (np.asarray(v) for v in grid.to_lonlat(x_px, y_px))
-    radius_m = radius_px * np.asarray(grid.resolution_at(x_px, y_px))
+    x, y = grid.to_crs(x_px, y_px, target)
+    lon, lat = grid.to_lonlat(x_px, y_px)
+    radius_m = radius_px * grid.resolution_at(x_px, y_px)
     count = len(x_px)
     return schema.table(
         schema.OBSTACLES,
