@@ -72,6 +72,28 @@ def test_a_parcel_that_is_nowhere_is_left_out_or_refused_where_it_is_the_only_on
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        pytest.param(["field", PICTURE, "--boundary", "FILE", "-o", "OUT"], id="boundary"),
+        pytest.param(["info", "FILE"], id="info"),
+        pytest.param(["validate", "FILE"], id="validate"),
+    ],
+)
+def test_a_parcel_outside_its_crs_is_refused(tmp_path: Path, arguments: list[str | Path]) -> None:
+    """Eastings with the zone in front (EPSG:4647) under EPSG:25832 ended in an OverflowError."""
+    path, out = tmp_path / "zone.gpkg", tmp_path / "out.gpkg"
+    parcel = shapely.box(32500000, 5500000, 32500300, 5500200)
+    gpd.GeoDataFrame(geometry=[parcel], crs="EPSG:25832").to_file(path)
+    given = {"FILE": path, "OUT": out}
+    done = run_geofield(*(given.get(str(each), each) for each in arguments))
+    assert done.returncode == 1
+    assert "Coordinates are outside the area of EPSG:25832." in done.stdout + done.stderr
+    assert "Check the CRS: the data may be in another one." in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
 def test_a_polygon_that_is_nowhere_has_no_tracks() -> None:
     with pytest.raises(TrackError, match="not finite numbers") as caught:
         plan_tracks(BROKEN, crs="EPSG:32636", spacing_m=6.0)

@@ -199,11 +199,7 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
         np.stack([at_x - _ARM_M, at_x + _ARM_M, at_x, at_x]),
         np.stack([at_y, at_y, at_y - _ARM_M, at_y + _ARM_M]),
     )
-    if not (np.isfinite(lon).all() and np.isfinite(lat).all()):
-        raise CRSError(
-            f"Coordinates are outside the area of {authority_name(crs)}.",
-            hint="Check the CRS: the data may be in another one.",
-        )
+    refuse_outside(crs, lon, lat)
     along, across, turn = _cross(lon, lat)
     # The axes of the ellipse that a circle becomes; a conformal CRS leaves it one.
     apart = np.hypot((along / across - across / along) / 2.0, np.cos(turn))
@@ -217,6 +213,20 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
         )
     scale = 2.0 * _ARM_M / np.sqrt(along * across * np.abs(np.sin(turn)))
     return float(scale) if scale.ndim == 0 else scale
+
+
+def refuse_outside(crs: CRS, lon: ArrayLike, lat: ArrayLike) -> None:
+    """Refuse places in a CRS that have no longitude and latitude.
+
+    Raises
+    ------
+    CRSError
+    """
+    if not (np.isfinite(lon).all() and np.isfinite(lat).all()):
+        raise CRSError(
+            f"Coordinates are outside the area of {authority_name(crs)}.",
+            hint="Check the CRS: the data may be in another one.",
+        )
 
 
 def side_of_cross_m(lon: Any, lat: Any) -> Any:

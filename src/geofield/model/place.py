@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from shapely import Polygon
 
-from geofield.crs import LONLAT, transformer
+from geofield.crs import LONLAT, refuse_outside, transformer
 
 #: Degrees between round positions, from the roundest on; 5e-7 is five centimetres.
 _STEPS = tuple(
@@ -29,19 +29,22 @@ def place_id(polygon: Polygon, crs: CRS) -> str:
     Latitude and longitude are multiples of 1 degree, else of 0.5, 0.2, 0.1, 0.05 and so on. Of
     several positions that are equally round, the one with the roundest latitude counts, then the
     one with the roundest longitude. Holes belong to the field here.
+
+    Raises
+    ------
+    CRSError
+        The outline reaches out of the CRS's area.
     """
     whole = Polygon(polygon.exterior)
     shapely.prepare(whole)
-    x0, y0, x1, y1 = whole.bounds
+    to_lonlat = transformer(crs, LONLAT)
     middle = whole.representative_point()
-    lon_0, lat_0 = transformer(crs, LONLAT).transform(middle.x, middle.y)
-    edge = np.linspace(0.0, 1.0, 9)
-    x = np.concatenate([x0 + edge * (x1 - x0)] * 2 + [np.full(9, x0), np.full(9, x1)])
-    y = np.concatenate([np.full(9, y0), np.full(9, y1)] + [y0 + edge * (y1 - y0)] * 2)
-    lons, lats = (np.asarray(each) for each in transformer(crs, LONLAT).transform(x, y))
+    lon_0, lat_0 = to_lonlat.transform(middle.x, middle.y)
+    west, south, east, north = to_lonlat.transform_bounds(*whole.bounds, densify_pts=7)
+    refuse_outside(crs, (west, east), (south, north))
     # Around the field's own longitude, for those that 180 degrees runs through.
-    lons = lon_0 + (lons - lon_0 + 180.0) % 360.0 - 180.0
-    box = (lats.min(), lats.max(), lons.min(), lons.max())
+    west, east = (lon_0 + (lon - lon_0 + 180.0) % 360.0 - 180.0 for lon in (west, east))
+    box = (south, north, west, east)
     for digits, tenths in _STEPS:
         per_degree = 10**digits / tenths
         found = _inside(whole, crs, per_degree, box)
