@@ -78,10 +78,11 @@ def test_a_parcel_that_is_nowhere_is_left_out_or_refused_where_it_is_the_only_on
         pytest.param(["field", PICTURE, "--boundary", "FILE", "-o", "OUT"], id="boundary"),
         pytest.param(["info", "FILE"], id="info"),
         pytest.param(["validate", "FILE"], id="validate"),
+        pytest.param(["evaluate", PLAN, "FILE"], id="truth"),
     ],
 )
-def test_a_parcel_outside_its_crs_is_refused(tmp_path: Path, arguments: list[str | Path]) -> None:
-    """Eastings with the zone in front (EPSG:4647) under EPSG:25832 ended in an OverflowError."""
+def test_shapes_outside_their_crs_are_refused(tmp_path: Path, arguments: list[str | Path]) -> None:
+    """Eastings with the zone in front (EPSG:4647) under EPSG:25832 ended in tracebacks."""
     path, out = tmp_path / "zone.gpkg", tmp_path / "out.gpkg"
     parcel = shapely.box(32500000, 5500000, 32500300, 5500200)
     gpd.GeoDataFrame(geometry=[parcel], crs="EPSG:25832").to_file(path)

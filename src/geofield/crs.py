@@ -215,14 +215,14 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
     return float(scale) if scale.ndim == 0 else scale
 
 
-def refuse_outside(crs: CRS, lon: ArrayLike, lat: ArrayLike) -> None:
-    """Refuse places in a CRS that have no longitude and latitude.
+def refuse_outside(crs: CRS, *brought: ArrayLike) -> None:
+    """Refuse places in a CRS whose coordinates are not finite where they were brought to another.
 
     Raises
     ------
     CRSError
     """
-    if not (np.isfinite(lon).all() and np.isfinite(lat).all()):
+    if not all(np.isfinite(each).all() for each in brought):
         raise CRSError(
             f"Coordinates are outside the area of {authority_name(crs)}.",
             hint="Check the CRS: the data may be in another one.",

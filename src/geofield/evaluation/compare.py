@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
-from geofield.crs import ground_areas_m2, ground_scale, is_metric
+from geofield.crs import ground_areas_m2, ground_scale, is_metric, refuse_outside
 from geofield.errors import (
     CRSError,
     ObstacleError,
@@ -155,8 +155,9 @@ def compared(
         raise CRSError(
             "Detections are not in a metric CRS.", hint="Reproject them to their UTM zone."
         )
-    truth = active(truth).to_crs(detected.crs)
-    return _counting(active(detected), area), _counting(truth, area)
+    true = active(truth).to_crs(detected.crs)
+    refuse_outside(CRS(truth.crs), shapely.get_coordinates(true.geometry.to_numpy()))
+    return _counting(active(detected), area), _counting(true, area)
 
 
 def _tell_elsewhere(found_m: FloatArray, true_m: FloatArray) -> None:
