@@ -29,7 +29,7 @@ from scipy import ndimage
 
 import geofield as gf
 from common import DATA, machine, write_page
-from geofield.errors import ObstacleWarning
+from geofield.errors import ObstacleWarning, TrackWarning
 from geofield.evaluation import Driving, driving, match_points, reliability
 from geofield.imagery import read_scene
 from geofield.learned import network
@@ -410,6 +410,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1)
     given = parser.parse_args()
     warnings.simplefilter("ignore", ObstacleWarning)
+    warnings.simplefilter("ignore", TrackWarning)
     lines = machine("opencv-python-headless")
     if given.part in ("sites", "all"):
         cases = list(sites_left_out(given.every))
