@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,8 @@ import click
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
-from geofield.cli.interrupts import two_interrupts
 from geofield.cli.options import Number, acknowledge_option, stage_options, tell_idle
-from geofield.cli.place_options import place_options, places_of
+from geofield.cli.parcels import place_options, places_of
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
 from geofield.wording import counted
@@ -150,9 +150,9 @@ def batch(
     say(f"Places     {len(found)} of {places.name}")
     waiting = take_in(store, job)
     with (
-        _overview_renewed(store, overview=overview),
+        overview_renewed(store, overview=overview),
         progress_bar(quiet=as_json) as progress,
-        two_interrupts() as stop,
+        _two_interrupts() as stop,
     ):
         count = run_farm(
             found, job, store, lambda: _engine(workers, scheduler, store),
@@ -216,7 +216,7 @@ def _tell_notes(reviewed: list[dict[str, Any]]) -> None:
 
 
 @contextmanager
-def _overview_renewed(store: Store, *, overview: bool) -> Iterator[None]:
+def overview_renewed(store: Store, *, overview: bool) -> Iterator[None]:
     """Where a run is refused, an overview in which what was taken in is no edit any more."""
     from geofield.farm.finish import renew_unless_edited
     from geofield.farm.marks import CHANGED
@@ -227,6 +227,28 @@ def _overview_renewed(store: Store, *, overview: bool) -> Iterator[None]:
         if overview and store.get(CHANGED) is not None:
             renew_unless_edited(store)
         raise
+
+
+@contextmanager
+def _two_interrupts() -> Iterator[threading.Event]:
+    """What the first Ctrl+C sets; the second, and any other stop, end the block."""
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+
+    def first(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, before)
+        stop.set()
+        say_note("What is begun is finished; again Ctrl+C stops at once.")
+
+    # Asked first: the handler can be called before a value that is handed back has its name.
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, first)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
@@ -298,29 +320,22 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
         from geofield.farm.pool import Pool, cores
 
         engine = Pool(workers or cores())
-    elif _has_dask():
+    else:
         from geofield.farm.cluster import Cluster
 
-        engine = Cluster.at(scheduler, store)
-    else:
-        raise GeofieldError(
-            "A Dask cluster needs the extra: pip install geofield[batch]",
-            hint="Without it, --workers N uses this machine.",
-        )
+        try:
+            engine = Cluster.at(scheduler, store)
+        except ImportError:
+            raise GeofieldError(
+                "A Dask cluster needs the extra: pip install geofield[batch]",
+                hint="Without it, --workers N uses this machine.",
+            ) from None
     try:
         say(f"Workers    {engine.where}")
     except BaseException:  # a stop: nobody else knows of it yet
         engine.close()
         raise
     return engine
-
-
-def _has_dask() -> bool:
-    """Whether the extra is there."""
-    try:
-        return find_spec("distributed") is not None
-    except ValueError:
-        return False
 
 
 def _show(progress: Any, count: Count) -> None:

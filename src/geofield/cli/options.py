@@ -12,13 +12,14 @@ import re
 import types
 import typing
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import click
 from pydantic.fields import FieldInfo
 
 from geofield.cli.console import say, say_note
 from geofield.cli.degrees import Degrees
+from geofield.cli.files import Command
 from geofield.errors import SettingsError
 from geofield.settings import (
     LonLat,
@@ -30,8 +31,6 @@ from geofield.settings import (
     option_named,
 )
 from geofield.wording import nearest
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 SEPARATOR = "__"
 

@@ -1,37 +1,37 @@
-"""The user's own parcels as field boundaries, for the commands that take them."""
+"""Options of files that fields come from: parcels for the boundary of one, places for many."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from geofield.cli.console import say_note
-from geofield.cli.files import OLD_PATH
+from geofield.cli.files import OLD_PATH, Command
 from geofield.errors import FieldError, FormatError
 
 if TYPE_CHECKING:
+    from geofield.farm.places import Places
     from geofield.model import Field
+    from geofield.settings import Settings
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+_COLUMNS = ("id", "name", "lat", "lon")
 
 
 def boundary_options(command: Command) -> Command:
     """Add ``--boundary``, ``--boundary-layer`` and ``--boundary-name``."""
-    for option in (
-        click.option("--boundary-name", help="Take the parcel of this name or id instead."),
-        click.option("--boundary-layer", help="Layer of --boundary, where it has several."),
-        click.option(
-            "--boundary",
-            type=OLD_PATH,
-            help="Your own parcels (any vector file, any CRS): the only one is taken, or the one "
-            "with the point.",
-        ),
-    ):
-        command = option(command)
-    return command
+    name = click.option("--boundary-name", help="Take the parcel of this name or id instead.")
+    layer = click.option("--boundary-layer", help="Layer of --boundary, where it has several.")
+    parcels = click.option(
+        "--boundary",
+        type=OLD_PATH,
+        help="Your own parcels (any vector file, any CRS): the only one is taken, or the one with "
+        "the point.",
+    )
+    return parcels(layer(name(command)))
 
 
 def parcel_and_point(
@@ -76,3 +76,40 @@ def parcel_and_point(
 
 def _missing(lat: float | None) -> click.UsageError:
     return click.UsageError(f"Missing option '{'--lat' if lat is None else '--lon'}'.")
+
+
+def place_options(command: Command) -> Command:
+    """Add ``--layer``, ``--places-crs`` and the names of columns."""
+    for name in reversed(_COLUMNS):
+        command = click.option(
+            f"--{name}-column",
+            help=f"Column of PLACES with the {name}; usual names are found.",
+        )(command)
+    command = click.option(
+        "--places-crs", help="CRS of files that do not say theirs, e.g. EPSG:32633."
+    )(command)
+    return click.option("--layer", help="Layer of PLACES, where it has several.")(command)
+
+
+def places_of(path: Path, settings: Settings, options: Mapping[str, Any]) -> Places:
+    """The places of a file; what there is to say of them is said."""
+    from geofield.farm.place_reader import read_places
+    from geofield.farm.places import overlaps
+
+    places = read_places(
+        path,
+        settings=settings,
+        layer=options.get("layer"),
+        crs=options.get("places_crs"),
+        **{f"{name}_column": options.get(f"{name}_column") for name in _COLUMNS},
+    )
+    for note in places.notes:
+        say_note(note)
+    told = overlaps(places)
+    if told:
+        first = next(iter(told))
+        say_note(
+            f"{len(told)} parcels overlap others, such as {places.names[first].as_py()}: it "
+            f"{told[first]}. Each is planned as it is."
+        )
+    return replace(places, remarks=told)

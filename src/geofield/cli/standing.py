@@ -41,12 +41,12 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
     from pyproj import CRS
 
     from geofield.datum import datum_notes
-    from geofield.farm.standing import LAYERS, WITHOUT_SHAPE, obstacles_of, unsized_points
+    from geofield.farm.standing import LAYERS, WITHOUT_SHAPE, unsized_points
     from geofield.model.obstacles import POINT_RADIUS_M
 
-    if job.obstacles is None:
+    standing = job.standing
+    if job.obstacles is None or standing is None:
         return
-    standing = obstacles_of(job.obstacles, job.obstacles_crs)
     if layers := standing.attrs[LAYERS]:
         say_note(f"{job.obstacles.name}: what all its layers hold is avoided: {', '.join(layers)}.")
     for note in datum_notes(CRS(standing.crs), *shapely.get_coordinates(standing.geometry).T):
@@ -70,11 +70,11 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
 
 def tell_unreached(job: Job, outlines_lonlat: Iterable[Shapes]) -> None:
     """Tell when nothing of the file of obstacles stands at any field that was planned."""
-    from geofield.farm.standing import any_reached, obstacles_of
+    from geofield.farm.standing import any_reached
 
-    if job.obstacles is None:
+    standing = job.standing
+    if job.obstacles is None or standing is None:
         return
-    standing = obstacles_of(job.obstacles, job.obstacles_crs)
     if not len(standing):
         say_note(f"{job.obstacles.name} holds no shape: NOTHING of it is avoided.")
     elif not any_reached(standing, outlines_lonlat):

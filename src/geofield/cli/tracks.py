@@ -18,6 +18,15 @@ from geofield.cli.files import (
     tell_unsaved,
 )
 from geofield.cli.grouped import GroupedCommand
+from geofield.cli.many_tracks import (
+    Wanted,
+    figures_of,
+    file_name,
+    line_of,
+    of_many,
+    parcels_in,
+    tell_spacing,
+)
 from geofield.cli.options import (
     continued,
     defaults_option,
@@ -88,14 +97,6 @@ def tracks(
     which is a field. Their columns come along, and those named like settings (spacing_m,
     heading_deg, ...) hold for their field.
     """
-    from geofield.cli.many_tracks import (
-        Wanted,
-        file_name,
-        line_of,
-        of_many,
-        parcels_in,
-        tell_spacing,
-    )
     from geofield.farm.work import Job
 
     (claim_file if output.suffix else claim_folder)(output)
@@ -188,8 +189,7 @@ def _one(
     plan: Plan | Place, job: Job, target: Path, file: Path, *, overwrite: bool, fresh: bool
 ) -> dict[str, Any]:
     """Plan one field and write it; its figures."""
-    from geofield.cli.many_tracks import figures_of
-    from geofield.farm.standing import obstacles_of, with_obstacles
+    from geofield.farm.standing import with_obstacles
     from geofield.farm.work import plan_place
     from geofield.model.track_edits import TrackEdits
     from geofield.pipeline import run_tracks
@@ -201,8 +201,8 @@ def _one(
         done, read_from = plan_place(plan, job), None
         inputs.append(file)
     else:
-        if job.obstacles is not None:
-            plan = with_obstacles(plan, obstacles_of(job.obstacles, job.obstacles_crs))
+        if job.standing is not None:
+            plan = with_obstacles(plan, job.standing)
         if fresh:
             evidence = replace(plan.evidence, track_edits=TrackEdits())
             plan = replace(plan, tracks=None, evidence=evidence)

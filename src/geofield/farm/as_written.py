@@ -6,18 +6,15 @@ import hashlib
 import json
 from collections.abc import Collection, Mapping
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import pandas as pd
 import shapely
 
 from geofield import schema
 from geofield.farm.layers import EPSG, FIELD_ID
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.plan import Plan
+from geofield.plan import Plan
 
 #: What a person may change, besides shapes.
 _FIELD_WORDS = ("name",)

@@ -45,7 +45,7 @@ def _obstacles(job: Job) -> dict[str, Any]:
 
 
 def _digest(record: Record) -> str:
-    places = (record.places or {}).get("digest")
+    places = record.places["digest"]
     content = [__version__, record.settings, places, record.imagery, record.chunk_fields]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -53,12 +53,12 @@ def _digest(record: Record) -> str:
 def difference(there: Record, wanted: Record) -> str:
     """What differs, in words."""
     words = []
-    for section, values in (wanted.settings or {}).items():
-        before = (there.settings or {}).get(section, {})
+    for section, values in wanted.settings.items():
+        before = there.settings.get(section, {})
         for name in {*values, *before}:
             if values.get(name) != before.get(name):
                 words.append(f"{name} was {before.get(name)} and is {values.get(name)}")
-    if (there.places or {}).get("digest") != (wanted.places or {}).get("digest"):
+    if there.places.get("digest") != wanted.places["digest"]:
         words.append("the places differ")
     if there.imagery != wanted.imagery:
         words.append("the pictures or obstacles differ")

@@ -6,8 +6,9 @@ row names one field alone: what was merged into it of others was gone there.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
@@ -19,9 +20,6 @@ from geofield.farm.layers import FIELD_ID
 from geofield.model.tracks_written import SAME_M
 from geofield.model.written import same_shapes
 from geofield.wording import counted, some_of
-
-if TYPE_CHECKING:
-    import geopandas as gpd
 
 #: What tells the rows of a field apart.
 KEYS = {
@@ -49,21 +47,9 @@ def undissolved(
     field in which it lies. A row that is not driven around is no word on what it took in of other
     fields. Either is told.
 
-    Parameters
-    ----------
-    of : Layer
-        One of `KEYS`.
-    rows, written : GeoDataFrame
-        The layer as it was left, and in the farm, in one CRS and with columns of the same names.
-    fields : GeoDataFrame
-        The outlines.
-
-    Returns
-    -------
-    GeoDataFrame
-        The layer.
-    ids : set of str
-        The fields of which something stands in merged rows.
+    `rows` is one of the layers `KEYS` as it was left, `written` as it is in the farm, in the same
+    CRS and with columns of the same names; `fields` are the outlines. The ids that come with the
+    layer are those of fields of which something stands in merged rows.
     """
     rows, written = (table.reset_index(drop=True) for table in (rows, written))
     now, before = _names(of, rows), _names(of, written)

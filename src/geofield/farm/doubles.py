@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from geofield import schema
 from geofield.errors import FieldWarning, FormatError
 from geofield.farm import edited_tracks
 from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS, record_in
 from geofield.farm.as_written import digests_of
+from geofield.farm.edited_plan import Edits
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.reviewed import file_of, reviewed_files
 from geofield.farm.store import Store
+from geofield.farm.value import Farm
 from geofield.notes import warn
 from geofield.staging.generations import earlier_of
-
-if TYPE_CHECKING:
-    from geofield.farm.edited_plan import Edits
-    from geofield.farm.value import Farm
 
 
 def changed_elsewhere(farm: Farm, overview: Path, edits: Edits) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from geofield.errors import FieldWarning, FormatError, GeofieldError
-from geofield.farm.folder import REVIEWED, STATUS, committed, read_part
+from geofield.farm.folder import REVIEWED, STATUS, read_parts
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.put_settings import settings_put, settings_said
@@ -40,10 +40,9 @@ def edited_in_place(store: Store, only: Set[str] | None = None) -> Iterator[str]
     if store.folder is None or not names:
         return
     farm, put = read_farm(store.place), settings_put(store)
-    for chunk in committed(store):
+    for chunk, status in read_parts(store, STATUS, [FIELD_ID]):
         taken_in_ns = written_ns(store.folder / file_in(STATUS, chunk))
-        status = read_part(store, STATUS, chunk, [FIELD_ID])
-        for one in [] if status is None else status[FIELD_ID].to_pylist():
+        for one in status[FIELD_ID].to_pylist():
             if file_of(one) not in names or one not in farm:
                 continue
             file = store.folder / file_of(one)

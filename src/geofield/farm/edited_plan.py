@@ -6,8 +6,9 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
@@ -24,9 +25,6 @@ from geofield.notes import listening, warn
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
-
-if TYPE_CHECKING:
-    import geopandas as gpd
 
 #: Outlines that differ by less, in the units of the overview, are the same.
 _SAME = 1e-9
@@ -50,17 +48,10 @@ class Edits:
 def edited_plan(
     plan: Plan, edits: Edits, outlines: gpd.GeoSeries, around: gpd.GeoDataFrame | None
 ) -> Plan:
-    """A plan as it was edited, with the tracks of before.
+    """A plan of the farm as it was edited, with the tracks of before.
 
-    Parameters
-    ----------
-    plan : Plan
-        Of the farm.
-    edits : Edits
-    outlines : GeoSeries
-        Of the farm, by field id, in the CRS of the overview.
-    around : GeoDataFrame, optional
-        Obstacles of a file of their own: an outline that was moved has those that stand in it now.
+    `outlines` are those of the farm by field id, in the CRS of the overview; `around` are obstacles
+    of a file of their own: an outline that was moved has those that stand in it now.
 
     Raises
     ------

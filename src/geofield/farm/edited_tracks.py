@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import numpy as np
 import shapely
 from pyproj import CRS
@@ -19,15 +19,11 @@ from geofield import schema
 from geofield.farm.as_written import hashed, own_names, text_of
 from geofield.farm.dissolved import KEYS
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.farm.value import Farm
 from geofield.model.lost_numbers import known_by_shape
 from geofield.plan import Plan
 
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.farm.value import Farm
-
-Tables = Mapping[schema.Layer, "gpd.GeoDataFrame"]
+Tables = Mapping[schema.Layer, gpd.GeoDataFrame]
 #: By layer, what columns of a person's own are called in the file, and in the farm.
 Names = Mapping[str, Mapping[str, str]]
 
@@ -38,10 +34,7 @@ EDITED = {of: KEYS[of] for of in (schema.TRACKS, schema.SEGMENTS)}
 def track_digests(tables: Tables) -> dict[str, str]:
     """A digest per field of its tracks, segments and what a person wrote beside them.
 
-    Parameters
-    ----------
-    tables : mapping
-        The layers `EDITED` of many fields.
+    `tables` are the layers `EDITED` of many fields, as below.
     """
     parts: dict[str, list[bytes]] = {}
     for of, keys in EDITED.items():
@@ -60,17 +53,7 @@ def track_digests(tables: Tables) -> dict[str, str]:
 def layers_of(
     farm: Farm, layers: Iterable[schema.Layer], ids: Collection[str], crs: CRS, names: Names
 ) -> Tables:
-    """Layers of some of a farm's fields, with columns called as in the overview.
-
-    Parameters
-    ----------
-    farm : Farm
-    layers : iterable of Layer
-    ids : collection of str
-    crs : CRS
-        Of the overview.
-    names : mapping
-    """
+    """Layers of some of a farm's fields, in the CRS and with the columns' names of the overview."""
     tables = {}
     for of in layers:
         table = farm.layer(of.name)
@@ -81,15 +64,7 @@ def layers_of(
 
 
 def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
-    """A plan with the tracks and segments of its field as they were edited.
-
-    Parameters
-    ----------
-    plan : Plan
-    tables : mapping
-        The layers `EDITED` of many fields.
-    names : mapping
-    """
+    """A plan with the tracks and segments of its field as they were edited."""
     if plan.tracks is None:
         return plan
 
@@ -110,17 +85,7 @@ def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
 
 
 def only_lost_numbers(farm: Farm, ids: Collection[str], tables: Tables, names: Names) -> set[str]:
-    """The fields of which rows lost their numbers in another program, and nothing was edited.
-
-    Parameters
-    ----------
-    farm : Farm
-    ids : collection of str
-        Fields of which the digests differ.
-    tables : mapping
-        The layers `EDITED` of many fields.
-    names : mapping
-    """
+    """Of fields whose digests differ those where another program lost numbers, and no more."""
     lost: set[str] = set()
     for of, keys in EDITED.items():
         without = tables[of][list(keys)].isna().any(axis=1)

@@ -13,14 +13,25 @@ import sqlite3
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import geopandas as gpd
 import pandas as pd
 
 from geofield import schema
 from geofield.errors import FieldWarning, FormatError, FormatWarning
 from geofield.farm import edited_tracks
-from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS, record_in, table_in, tell
+from geofield.farm.as_left import (
+    DETAILS,
+    DIGESTS,
+    OWN,
+    TRACKS,
+    lines_with_owners,
+    obstacles_with_owners,
+    record_in,
+    table_in,
+    tell,
+)
 from geofield.farm.as_written import digests_of, own_digests, own_names, with_rest
 from geofield.farm.dissolved import TOLD, undissolved
 from geofield.farm.doubles import changed_elsewhere, refuse_double, tell_double
@@ -29,19 +40,14 @@ from geofield.farm.edited_plan import Edits, edited_plan, planned
 from geofield.farm.folder import REVIEWED, Record
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.neighbours import shared
-from geofield.farm.owners import lines_with_owners, obstacles_with_owners
 from geofield.farm.put_back import put_plans
 from geofield.farm.store import Store
+from geofield.farm.value import Farm, read_farm
 from geofield.formats import origin
 from geofield.model.merged_rows import parts_apart
 from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.wording import counted, some_of
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.farm.value import Farm
 
 #: The edits that the farm holds already, while the overview is older than it.
 TAKEN = f"{REVIEWED}/.taken.json"
@@ -249,7 +255,7 @@ def is_overview(path: Path) -> bool:
 
 def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) -> None:
     """Tell where an outline was moved over ground on which the file of obstacles was not read."""
-    file = ((Record.read(store) or Record()).imagery or {}).get("obstacles")
+    file = (Record.read(store) or Record()).imagery.get("obstacles")
     wider = [
         one
         for one, plan in edited.items()
@@ -265,8 +271,6 @@ def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) ->
 
 def is_edited(folder: Path, overview: Path) -> bool:
     """Whether an overview has edits that its farm has not taken in, or cannot understand."""
-    from geofield.farm.value import read_farm
-
     if not overview.is_file():
         return False
     taken = _taken(Store.of(folder), overview)
@@ -312,8 +316,6 @@ def put_edits(
         When an edit cannot be understood, or its field was changed elsewhere; the farm is as it was
         then.
     """
-    from geofield.farm.value import read_farm
-
     if not overview.is_file():
         return [], []
     store, farm = Store.of(folder), read_farm(folder)

@@ -26,11 +26,10 @@ def write_failed(store: Store, places: Places) -> list[str]:
     """
     import pyarrow.csv
 
-    bad = []
-    for chunk in folder.committed(store):
-        table = folder.read_part(store, folder.STATUS, chunk, _STATUS)
-        if table is not None:
-            bad.append(table.filter(pc.is_in(table["status"], pa.array(["failed", "lost"]))))
+    bad = [
+        table.filter(pc.is_in(table["status"], pa.array(["failed", "lost"])))
+        for _, table in folder.read_parts(store, folder.STATUS, _STATUS)
+    ]
     failed = pa.concat_tables(bad) if bad else None
     if failed is None or not failed.num_rows:
         store.remove(FAILED)
@@ -69,5 +68,5 @@ def _positions(places: Places, at: Any) -> dict[str, Any]:
 def _text(column: Any) -> Any:
     """What CSV has no type for, as text."""
     kind = column.type
-    plain = pa.types.is_primitive(kind) or pa.types.is_string(kind) or pa.types.is_boolean(kind)
+    plain = pa.types.is_primitive(kind) or pa.types.is_string(kind)
     return column if plain else column.cast(pa.string())

@@ -15,8 +15,8 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,11 +46,11 @@ class Record:
     #: Of all that decides the result: settings, places, imagery, software.
     digest: str = ""
     #: Plain JSON values.
-    settings: Mapping[str, Any] | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
     #: File, number and digest of the places.
-    places: Mapping[str, Any] | None = None
+    places: Mapping[str, Any] = field(default_factory=dict)
     #: What the pictures are, with their terms; empty without imagery.
-    imagery: Mapping[str, Any] | None = None
+    imagery: Mapping[str, Any] = field(default_factory=dict)
     #: Places per chunk.
     chunk_fields: int = 250
     chunks: int = 0
@@ -63,9 +63,9 @@ class Record:
             "digest": self.digest,
             "chunks": self.chunks,
             "chunk_fields": self.chunk_fields,
-            "places": self.places or {},
-            "imagery": self.imagery or {},
-            "settings": self.settings or {},
+            "places": self.places,
+            "imagery": self.imagery,
+            "settings": self.settings,
         }
         return (json.dumps(content, ensure_ascii=False, indent=2) + "\n").encode()
 
@@ -82,9 +82,9 @@ class Record:
                     f"{store.shown} was written by a later version of geofield.",
                     hint="Update geofield.",
                 )
-            plain = (content[name] for name in ("settings", "places", "imagery"))
-            numbers = (int(content[name]) for name in ("chunk_fields", "chunks"))
-            return cls(str(content["digest"]), *plain, *numbers)
+            said: list[Any] = [dict(content[name]) for name in ("settings", "places", "imagery")]
+            said += [int(content[name]) for name in ("chunk_fields", "chunks")]
+            return cls(str(content["digest"]), *said)
         except (KeyError, TypeError, ValueError) as error:
             raise FormatError(
                 f"{store.shown}/{RECORD} is damaged: {error!r}.",
@@ -168,3 +168,16 @@ def read_part(
             hint="Remove that chunk's file in status/, and run geofield batch again.",
         ) from None
     return table.drop_columns("bbox") if "bbox" in table.column_names else table
+
+
+def read_parts(
+    store: Store,
+    layer: str,
+    columns: Sequence[str] | None = None,
+    chunks: Iterable[int] | None = None,
+) -> Iterator[tuple[int, pa.Table]]:
+    """A layer of all chunks that count, or of some, with their numbers; of those that have it."""
+    for chunk in committed(store) if chunks is None else chunks:
+        table = read_part(store, layer, chunk, columns)
+        if table is not None:
+            yield chunk, table

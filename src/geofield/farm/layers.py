@@ -12,6 +12,8 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import geopandas as gpd
@@ -96,12 +98,15 @@ def layer_table(
         if column.name != FIELD_ID:
             values = [rows.column(column.name) for _, rows in parts]
             columns[column.name] = _joined(column, values)
-    columns |= _own(of, [rows for _, rows in parts], own)
-    shapes = [rows.geometry for _, rows in parts]
-    lonlat = [np.empty(0, dtype=object)]
-    for zone, group in _grouped([crs[at] for at, _ in parts], shapes):
-        lonlat.append(_lonlat(np.concatenate(group), zone))
-    exact = np.concatenate([np.empty(0, dtype=object), *shapes])
+    columns |= _own([rows for _, rows in parts], own)
+    lonlat, shapes = [np.empty(0, dtype=object)], [np.empty(0, dtype=object)]
+    # Neighbours in one CRS are transformed by one call.
+    placed = ((crs[at], rows.geometry) for at, rows in parts)
+    for zone, group in groupby(placed, key=itemgetter(0)):
+        run = np.concatenate([geometry for _, geometry in group])
+        lonlat.append(_lonlat(run, zone))
+        shapes.append(run)
+    exact = np.concatenate(shapes)
     columns[GEOMETRY] = pa.array(shapely.to_wkb(np.concatenate(lonlat), flavor="iso"), pa.binary())
     columns[EXACT] = pa.array(shapely.to_wkb(exact, flavor="iso"), pa.binary())
     return pa.table(columns)
@@ -122,7 +127,7 @@ def _joined(column: schema.Column, parts: Sequence[Any]) -> pa.Array:
     )  # fmt: skip
 
 
-def _own(of: schema.Layer, parts: Sequence[Rows], own: pa.Schema | None) -> dict[str, Any]:
+def _own(parts: Sequence[Rows], own: pa.Schema | None) -> dict[str, Any]:
     """The user's own columns, by name; of given types where they are known before."""
     names = list(own.names) if own is not None else []
     names += [name for rows in parts for name in rows.own if name not in (EPSG, EXACT, FIELD_ID)]
@@ -140,17 +145,6 @@ def _own(of: schema.Layer, parts: Sequence[Rows], own: pa.Schema | None) -> dict
             found = pa.array(texts, pa.string())
         columns[name] = found.cast(pa.string()) if pa.types.is_null(found.type) else found
     return columns
-
-
-def _grouped(zones: Sequence[CRS], shapes: Sequence[Any]) -> list[tuple[CRS, list[Any]]]:
-    """Runs of neighbours in one CRS, so that each is transformed by one call."""
-    groups: list[tuple[CRS, list[Any]]] = []
-    for zone, part in zip(zones, shapes, strict=True):
-        if groups and (groups[-1][0] is zone or groups[-1][0] == zone):
-            groups[-1][1].append(part)
-        else:
-            groups.append((zone, [part]))
-    return groups
 
 
 def _lonlat(shapes: Any, crs: CRS) -> Any:
@@ -268,7 +262,7 @@ def _of_kind(table: pa.Table, name: str, kind: pa.DataType) -> pa.Table:
     return table.set_column(table.column_names.index(name), name, column)
 
 
-def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
+def frame_of(table: pa.Table) -> gpd.GeoDataFrame:
     """A layer of many fields as people use it.
 
     In the metric CRS where all its fields share one, else in WGS 84, or in Pacific Mercator where
@@ -285,13 +279,7 @@ def frame_of(name: str, table: pa.Table) -> gpd.GeoDataFrame:
             # As they were, not joined again behind a cut.
             mine = (zones == zone).to_numpy()
             shapes[mine] = reproject(exact[mine], CRS.from_epsg(int(zone)), crs)
-    rest = table.drop_columns(
-        [each for each in (GEOMETRY, EXACT, "bbox") if each in table.column_names]
-    )
-    return gpd.GeoDataFrame(_nullable(rest), geometry=shapes, crs=crs)
-
-
-def _nullable(table: pa.Table) -> Any:
-    """As pandas, whole numbers whole beside missing ones."""
+    # Whole numbers stay whole beside missing ones.
     kinds = {pa.int64(): pd.Int64Dtype(), pa.bool_(): pd.BooleanDtype()}
-    return table.to_pandas(types_mapper=kinds.get)
+    rest = table.drop_columns([GEOMETRY, EXACT]).to_pandas(types_mapper=kinds.get)
+    return gpd.GeoDataFrame(rest, geometry=shapes, crs=crs)

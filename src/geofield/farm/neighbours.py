@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import numpy as np
 import shapely
 
@@ -12,12 +12,8 @@ from geofield import schema
 from geofield.crs import reproject
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.farm.standing import with_rows
+from geofield.farm.value import Farm
 from geofield.plan import Plan
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.farm.value import Farm
 
 #: Ground that is not worth a row of its own, square metres.
 _LEAST_M2 = 0.01
@@ -30,14 +26,8 @@ def shared(edited: Mapping[str, Plan], farm: Farm) -> dict[str, Plan]:
 
     An obstacle gets a row in each field in which it newly stands: because it was drawn, moved or
     confirmed, or because the outline was moved over it. What a person took away in one of two
-    fields that it stood in stays away there. Tracks are not planned.
-
-    Parameters
-    ----------
-    edited : mapping
-        Plans by field id, their obstacles as :func:`reconcile` leaves them.
-    farm : Farm
-        As it was before the edits.
+    fields that it stood in stays away there. Tracks are not planned. `edited` are plans by field
+    id, their obstacles as :func:`reconcile` leaves them; `farm` is as it was before the edits.
     """
     fields = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
     before = _avoided(farm.layer(schema.OBSTACLES.name).to_crs(fields.crs))

@@ -7,7 +7,8 @@ when one looks closer.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import geopandas as gpd
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
@@ -16,15 +17,11 @@ from geofield.farm.as_written import digests_of
 from geofield.farm.edited_tracks import EDITED, track_digests
 from geofield.farm.edits import remember_own
 from geofield.farm.layers import FIELD_ID
+from geofield.farm.value import Farm
 from geofield.formats.gpkg import write as write_gpkg
 from geofield.formats.many import Joined
 from geofield.model import ImagerySource, Provenance
 from geofield.staging import staged_folder
-
-if TYPE_CHECKING:
-    import geopandas as gpd
-
-    from geofield.farm.value import Farm
 
 #: Name of the files, without suffix.
 STEM = "farm"

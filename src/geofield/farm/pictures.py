@@ -61,7 +61,7 @@ def _inside(grid: Grid, lat: np.ndarray, lon: np.ndarray) -> np.ndarray:
 
 def pictures_of(folder: Path) -> Path | None:
     """The pictures that the farm was planned on, beside it or in the current folder."""
-    record = Record.read(Store.of(folder))
-    name = str(((record and record.imagery) or {}).get("imagery", ""))
+    record = Record.read(Store.of(folder)) or Record()
+    name = str(record.imagery.get("imagery", ""))
     places = (folder.parent / name, Path(name)) if name else ()
     return next((place for place in places if place.exists()), None)

@@ -6,14 +6,16 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from geofield.earlier import is_planned
 from geofield.errors import FieldWarning, FormatError
 from geofield.farm.edited_in_place import edited_in_place
-from geofield.farm.folder import REVIEWED, STATUS, Record, committed, read_part, write_chunk
+from geofield.farm.folder import REVIEWED, STATUS, Record, read_part, read_parts, write_chunk
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
@@ -32,9 +34,6 @@ from geofield.plan_files import save_plan
 from geofield.settings import Settings
 from geofield.staging import refuse_locked
 from geofield.staging.generations import copy_whole, earlier_of
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 #: Of a status row that a person's plan took the place of.
 _SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
@@ -237,11 +236,10 @@ def put_plans(
 
 def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
     """The status of the chunks in which fields are."""
-    found = {chunk: read_part(store, STATUS, chunk) for chunk in committed(store)}
     return {
         chunk: status
-        for chunk, status in found.items()
-        if status is not None and not ids.isdisjoint(status["field_id"].to_pylist())
+        for chunk, status in read_parts(store, STATUS)
+        if not ids.isdisjoint(status["field_id"].to_pylist())
     }
 
 
@@ -272,15 +270,10 @@ def _replace(store: Store, plans: Sequence[Plan]) -> None:
 
 def _spliced(old: Any, new: Any, mine: list[str], ids: list[str]) -> pa.Table:
     """A table with the rows of some fields exchanged, the fields in their order."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    rest = (
-        None
-        if old is None
-        else old.filter(pc.invert(pc.is_in(old["field_id"], pa.array(mine, pa.string()))))
-    )
-    parts = [part for part in (rest, new) if part is not None]
+    parts = [] if new is None else [new]
+    if old is not None:
+        theirs = pc.invert(pc.is_in(old["field_id"], pa.array(mine, pa.string())))
+        parts.insert(0, old.filter(theirs))
     whole = stacked(parts)
     at = pc.index_in(whole["field_id"], pa.array(ids, pa.string()))
     order = pc.sort_indices(pa.table({"at": at, "row": range(len(whole))}),

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import quote
 
 from geofield.errors import FormatError
-from geofield.farm.folder import REVIEWED, STATUS, committed, read_part
+from geofield.farm.folder import REVIEWED, STATUS, read_parts
 from geofield.farm.status import outcomes_of
 from geofield.farm.store import Store
 from geofield.plan import Plan, read_plan
@@ -43,9 +43,8 @@ def reviewed_files(store: Store) -> frozenset[str]:
 
 def reviewed_rows(store: Store) -> list[dict[str, Any]]:
     """The status rows of fields that a person reviewed."""
-    tables = [read_part(store, STATUS, chunk) for chunk in committed(store)]
-    rows = [row for table in tables if table is not None for row in outcomes_of(table)]
-    return [row for row in rows if row["reviewed"]]
+    tables = (table for _, table in read_parts(store, STATUS))
+    return [row for table in tables for row in outcomes_of(table) if row["reviewed"]]
 
 
 def without_place(store: Store, ids: Iterable[str]) -> list[str]:

@@ -169,12 +169,8 @@ def _asked(
 
 
 def _statuses(store: Store, chunks: list[int]) -> Counter[str]:
-    counts: Counter[str] = Counter()
-    for chunk in chunks:
-        table = place.read_part(store, place.STATUS, chunk, ["status"])
-        if table is not None:
-            counts.update(table["status"].to_pylist())
-    return counts
+    parts = place.read_parts(store, place.STATUS, ["status"], chunks)
+    return Counter(one for _, table in parts for one in table["status"].to_pylist())
 
 
 def _with_failures(store: Store, chunks: list[int]) -> list[int]:

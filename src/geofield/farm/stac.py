@@ -108,13 +108,14 @@ def _layers() -> list[tuple[str, str]]:
 def _terms(store: Store, chunk: int) -> list[dict[str, Any]]:
     """The pictures behind the fields of a chunk: name, day, attribution and licence, each once."""
     plans = read_part(store, PLAN, chunk, ["source"])
-    found: dict[tuple[Any, ...], dict[str, Any]] = {}
+    found: list[dict[str, Any]] = []
     for text in [] if plans is None else pc.unique(plans["source"]).to_pylist():
         source = json.loads(text or "{}")
-        kept = {key: source.get(key) for key in ("name", "date", "attribution", "licence")}
-        if any(kept.values()):
-            found[tuple(kept.values())] = {key: value for key, value in kept.items() if value}
-    return list(found.values())
+        names = ("name", "date", "attribution", "licence")
+        said = {name: source[name] for name in names if source.get(name)}
+        if said and said not in found:
+            found.append(said)
+    return found
 
 
 def _collection(by_file: Mapping[str, dict[str, Any]], name: str) -> dict[str, Any]:

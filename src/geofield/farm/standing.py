@@ -16,7 +16,7 @@ import shapely
 from geofield import schema
 from geofield.crs import LONLAT, parse_crs
 from geofield.errors import CRSError, FormatError, TrackError
-from geofield.farm.folder import committed, read_part
+from geofield.farm.folder import read_parts
 from geofield.farm.layers import GEOMETRY
 from geofield.farm.place_files import CSV
 from geofield.farm.place_reader import read_table
@@ -111,9 +111,8 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
             f"{path} is a plan in which no obstacle stands.",
             hint="Leave it out, or search or draw some in it: geofield obstacles, geofield review.",
         )
-    if len(names) < 2:
-        return read_vector(path), []
-    tables = {name: table for name in names if len(table := read_vector(path, name))}
+    several = names if len(names) > 1 else ()
+    tables = {name: table for name in several if len(table := read_vector(path, name))}
     if not tables:
         return read_vector(path), []
     crs = next(iter(tables.values())).crs
@@ -225,10 +224,8 @@ def unsized_points(standing: gpd.GeoDataFrame) -> int:
 
 def outlines_in(store: Store) -> Iterator[np.ndarray]:
     """The outlines of a farm in degrees, chunk by chunk."""
-    for chunk in committed(store):
-        table = read_part(store, schema.FIELD.name, chunk, [GEOMETRY])
-        if table is not None:
-            yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))
+    for _, table in read_parts(store, schema.FIELD.name, [GEOMETRY]):
+        yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))
 
 
 def _near_m(standing: gpd.GeoDataFrame) -> float:

@@ -87,7 +87,8 @@ def plan_fields(
         None if obstacles is None else Path(obstacles),
     )
     waiting = iter(found.take(found.order()))
-    for plan, why in _here(waiting, job) if client is None else _there(waiting, job, client):
+    here = (_one(place, job) for place in waiting)
+    for plan, why in here if client is None else _there(waiting, job, client):
         if plan is None:
             warn(why, FieldWarning, stacklevel=2)
         else:
@@ -105,11 +106,6 @@ def _one(place: Place, job: Job) -> tuple[Plan | None, str]:
             said = in_words(error)
             return None, f"{place.name} ({place.field_id}): {said['error']} {said['hint']}".strip()
     return plan, told(place, heard)
-
-
-def _here(places: Iterator[Place], job: Job) -> Iterator[tuple[Plan | None, str]]:
-    for place in places:
-        yield _one(place, job)
 
 
 def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Plan | None, str]]:

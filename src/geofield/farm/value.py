@@ -141,7 +141,7 @@ class Farm:
             )
         found = (self._table(name, chunk) for chunk in self._chunks)
         parts = [part for part in found if part is not None]
-        return frame_of(name, stacked(parts or [layer_table(schema.layer(name))]))
+        return frame_of(stacked(parts or [layer_table(schema.layer(name))]))
 
     @cached_property
     def fields(self) -> gpd.GeoDataFrame:

@@ -1,4 +1,4 @@
-"""The work on one place and on one chunk of places: what a worker does, wherever it is."""
+"""The work on one place: what a worker does, wherever it is."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
-from geofield.earlier import drew_outline, with_said_tracks
+from geofield.earlier import drew_outline, holds, with_said_tracks
 from geofield.errors import FieldError, FieldWarning, GeofieldWarning
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
@@ -109,8 +109,7 @@ def _as_reviewed(place: Place, previous: Plan) -> Place:
 
 def _holds(previous: Plan, place: Place) -> bool:
     """Whether a reviewed plan is of the field at a point, or was looked for there."""
-    x, y = transformer(LONLAT, previous.field.crs).transform(place.lon, place.lat)
-    if shapely.Polygon(previous.field.polygon.exterior).covers(shapely.Point(x, y)):
+    if holds(previous, lat=place.lat, lon=place.lon):
         return True
     told = previous.evidence.point
     return told is not None and np.allclose(told, (place.lat, place.lon), rtol=0.0, atol=1e-6)
