@@ -7,6 +7,7 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 from math import isfinite, isinf, isnan, nan
 from numbers import Real
 from typing import Any, get_args
@@ -48,11 +49,7 @@ class GeofieldError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only arguments are lost by the default, and pools pickle errors.
-        return (_rebuild, (type(self), self.message, self.hint))
-
-
-def _rebuild(cls: type[GeofieldError], message: str, hint: str | None) -> GeofieldError:
-    return cls(message, hint=hint)
+        return partial(type(self), hint=self.hint), (self.message,)
 
 
 def refuse_other(

@@ -193,7 +193,7 @@ def run_field(
             field = field.choose(choose) if choose else field
         else:
             field = boundary
-            refuse_elsewhere(boundary, scene)
+            refuse_elsewhere(boundary, scene.grid)
         field = replace(
             field,
             imagery=scene.source.name,

@@ -50,19 +50,15 @@ def open_scene(
         shown = None if outline is None else _point_shown(path, outline, settings)
         if shown is None:
             if outline is not None and outline.method == "boundary":
-                _refuse_whole(outline, grid_of(path, settings))
+                refuse_elsewhere(outline, grid_of(path, settings))
             raise
         scene = _read(path, *shown, settings, outline)
     tell_guesses(scene)
     return scene
 
 
-def refuse_elsewhere(boundary: Field, scene: Scene) -> None:
-    """Refuse an outline that the picture does not show: often its coordinates are swapped."""
-    _refuse_whole(boundary, scene.grid)
-
-
-def _refuse_whole(boundary: Field, grid: Grid) -> None:
+def refuse_elsewhere(boundary: Field, grid: Grid) -> None:
+    """Refuse an outline that a picture does not show: often its coordinates are swapped."""
     frame = shapely.Polygon(grid.corners_lonlat())
     outline = boundary.polygon_lonlat
     if frame.intersects(outline):

@@ -48,7 +48,7 @@ def _facts(file: Path, crs: str | None) -> dict[str, Any]:
     if file.suffix.lower() in (".tif", ".tiff") or holds_tiles(file):
         return _picture(file)
     try:
-        detect(file)
+        title = detect(file).title
     except FormatError as error:
         if not file.is_file():
             raise
@@ -56,24 +56,23 @@ def _facts(file: Path, crs: str | None) -> dict[str, Any]:
             return _picture(file)
         except ImageryError:
             raise error from None
-    return _vector(file, crs)
+    return _vector(file, crs, title)
 
 
-def _vector(file: Path, crs: str | None) -> dict[str, Any]:
+def _vector(file: Path, crs: str | None, title: str) -> dict[str, Any]:
     import numpy as np
 
     from geofield.crs import areas_anywhere_m2, authority_name
-    from geofield.formats import detect, read_dataset
+    from geofield.formats import read_dataset
     from geofield.formats.arrow import to_lonlat
     from geofield.model.field import Field
     from geofield.model.map_words import doubts_in_words
 
-    found = detect(file)
     dataset = read_dataset(file, crs=crs)
     field = dataset.table("field")
     facts: dict[str, Any] = {
         "file": str(file),
-        "format": found.title,
+        "format": title,
         "name": dataset.name,
         "CRS" if len(field) > 1 else "metric CRS": (
             f"{authority_name(dataset.crs)} ({dataset.crs.name})"

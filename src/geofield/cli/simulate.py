@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +97,8 @@ def simulate(
 
     The truth has the layers field and obstacles, as `geofield evaluate` reads them.
     """
+    import pandas as pd
+
     settings = SimulationSettings(width_px=size_px, height_px=size_px, **asked)
     claim_folder(out)
     rows: list[dict[str, Any]] = []
@@ -105,10 +106,7 @@ def simulate(
         for one in simulate_fields(fields, seed, settings):
             rows.append(_write(one, folder, f"field_{len(rows) + 1}"))
             progress(len(rows), fields, "fields")
-        with (folder / "seeds.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        pd.DataFrame(rows).to_csv(folder / "seeds.csv", index=False, lineterminator="\r\n")
     wanted, least = asked["obstacles"], min(row["obstacles"] for row in rows)
     if wanted is not None and least < wanted:
         say_note(f"Not all {wanted} trees have room in every field: one has {least}.")

@@ -8,6 +8,7 @@ import click
 
 from geofield.cli.console import say
 from geofield.cli.files import plan_argument, tell_unsaved
+from geofield.cli.refresh import say_outdated
 
 
 @click.command(
@@ -29,7 +30,5 @@ def undo(plan_file: Path) -> None:
 
     tell_unsaved(plan_file.parent, (plan_file.name,))
     undo(plan_file)
-    from geofield.cli.refresh import say_outdated
-
     say_outdated(plan_file)
     say(f"{plan_file} is the earlier plan again; the later one is {earlier_of(plan_file)}.")

@@ -3,9 +3,9 @@
 What comes in is a plan (a GeoPackage) and the picture beside it; what goes out is the same
 GeoPackage with the person's word in it. Begin reading at `commands` (edits, pure functions of
 a plan), then `session` (undo, redo, tracks that follow), `journal` (nothing is lost when the
-program is killed), `view` (a plan as the page sees it), `picture` (tiles), and last `server` and
-`guard` (this machine only). The page itself is `page/`: plain modules, no build step; the map
-is drawn by OpenLayers, which lies there with its licence.
+program is killed), `desk` (what the page may ask for) and `shown` (a session as it sees it), and
+last `server` and `guard` (this machine only). The page itself is `page/`: plain modules, no build
+step; the map is drawn by OpenLayers, which lies there with its licence.
 """
 
 from __future__ import annotations

@@ -130,7 +130,8 @@ class Desk:
 
         with self.lock:
             plan = self.session.plan
-            bounds = self._bounds(plan)
+            picture = self.picture
+            bounds = margin_bounds(plan.field.polygon) if picture is None else picture.bounds
             return {
                 **self._state(),
                 "file": self.path.name,
@@ -304,9 +305,6 @@ class Desk:
         if place.exists():
             raise FormatError(f"{place.name} is there already.", hint="Choose another name.")
         return place
-
-    def _bounds(self, plan: Plan) -> tuple[float, float, float, float]:
-        return margin_bounds(plan.field.polygon) if self.picture is None else self.picture.bounds
 
     def _picture_facts(self) -> Mapping[str, Any] | None:
         picture = self.picture

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.earlier import bars_points
 from geofield.model.evidence import outline_digest
+from geofield.model.scene import Scene
+from geofield.plan import Plan
 from geofield.review.commands import Command, EditError, places_of
 from geofield.settings import Settings
-
-if TYPE_CHECKING:
-    from geofield.model.scene import Scene
-    from geofield.plan import Plan
-
 
 #: Clicks nearer than this are on the same place, metres.
 _SAME_M = 2.0
@@ -46,10 +43,7 @@ class Ground:
         GeofieldError
             When the place lies outside the picture or contradicts an earlier one.
         """
-        try:
-            ((x, y),) = places_of([command["place"]])
-        except KeyError:
-            raise EditError("A place is two numbers, x and y.") from None
+        ((x, y),) = places_of([command.get("place")])
         barred = bars_points(plan)
         if barred is not None:
             raise EditError(

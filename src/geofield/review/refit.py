@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geofield.errors import GeofieldError
 from geofield.model.evidence import outline_digest
+from geofield.plan import Plan
 from geofield.review.commands import EditError
-
-if TYPE_CHECKING:
-    from geofield.plan import Plan
-    from geofield.review.session import Session
+from geofield.review.session import Session
 
 Entry = Mapping[str, Any]
 #: Edits of the outline, which mean something else on another one.

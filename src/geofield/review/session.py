@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geofield.earlier import is_planned
 from geofield.notes import listening
 from geofield.pipeline import run_tracks, tracks_of_plan
+from geofield.plan import Plan
 from geofield.review.commands import Command, EditError, apply_command
+from geofield.review.ground import Ground
 from geofield.settings import Settings
-
-if TYPE_CHECKING:
-    from geofield.plan import Plan
-    from geofield.review.ground import Ground
 
 #: Steps that can be undone; a plan shares its unchanged tables with its neighbours.
 MOST_STEPS = 500

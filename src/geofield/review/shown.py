@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from geofield.plan import Plan
+from geofield.review.session import Session
 from geofield.settings import Settings
 from geofield.web.view import obstacles_view, outline_view, rings_of, tracks_view
-
-if TYPE_CHECKING:
-    from geofield.plan import Plan
-    from geofield.review.session import Session
 
 
 def state_of(session: Session) -> dict[str, Any]:
