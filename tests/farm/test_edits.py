@@ -816,14 +816,23 @@ def test_shapes_of_one_part_among_several_are_no_edit(folder: Path) -> None:
     assert "as edited" not in _batch(folder)
 
 
-def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path) -> None:
+@pytest.mark.parametrize("door", ["batch", "tracks"])
+def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path, door: str) -> None:
     """An edit that was taken back there was passed over without a word."""
+
+    def with_8_m(fresh: bool, code: int) -> str:
+        if door == "batch":
+            return _batch(folder, "--spacing", 8, *["--fresh"] * fresh, code=code)
+        trees = ("--obstacles", folder / "trees.gpkg")
+        asked = ("tracks", folder / "parcels.gpkg", *trees, "--spacing", 8, "-o", folder / "farm")
+        return geofield(*asked, *["--overwrite"] * fresh, code=code)
+
     _edit(folder, "obstacles", _third("rejected"))
-    refused = _batch(folder, "--spacing", 8, code=1)
+    refused = with_8_m(fresh=False, code=1)
     assert "b as edited" in refused
     assert "farm of other work" in refused
     _edit(folder, "obstacles", _third("added"))
-    assert "b as edited" in _batch(folder, "--fresh", "--spacing", 8)
+    assert "b as edited" in with_8_m(fresh=True, code=0)
     assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["added", "added"]
 
 

@@ -17,7 +17,6 @@ from geofield.wording import counted
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
     from geofield.farm.places import Places
-    from geofield.farm.run import Count
     from geofield.farm.value import Farm
     from geofield.farm.work import Job
     from geofield.plan import Plan
@@ -98,7 +97,7 @@ def of_many(places: Places, job: Job, wanted: Wanted) -> Told:
 
 
 def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool) -> Farm:
-    from geofield.cli.batch import take_in
+    from geofield.cli.batch import overview_renewed, take_in
     from geofield.farm.engine import Here
     from geofield.farm.finish import finish
     from geofield.farm.pool import Pool, cores
@@ -112,12 +111,11 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
 
     store, stays = Store.of(folder), folder == wanted.output
     waiting = take_in(store, job) if stays else []
-    with progress_bar(quiet=wanted.quiet) as progress:
-
-        def tell(count: Count) -> None:
-            progress(count.done, count.total, "fields")
-
-        count = run_farm(places, job, store, engine, fresh=fresh, tell=tell)
+    with overview_renewed(store, overview=stays), progress_bar(quiet=wanted.quiet) as progress:
+        count = run_farm(
+            places, job, store, engine, fresh=fresh,
+            tell=lambda now: progress(now.done, now.total, "fields"),
+        )  # fmt: skip
     waiting = waiting and take_in(store, job, waiting)
     if stays:
         finish(store, places, anew=count.done > count.before, overview=not waiting)
