@@ -317,7 +317,7 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
         (["evaluate", PLAN, PLAN, "--seed", "-5"], "x>=0"),
         (["evaluate", PLAN, PLAN, "--draw", "hits.shp"], "hits.shp is not the name of a picture"),
         (["obstacles", PLAN, PICTURE, "-o", "field.gpkg"], "The picture comes first"),
-        (["field", PICTURE, "--lat", "35,07", "--lon", "33.5", "-o", "a.gpkg"], "write degrees"),
+        (["field", PICTURE, "--lat", "35,07", "--lon", "33.5", "-o", "a.gpkg"], "write 35.07."),
         (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", ""], "it is empty"),
         (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", "-"], "give a name"),
         (["tracks", PLAN, "--spacing", "4", "-o", "-"], "standard input and output are not used"),
