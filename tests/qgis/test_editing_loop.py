@@ -11,10 +11,11 @@ from click.testing import CliRunner
 from formats_plan import ORIGIN, make_dataset
 
 from geofield.cli.tracks import tracks
-from geofield.errors import FormatWarning
+from geofield.errors import FormatWarning, TrackWarning
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Field, Provenance
 from geofield.model.evidence import outline_digest
+from geofield.notes import listening
 
 
 def placed(*xy):
@@ -24,9 +25,9 @@ def placed(*xy):
 
 def plan_again(path):
     """As a person does it: `geofield tracks field.gpkg --spacing 5 -o field.gpkg`."""
-    done = CliRunner().invoke(
-        tracks, [str(path), "--spacing", "5", "-o", str(path)], catch_exceptions=False
-    )
+    words = [str(path), "--spacing", "5", "-o", str(path)]
+    with listening(TrackWarning):  # a segment lies in an obstacle's hole
+        done = CliRunner().invoke(tracks, words, catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return read_dataset(path)
 
