@@ -41,7 +41,9 @@ def tell_enclosed(tracks: Tracks) -> Tracks:
 
 
 def _enclosed(outline: Polygon, shapes: ObstacleShapes) -> NDArray[np.object_]:
-    """The holes in what bars the way."""
+    """The holes in what bars the way; those of a field alone enclose nothing."""
+    if not len(shapes.circle_no) + len(shapes.polygon_no):
+        return np.empty(0, dtype=object)
     polygons = np.array([*shapes.polygons, *map(Polygon, outline.interiors)], dtype=object)
     x, y, radius = shapes.circles.T
     boxes = np.concatenate(
