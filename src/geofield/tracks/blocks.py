@@ -63,7 +63,7 @@ def obstacle_shapes(
         return ObstacleShapes(np.empty((0, 3)), none, np.empty(0, dtype=object), none)
     frame = _as_table(obstacles, crs, outline)
     frame = active(numbered(frame))
-    while (mixed := (frame.geom_type == "GeometryCollection") & ~frame.is_empty).any():
+    while (mixed := _of_several_kinds(frame.geometry.to_numpy())).any():
         parts = frame[mixed].explode(ignore_index=True)
         frame = pd.concat([frame[~mixed], parts], ignore_index=True)
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
@@ -170,6 +170,11 @@ def _grown(shapes: ObstacleShapes, clearance_m: float, crs: CRS) -> ObstacleShap
         grown = clearance_m * ground_scale_of(polygons, crs)
         polygons = shapely.buffer(polygons, grown, quad_segs=QUARTER_SEGMENTS)
     return ObstacleShapes(circles, shapes.circle_no, polygons, shapes.polygon_no)
+
+
+def _of_several_kinds(geometry: NDArray[np.object_]) -> NDArray[np.bool_]:
+    collection = shapely.get_type_id(geometry) == shapely.GeometryType.GEOMETRYCOLLECTION.value
+    return np.asarray(collection & ~shapely.is_empty(geometry))
 
 
 def _warn(message: str) -> None:
