@@ -26,7 +26,7 @@ from selenium.webdriver.common.keys import Keys
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from geofield.errors import TrackWarning
+from geofield.errors import TrackError, TrackWarning
 from geofield.notes import listening
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -407,14 +407,26 @@ def test_notes_of_tracks_are_in_german(page: Page) -> None:
         ([], {"spacing_m": 90, "offset_m": 59, "last_strip": "leave"}),
         ([square.buffer(1)], {"spacing_m": 5}),
     ]
-    notes = list[str]()
-    with listening():
+    with listening() as heard:
         for obstacles, settings in asked:
-            notes += plan_tracks(square, obstacles, crs=32636, direction=90, **settings).notes
+            plan_tracks(square, obstacles, crs=32636, direction=90, **settings)
         parted = plan_tracks(square, [wall], crs=32636, spacing_m=6, headland_m=12)
-        notes += plan_route(parted).notes
-        notes += plan_route(plan_tracks(square, crs=32636, spacing_m=30), pattern="skip").notes
-    assert len(set(notes)) >= 7
+        plan_route(parted)
+        plan_route(plan_tracks(square, crs=32636, spacing_m=30), pattern="skip")
+        bowtie = shapely.Polygon([(40, 20), (60, 30), (60, 20), (40, 30)])
+        for odd in ([bowtie], [bowtie, bowtie], [shapely.Point()], [shapely.Point()] * 2):
+            plan_tracks(square, odd, crs=32636, spacing_m=9)
+    notes = [str(note) for note in heard]
+    assert len(set(notes)) >= 11
+    refused: list[dict[str, Any]] = [
+        {"spacing_m": 1e-4},
+        {"spacing_m": 0.01, "step_m": 0.01},
+        {"spacing_m": 9, "offset_m": 150},
+    ]
+    for settings in refused:
+        with pytest.raises(TrackError) as error:
+            plan_tracks(square, crs=32636, **settings)
+        notes.append(error.value.message)
     page.run("localStorage.setItem('language', 'de')")
     page.driver.refresh()
     told = page.driver.execute_async_script(
