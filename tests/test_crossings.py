@@ -39,6 +39,9 @@ def tangle(corners: int) -> shapely.Polygon:
 def test_a_bow_is_mended_and_a_tangle_refused() -> None:
     bow = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
     assert shapely.area(mended(bow)) == pytest.approx(2.0)
+    spur = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2), (-1, 2), (0, 2)])
+    kinds = sorted(part.geom_type for part in shapely.get_parts(mended(spur)))
+    assert kinds == ["LineString", "Polygon", "Polygon"]
     assert shapely.is_valid(mended(tangle(41)))
     with pytest.raises(FormatError, match="crosses itself more than"):
         mended(tangle(2001))

@@ -31,8 +31,8 @@ def mended(
 ) -> BaseGeometry:
     """A valid geometry of an outline that crosses or touches itself, in any CRS.
 
-    Perhaps of several parts, and of lines where areas collapsed; `method` is that of
-    `shapely.make_valid`.
+    Perhaps of several parts, none of several again, and of lines where areas collapsed; `method` is
+    that of `shapely.make_valid`.
 
     Raises
     ------
@@ -45,7 +45,10 @@ def mended(
             f"than {_MOST_CROSSINGS} times, or goes over the same ground more than {_MOST_TIMES}.",
             hint="Its vertices are in disorder: draw it anew, or ask for a sound file.",
         )
-    return shapely.make_valid(polygon, method=method)
+    valid = shapely.make_valid(polygon, method=method)
+    if isinstance(valid, shapely.GeometryCollection):  # areas and lines, areas as one part
+        return shapely.GeometryCollection(shapely.get_parts(shapely.get_parts(valid)).tolist())
+    return valid
 
 
 def largest_part(repaired: BaseGeometry) -> tuple[BaseGeometry, float]:

@@ -220,7 +220,8 @@ def test_a_border_that_crosses_itself(folder: Path, made: SimulatedField) -> Non
     file = folder / "out/field.gpkg"
     before = rows(plan_in(folder))
     west, south, east, north = before.geometry[1].bounds
-    bow = shapely.Polygon([(west, south), (east, north), (east, south), (west, north)])
+    corners = [(west, south), (east, north), (east, south), (west, north)]
+    bow = shapely.Polygon([*corners, (west - 1, north), corners[-1]])  # with a spur
 
     def cross(table: Frame) -> Frame:
         table.loc[at(table, 1), "geometry"] = bow
@@ -229,6 +230,7 @@ def test_a_border_that_crosses_itself(folder: Path, made: SimulatedField) -> Non
     rewritten(file, "obstacles", cross)
     run(folder, made, "--overwrite")
     after = rows(plan_in(folder))
+    assert len(after) == len(before) + 1
     parts = after.geometry[[1, len(before) + 1]]
     assert parts.is_valid.all()
     assert parts.area.sum() == pytest.approx(shapely.make_valid(bow).area)

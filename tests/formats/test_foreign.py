@@ -134,6 +134,16 @@ def test_self_crossing_outlines_are_told(tmp_path):
         read_dataset(path)
 
 
+def test_outlines_that_cross_themselves_and_have_a_spur_keep_their_areas(tmp_path):
+    bow = shapely.Polygon([(20, 20), (30, 30), (30, 20), (20, 30), (10, 30), (20, 30)])
+    bow = shapely.affinity.translate(bow, 500_000, 5_500_000)
+    path = write(tmp_path / "farm.gpkg", [BOX, bow])
+    with pytest.warns(FormatWarning, match="1 polygon crosses itself"):
+        assert read_dataset(path).table("obstacles").area.tolist() == [25.0, 25.0]
+    with pytest.warns(FormatWarning, match="into parts"), pytest.raises(FormatError, match="2 out"):
+        read_dataset(write(tmp_path / "bow.gpkg", [bow]))
+
+
 def test_google_earth_kml(tmp_path):
     (tmp_path / "acker.kml").write_text(
         """<?xml version="1.0" encoding="UTF-8"?>

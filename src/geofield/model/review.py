@@ -192,7 +192,8 @@ def _repaired(obstacles: gpd.GeoDataFrame, crossed: NDArray[np.bool_]) -> gpd.Ge
     """Rows whose border crosses itself made valid; further parts have the same number still."""
     shapes = np.array(obstacles.geometry.array, dtype=object)
     for row in np.flatnonzero(crossed):
-        parts = shapely.get_parts(shapely.make_valid(shapes[row]))
+        # Of areas and lines the areas are one part.
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapes[row])))
         areas = [part for part in parts if isinstance(part, shapely.Polygon)]
         # What has no area at all is the line or point that it is: nobody took it away.
         shapes[row] = shapely.MultiPolygon(areas) if areas else shapely.union_all(parts)
