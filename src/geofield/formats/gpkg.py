@@ -7,6 +7,7 @@ stamped with a time gets the date of the imagery, so that a second run is byte-i
 
 from __future__ import annotations
 
+import json
 import os
 import sqlite3
 from collections.abc import Mapping
@@ -18,8 +19,9 @@ from typing import Any
 from geofield import schema
 from geofield.formats import origin
 from geofield.formats.arrow import gdal_config, write_layer
+from geofield.formats.qgis.layer_style import qml
 from geofield.formats.qgis.project import project_xml, qgz_bytes
-from geofield.formats.qgis.store import add_project, add_styles
+from geofield.formats.qgis.sld import sld
 from geofield.model import Dataset
 
 #: GDAL 3.4 and QGIS 3.22 warn about 1.4.
@@ -69,6 +71,24 @@ CREATE TABLE gpkg_data_column_constraints (
   CONSTRAINT gdcc_ntv UNIQUE (constraint_name, constraint_type, value)
 );
 """
+_STYLES = """
+CREATE TABLE layer_styles (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  f_table_catalog TEXT(256),
+  f_table_schema TEXT(256),
+  f_table_name TEXT(256),
+  f_geometry_column TEXT(256),
+  styleName TEXT(30),
+  styleQML TEXT,
+  styleSLD TEXT,
+  useAsDefault BOOLEAN,
+  description TEXT,
+  owner TEXT(30),
+  ui TEXT(30),
+  update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now'))
+);
+"""
+_PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, content BLOB);"
 
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
@@ -101,10 +121,10 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         connection.execute("PRAGMA synchronous = OFF")
         _add_origin(connection, dataset)
         _add_columns(connection, dataset)
-        add_styles(connection, dataset, stamp)
+        _add_styles(connection, dataset, stamp)
         shown = dataset if options.get("picture", True) else replace(dataset, scene_path=None)
         project = qgz_bytes(project_xml(shown, path.name), stem, stamp)
-        add_project(connection, stem, project, stamp)
+        _add_project(connection, stem, project, stamp)
     with path.open("r+b") as file:  # Windows waits for nothing that is open for reading alone
         os.fsync(file.fileno())
     if not options.get("project", True):
@@ -155,4 +175,38 @@ def _register(connection: sqlite3.Connection, extension: str, *tables: str) -> N
     connection.executemany(
         "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
         [(table, f"gpkg_{extension}", page) for table in tables],
+    )
+
+
+def _add_styles(connection: sqlite3.Connection, dataset: Dataset, timestamp: str) -> None:
+    """The table `layer_styles`: one default style per layer, as QML and SLD."""
+    connection.execute(_STYLES)
+    for layer in dataset.layers(working=True):
+        connection.execute(
+            "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
+            "f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, description, owner, "
+            "ui, update_time) VALUES ('', '', ?, 'geom', ?, ?, ?, 1, ?, '', NULL, ?)",
+            (
+                layer.name,
+                layer.title[:30],
+                qml(layer, dataset),
+                sld(layer),
+                layer.description,
+                timestamp,
+            ),
+        )
+    connection.execute(
+        "INSERT INTO gpkg_contents (table_name, data_type, identifier, description, last_change, "
+        "srs_id) VALUES ('layer_styles', 'attributes', 'layer_styles', 'Styles', ?, 0)",
+        (timestamp,),
+    )
+
+
+def _add_project(connection: sqlite3.Connection, name: str, qgz: bytes, timestamp: str) -> None:
+    """The table `qgis_projects` with one project: the hexadecimal text of a ``.qgz``."""
+    connection.execute(_PROJECTS)
+    metadata = {"last_modified_time": timestamp[:19], "last_modified_user": "geofield"}
+    connection.execute(
+        "INSERT INTO qgis_projects VALUES (?, ?, ?)",
+        (name, json.dumps(metadata).encode(), qgz.hex().encode()),
     )
