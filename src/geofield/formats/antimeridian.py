@@ -127,13 +127,10 @@ def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _collected(*pieces: Any) -> Any:
     """The pieces of both sides as one shape; what only touches the meridian has no piece."""
-    dimension = max(int(shapely.get_dimensions(piece)) for piece in pieces)
-    parts = [
-        part
-        for piece in pieces
-        for part in shapely.get_parts(piece)
-        if shapely.get_dimensions(part) == dimension
-    ]
+    parts = shapely.get_parts(np.array(pieces))
+    dimensions = shapely.get_dimensions(parts)
+    parts = parts[dimensions == dimensions.max()]
     if len(parts) == 1:
         return parts[0]
-    return shapely.multipolygons(parts) if dimension == 2 else shapely.multilinestrings(parts)
+    whole = shapely.multipolygons if dimensions.max() == 2 else shapely.multilinestrings
+    return whole(parts)

@@ -55,24 +55,20 @@ def write_v4(
     these names; ``zip`` (true: the folder TASKDATA in one archive); ``headland`` (``line``: its
     inner edge as AgOpenGPS reads it, or ``strip``: the area).
     """
-    return _written(datasets, folder, stem, "isoxml", 4, options)
+    return _written(datasets, folder, stem, 4, options)
 
 
 def write_v3(
     datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
     """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
-    return _written(datasets, folder, stem, "isoxml-v3", 3, options)
+    return _written(datasets, folder, stem, 3, options)
 
 
 def _written(
-    datasets: Sequence[Dataset],
-    folder: Path,
-    stem: str,
-    name: str,
-    version: int,
-    options: Mapping[str, Any],
+    datasets: Sequence[Dataset], folder: Path, stem: str, version: int, options: Mapping[str, Any]
 ) -> list[Path]:
+    name = "isoxml" if version == 4 else "isoxml-v3"
     below = folder / name
     path = below / "TASKDATA" / "TASKDATA.XML"
     write_xml(_task_data(datasets, version, options), path)
