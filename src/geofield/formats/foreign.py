@@ -176,11 +176,8 @@ def read_foreign(
     """
     for each in layers:
         refuse_nowhere(each.frame.geometry.to_numpy(), f"{path.name}: {each.name}")
-    present = [
-        RawLayer(each.name, _with_crs(_present(each.frame), f"{path.name}: {each.name}", crs))
-        for each in layers
-    ]
-    present = [RawLayer(each.name, _whole(each.frame)) for each in present if len(each.frame)]
+    read = [(each.name, _read(each.frame, f"{path.name}: {each.name}", crs)) for each in layers]
+    present = [RawLayer(name, frame) for name, frame in read if len(frame)]
     if not present:
         rows = sum(len(each.frame) for each in layers)
         raise (FormatError if rows else EmptyFileError)(f"{path} holds no geometries.")
@@ -223,9 +220,12 @@ def read_foreign(
     return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
 
 
-def _present(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+def _read(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFrame:
+    """The rows with a shape, in a CRS, as one that were cut at the 180th meridian."""
     keep = ~(frame.geometry.isna() | frame.geometry.is_empty)
-    return frame[keep].reset_index(drop=True)
+    frame = _with_crs(frame[keep].reset_index(drop=True), where, crs)
+    shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
+    return frame.set_geometry(joined(shapes, CRS(frame.crs)), crs=frame.crs)
 
 
 def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFrame:
@@ -236,8 +236,10 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
                 hint="Leave out the CRS, or correct the file.",
             )
         return frame.set_crs(crs, allow_override=True)
-    if frame.crs is not None or not len(frame):
-        return frame if frame.crs is not None else frame.set_crs(LONLAT)
+    if frame.crs is not None:
+        return frame
+    if not len(frame):
+        return frame.set_crs(LONLAT)
     west, south, east, north = frame.total_bounds
     if abs(west) <= 180 and abs(east) <= 180 and abs(south) <= 90 and abs(north) <= 90:
         warn(
@@ -252,12 +254,6 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
         f"{north:.0f} could be metres or feet of any projection.",
         hint="Name it, for instance --crs EPSG:32633.",
     )
-
-
-def _whole(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """The table with shapes as one that were cut at the 180th meridian."""
-    shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
-    return frame.set_geometry(joined(shapes, CRS(frame.crs)), crs=frame.crs)
 
 
 def _metric_of(layers: list[RawLayer]) -> CRS:

@@ -68,8 +68,9 @@ def read(path: Path) -> Dataset:
         )
     field = tables.get(schema.FIELD.name)
     several = field is not None and len(field) > 1
-    if field is not None and not several:
-        _refuse_far(tables, field, path)
+    alone = field if field is not None and len(field) == 1 else None
+    if alone is not None:
+        _refuse_far(tables, alone, path)
     for name in layers:
         if name not in known and not (several and name == schema.PLACES.name):
             warn(
@@ -77,13 +78,13 @@ def read(path: Path) -> Dataset:
                 FormatWarning,
                 stacklevel=2,
             )
-    named = field is not None and len(field) == 1 and isinstance(field["name"].iloc[0], str)
+    label = None if alone is None else alone["name"].iloc[0]
     has_points = schema.TRACK_POINTS.name in layers
     return Dataset(
         tables,
         crs,
         # A person may have renamed the field in its row.
-        field["name"].iloc[0] if field is not None and named else record.name,
+        label if isinstance(label, str) else record.name,
         record.provenance,
         record.grid,
         _scene(record, path),
@@ -95,8 +96,6 @@ def _refuse_far(
     tables: Mapping[str, gpd.GeoDataFrame], field: gpd.GeoDataFrame, path: Path
 ) -> None:
     """Refuse shapes that are no place near the field, as degrees are in a layer of metres."""
-    if field.empty:
-        return
     box = shapely.box(*field.total_bounds)
     for name, table in tables.items():
         away = shapely.distance(shapely.envelope(table.geometry.to_numpy()), box)
