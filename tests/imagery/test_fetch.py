@@ -351,7 +351,7 @@ def test_tiles_that_never_come_whole_are_counted_as_failed(tmp_path: Path) -> No
 
 def test_a_tile_that_says_it_is_enormous_is_a_broken_one() -> None:
     from geofield.imagery.client import BrokenBodyError
-    from geofield.imagery.decode import decode_tile
+    from geofield.imagery.fetch import decode_tile
 
     body = bytearray(tile_server.encode(tile_pixels(18, 1, 1)))
     body[16:24] = struct.pack(">II", 30_000, 30_000)

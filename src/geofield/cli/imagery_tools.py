@@ -51,7 +51,7 @@ def cache_dir_of(settings: Settings, given: Path | None = None) -> Path:
 
 def catalogue_of(settings: Settings) -> dict[str, SourceEntry]:
     """The sources known by name, with the user's own."""
-    from geofield.imagery.sources import SourceEntry, merged_catalogue
+    from geofield.imagery.sources import BUILTIN, SourceEntry
     from geofield.imagery.terms import Terms
 
     own = {
@@ -67,7 +67,7 @@ def catalogue_of(settings: Settings) -> dict[str, SourceEntry]:
         )
         for name, each in settings.fetch.sources.items()
     }
-    return merged_catalogue(own)
+    return {**BUILTIN, **own}  # which win
 
 
 def keys_of(settings: Settings, names: Mapping[str, SourceEntry]) -> dict[str, str]:

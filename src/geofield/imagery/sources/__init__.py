@@ -2,7 +2,7 @@
 
 from geofield.imagery.sources.base import PictureSource, Source, TileSource
 from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
-from geofield.imagery.sources.registry import find_source, merged_catalogue
+from geofield.imagery.sources.registry import find_source
 
 __all__ = [
     "BUILTIN",
@@ -11,5 +11,4 @@ __all__ = [
     "SourceEntry",
     "TileSource",
     "find_source",
-    "merged_catalogue",
 ]

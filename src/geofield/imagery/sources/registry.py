@@ -39,11 +39,6 @@ _FORBIDDING = {
 }
 
 
-def merged_catalogue(own: Mapping[str, SourceEntry] | None = None) -> dict[str, SourceEntry]:
-    """The sources known by name: the built-in ones and the user's, which win."""
-    return {**BUILTIN, **(own or {})}
-
-
 def find_source(
     what: str,
     *,
