@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import geopandas as gpd
 import mercantile
 import numpy as np
 import pytest
@@ -771,6 +772,15 @@ def test_an_index_and_a_vrt(tmp_path: Path) -> None:
     with rasterio.open(tmp_path / "sheets" / "sheet_0_0.tif") as file:
         rasterio.shutil.copy(file, str(vrt), driver="VRT")
     assert np.array_equal(read_scene(vrt).bands, values[:, :100, :120])
+
+
+def test_an_index_that_was_cut_off(tmp_path: Path) -> None:
+    index = tmp_path / "index.fgb"
+    rows = {"location": ["sheet.tif"], "geometry": [shapely.box(33, 35, 34, 36)]}
+    gpd.GeoDataFrame(rows, crs=4326).to_file(index)
+    index.write_bytes(index.read_bytes()[:300])
+    with pytest.raises(ImageryError, match=r"^The index index\.fgb cannot be read: .*whole\?$"):
+        read_scene(index)
 
 
 def test_stac_items(tmp_path: Path) -> None:

@@ -100,8 +100,11 @@ def pictures_of_index(index: Path) -> list[str]:
             if column is None:
                 return []
             rows = [str(row["properties"][column]) for row in table]
-    except FionaError as error:
-        raise ImageryError(f"The index {display_name(index)} cannot be read: {error}.") from None
+    except (FionaError, ValueError) as error:  # the latter of a file that was cut off
+        why = str(error).partition(": <")[0]
+        raise ImageryError(
+            f"The index {display_name(index)} cannot be read: {why}.", hint="Is the file whole?"
+        ) from None
     return [
         row if is_remote(row) or Path(row).is_absolute() else str(index.parent / row)
         for row in rows
