@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,7 +88,7 @@ def read(path: Path) -> Dataset:
         record.provenance,
         record.grid,
         _scene(record, path),
-        PointsInFile(path, crs) if has_points else None,
+        partial(_points_in, path, crs) if has_points else None,
     )
 
 
@@ -111,24 +111,17 @@ def _refuse_far(
             )
 
 
-@dataclass(frozen=True, slots=True)
-class PointsInFile:
-    """Track points that stay in their file until they are asked for, a batch at a time."""
+def _points_in(path: Path, crs: CRS) -> Iterator[gpd.GeoDataFrame]:
+    """The track points that stay in their file until they are asked for, a batch at a time."""
+    import geopandas as gpd
+    from pyogrio.raw import open_arrow
 
-    path: Path
-    crs: CRS
-
-    def __call__(self) -> Iterator[gpd.GeoDataFrame]:
-        """The batches, as tables of layer `track_points`."""
-        import geopandas as gpd
-        from pyogrio.raw import open_arrow
-
-        layer = schema.TRACK_POINTS
-        with open_arrow(self.path, layer=layer.name, batch_size=BATCH_ROWS) as (_, source):
-            for batch in pa.RecordBatchReader.from_stream(source):
-                if batch.num_rows:
-                    frame = gpd.GeoDataFrame.from_arrow(batch).rename_geometry("geometry")
-                    yield _own_table(layer, frame, self.crs, self.path)
+    layer = schema.TRACK_POINTS
+    with open_arrow(path, layer=layer.name, batch_size=BATCH_ROWS) as (_, source):
+        for batch in pa.RecordBatchReader.from_stream(source):
+            if batch.num_rows:
+                frame = gpd.GeoDataFrame.from_arrow(batch).rename_geometry("geometry")
+                yield _own_table(layer, frame, crs, path)
 
 
 def scene_beside(path: Path) -> Path | None:
