@@ -53,12 +53,6 @@ class CacheInfo:
     newest_s: int | None
 
 
-def cache_file(folder: Path, name: str, identity: str) -> Path:
-    """The cache file of a source; `identity` is what makes two of one name differ."""
-    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "source"
-    return folder / f"{slug}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.mbtiles"
-
-
 class TileCache:
     """Tiles of one source on disk, in a folder that is made when missing.
 
@@ -74,7 +68,9 @@ class TileCache:
         max_bytes: int | None = None,
         max_age_s: float | None = None,
     ) -> None:
-        self.path = cache_file(folder, source.name, source.identity)
+        slug = re.sub(r"[^a-z0-9]+", "-", source.name.lower()).strip("-")[:40] or "source"
+        differs = hashlib.sha256(source.identity.encode()).hexdigest()[:10]
+        self.path = folder / f"{slug}-{differs}.mbtiles"
         self._pyramid = source.pyramid
         self._max_bytes = max_bytes
         self._max_age_s = max_age_s
