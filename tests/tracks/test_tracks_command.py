@@ -168,16 +168,60 @@ def test_many_polygons_make_a_farm(tmp_path: Path) -> None:
     assert {plan.tracks.spacing_m for plan in farm} == {8.0}
 
 
+@pytest.mark.parametrize(
+    "wanted", [["tracks", "-o", "all.gpkg"], ["tracks", "-o", "farm"],
+               ["tracks", "--each", "-o", "plans"], ["batch", "--workers", "1", "--out", "farm"]],
+)  # fmt: skip
+def test_what_is_told_of_fields_names_them_and_is_told_once(
+    wanted: list[str], tmp_path: Path
+) -> None:
+    parcels = outlines(10)
+    parcels.loc[:1, "name"] = "North"  # a name alone would be that of both
+    ends = shapely.get_coordinates(parcels.geometry[9])[::-1].tolist()
+    knot = [[502705, 5600081], [502704, 5600081], [502705, 5600080]]
+    parcels.loc[9, "geometry"] = shapely.Polygon([[502704, 5600080], *knot, *ends])
+    parcels.assign(id=range(10)).to_file(tmp_path / "parcels.gpkg")
+    middles = parcels.geometry[:8].centroid
+    rings = middles.buffer(np.arange(20.0, 28.0)).difference(middles.buffer(15.0))
+    rings.to_file(tmp_path / "rings.gpkg")
+    files = ["parcels.gpkg", "--obstacles", "rings.gpkg", "--spacing", "8"]
+    result = run_geofield(wanted[0], *files, *wanted[1:], folder=tmp_path)
+    assert result.returncode == 0, result.stderr
+    notes = [line for line in result.stderr.splitlines() if line.startswith("Note: ")]
+    (enclosed,) = (note for note in notes if "obstacles enclose" in note)
+    assert enclosed.startswith("Note: North (0): 4 segments (")
+    assert enclosed.endswith(
+        "Likewise North (1), Field 3 (2), Field 4 (3), Field 5 (4), Field 6 (5) and 2 more."
+    )
+    (repaired,) = (note for note in notes if "was repaired" in note)
+    assert repaired.startswith("Note: Field 10 (9): The field's outline was repaired")
+    assert len(notes) == 2
+
+
+@pytest.mark.parametrize("target", ["all.gpkg", "farm", "plans"])
+def test_parcels_that_overlap_are_told(target: str, tmp_path: Path) -> None:
+    parcels = outlines(3)
+    parcels.loc[1, "geometry"] = shapely.box(500190, 5600000, 500400, 5600080)
+    parcels.to_file(tmp_path / "parcels.gpkg")
+    each = ["--each"] if target == "plans" else []
+    arguments = [str(tmp_path / "parcels.gpkg"), *each, "-o", str(tmp_path / target)]
+    result = CliRunner().invoke(cli, ["tracks", *arguments])
+    assert result.exception is None
+    (note,) = (line for line in result.stderr.splitlines() if line.startswith("Note: "))
+    assert "2 parcels overlap others, such as Field 1: it overlaps Field 2 by 0.08 ha" in note
+
+
 def test_fields_that_fail_are_told_and_the_others_written(tmp_path: Path) -> None:
-    frame = outlines(3).assign(spacing_m=[None, 900.0, None])
+    frame = outlines(4).assign(spacing_m=[None, 900.0, 900.0, None])
+    frame.loc[1:2, "name"] = "North"
     frame.to_file(tmp_path / "parcels.gpkg")
     for more in ((), ("--each",)):
         out = tmp_path / ("each" if more else "all")
         done = CliRunner().invoke(
             cli, ["tracks", str(tmp_path / "parcels.gpkg"), *more, "-o", str(out)]
         )
-        assert "1 of 3 fields could not be planned" in str(done.exception)
-        assert "larger than the field" in done.stderr
+        assert "2 of 4 fields could not be planned" in str(done.exception)
+        assert done.stderr.count("larger than the field") == 2
         assert len(list(out.glob("Field_*.gpkg")) if more else read_farm(out)) == 2
 
 

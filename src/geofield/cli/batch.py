@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from geofield.cli.console import echo_json, progress_bar, say, say_note
+from geofield.cli.field_notes import tell_farm
 from geofield.cli.files import OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import Number, acknowledge_option, stage_options, tell_idle
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from geofield.imagery import Imagery
     from geofield.settings import Settings, Stage
 
-#: Reviewed fields whose notes are told, each in a line.
+#: Reviewed fields without a plan that are named.
 _TOLD = 10
 
 
@@ -168,7 +169,7 @@ def batch(
         )
     reviewed = reviewed_rows(store)
     if count.done > count.before:
-        _tell_notes(reviewed)
+        tell_farm(store, found)
     waiting = waiting and take_in(store, job, waiting)
     files = finish(store, found, anew=count.done > count.before, overview=overview and not waiting)
     if as_json:
@@ -204,15 +205,6 @@ def _tell_unused(settings: Settings, places: Places, *, pictures: bool) -> None:
         )
     if not places.settings.num_columns:  # a column could choose another way for its field
         tell_idle(settings, unused=unused)
-
-
-def _tell_notes(reviewed: list[dict[str, Any]]) -> None:
-    """Say what the stages had to tell of fields that a person reviewed: it is about their word."""
-    told = [f"{row['field_id']}: {row['notes']}" for row in reviewed if row.get("notes")]
-    for words in told[:_TOLD]:
-        say_note(words)
-    if len(told) > _TOLD:
-        say_note(f"{len(told) - _TOLD} more reviewed fields have notes: see the farm's status.")
 
 
 @contextmanager

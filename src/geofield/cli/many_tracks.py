@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import progress_bar, say_note
+from geofield.cli.field_notes import labels, tell_farm, tell_fields
+from geofield.cli.parcels import tell_places
 from geofield.cli.standing import tell_unreached
 from geofield.errors import GeofieldError, TrackError
 from geofield.wording import counted
@@ -56,9 +58,7 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     places = read_places(file, settings=settings, crs=crs, unnamed=file.stem)
     if places.outlines is None:
         raise TrackError(f"{file} holds no polygons.", hint="Give a file of field outlines.")
-    for note in places.notes:
-        say_note(note)
-    return places
+    return tell_places(places)
 
 
 def tell_spacing(places: Places | None, settings: Settings) -> None:
@@ -119,12 +119,18 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     waiting = waiting and take_in(store, job, waiting)
     if stays:
         finish(store, places, anew=count.done > count.before, overview=not waiting)
+        tell_farm(store, places)
+    else:
+        tell_farm(store, places, f"in layer places of {wanted.output.name}")
     tell_unreached(job, outlines_in(store))
     return read_farm(folder)
 
 
 def _figures(farm: Farm, target: Path, wanted: Wanted) -> Told:
     status = farm.status.sort_values(["place", "field_id"])
+    alike = status["name"].duplicated(keep=False)
+    told_apart = status["name"] + " (" + status["field_id"] + ")"
+    status["name"] = status["name"].where(~alike, told_apart)
     bad = status[~status["field_id"].isin(farm.ids)]
     failed = {
         name: f"{error} {hint}".strip()
@@ -143,6 +149,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     """One after the other, each into a file of its own."""
     from geofield.farm.work import plan_place
     from geofield.formats.names import unlike
+    from geofield.notes import listening
     from geofield.plan_files import save_plan
 
     if wanted.output.suffix:
@@ -151,19 +158,26 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
             hint="Give a folder: --each -o plans/",
         )
     rows, failed, taken, outlines = [], {}, set[str](), []
+    called, notes = labels(places), []
     with progress_bar(quiet=wanted.quiet) as progress:
         for done, place in enumerate(places):
             stem = unlike(file_name(place.name), taken, "_")
             progress(done, len(places), stem)
-            try:
-                plan = plan_place(place, job)
-            except GeofieldError as error:
-                failed[stem] = f"{error.message} {error.hint or ''}".strip()
+            plan = None
+            with listening() as heard:
+                try:
+                    plan = plan_place(place, job)
+                except GeofieldError as error:
+                    failed[stem] = f"{error.message} {error.hint or ''}".strip()
+            if heard:
+                notes.append((called[place.field_id], "; ".join(map(str, heard))))
+            if plan is None:
                 continue
             target = wanted.output / f"{stem}.gpkg"
             save_plan(plan, target, overwrite=wanted.overwrite, inputs=_inputs(places, job))
             rows.append(figures_of(plan, target))
             outlines.append([plan.field.polygon_lonlat])
+    tell_fields(notes, "by a farm: -o FOLDER without --each")
     tell_unreached(job, outlines)
     return rows, failed
 

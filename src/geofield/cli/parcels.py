@@ -94,7 +94,6 @@ def place_options(command: Command) -> Command:
 def places_of(path: Path, settings: Settings, options: Mapping[str, Any]) -> Places:
     """The places of a file; what there is to say of them is said."""
     from geofield.farm.place_reader import read_places
-    from geofield.farm.places import overlaps
 
     places = read_places(
         path,
@@ -103,6 +102,13 @@ def places_of(path: Path, settings: Settings, options: Mapping[str, Any]) -> Pla
         crs=options.get("places_crs"),
         **{f"{name}_column": options.get(f"{name}_column") for name in _COLUMNS},
     )
+    return tell_places(places)
+
+
+def tell_places(places: Places) -> Places:
+    """Say what there is to say of places; those with the overlaps that each has."""
+    from geofield.farm.places import overlaps
+
     for note in places.notes:
         say_note(note)
     told = overlaps(places)
