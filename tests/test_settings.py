@@ -60,6 +60,9 @@ def test_names_of_another_version_are_passed_over() -> None:
         ("[tracks]\nspacing = 2\n", "tracks.spacing"),
         ("[tracks]\nheadland_m = true\n", "tracks.headland_m: .* not true or false"),
         ("[trucks]\nspacing_m = 2\n", "trucks"),
+        ("[obstacles]\nspacing_m = 2\n", r"obstacles.spacing_m: .*it belongs to \[tracks\]"),
+        ("[machines.m]\nwidth_m = 2\nbuffer_m = 1\n", r"it belongs to \[obstacles\]"),
+        ("spacing_m = 2\n", r"in no section; it belongs to \[tracks\]"),
         ("[tracks\n", "not valid TOML"),
         ("tracks = 3\n", "tracks is a section"),
         ("machines = 5\n[tracks]\nmachine = 'm'\n", "machines is a section"),
@@ -159,11 +162,13 @@ def test_a_variable_of_no_section_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(SettingsError, match=r"GEOFIELD_TRACK__SPACING_M.*Did you mean 'tracks'"):
         load_settings()
     monkeypatch.delenv("GEOFIELD_TRACK__SPACING_M")
-    monkeypatch.setenv("GEOFIELD_TRACKS_SPACING_M", "3")
-    with pytest.raises(SettingsError, match=r"GEOFIELD_TRACKS_SPACING_M.*sets nothing") as told:
-        load_settings()
-    name = "GEOFIELD_TRACKS__SPACING_M"
-    assert told.value.hint == f"Two underscores follow the section: {name}."
+    for wrong in ("GEOFIELD_TRACKS_SPACING_M", "GEOFIELD_SPACING_M"):
+        monkeypatch.setenv(wrong, "3")
+        with pytest.raises(SettingsError, match=rf"{wrong}.*sets nothing") as told:
+            load_settings()
+        name = "GEOFIELD_TRACKS__SPACING_M"
+        assert told.value.hint == f"Two underscores follow the section: {name}."
+        monkeypatch.delenv(wrong)
 
 
 def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:
@@ -177,7 +182,7 @@ def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path: Path) -> None:
     [
         ({"tracks": {"spacing": 6}}, "tracks.spacing: .*Did you mean 'spacing_m'"),
         ({"trakcs": {"spacing_m": 6}}, "trakcs: .*Did you mean 'tracks'"),
-        ({"spacing_m": 6}, "spacing_m: .*It belongs to tracks"),
+        ({"spacing_m": 6}, r"spacing_m: .*it belongs to \[tracks\]"),
         ({"tracks": {"spacing_m": -6}}, "tracks.spacing_m: .*greater than 0"),
     ],
 )

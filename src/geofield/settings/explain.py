@@ -46,9 +46,10 @@ def _explained(error: ValidationError) -> str:
                 within = Machine.model_fields
             elif len(problem["loc"]) == 1:
                 within = MODELS
-            near = nearest(str(problem["loc"][-1]), within)
-            if section in HOMES:
-                near = f"It belongs to {HOMES[section]}"
+            setting = str(problem["loc"][-1])
+            near = nearest(setting, within)
+            if setting in HOMES:
+                near = f"it belongs to [{HOMES[setting]}]"
         elif not whole and problem["type"] in ("literal_error", "value_error"):
             named = get_args(DirectionName) if "direction" in problem["loc"] else ()
             choices = re.findall(r"'([^']+)'", message) or named

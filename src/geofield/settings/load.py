@@ -61,6 +61,11 @@ def load_settings(
 def _check_sections(source: Mapping[str, Any]) -> None:
     """Refuse what is no section."""
     for section, settings in source.items():
+        if section in HOMES:
+            raise SettingsError(
+                f"{section} stands in no section; it belongs to [{HOMES[section]}].",
+                hint=f"Write [{HOMES[section]}] and its settings below.",
+            )
         if section not in _KNOWN:
             raise SettingsError(
                 f"Unknown section [{section}] in the settings." + nearest(section, _KNOWN),
@@ -191,6 +196,8 @@ def _from_environment() -> dict[str, Any]:
         after = name.upper().removeprefix(_PREFIX).lower()
         section, separator, _ = after.partition("__")
         first, _, setting = after.partition("_")
+        if after in HOMES:
+            first, setting = HOMES[after], after
         if not separator and setting and first in _KNOWN:
             raise SettingsError(
                 f"{name} in the environment sets nothing.",
