@@ -79,20 +79,36 @@ def test_a_parcel_that_is_nowhere_is_left_out_or_refused_where_it_is_the_only_on
         pytest.param(["info", "FILE"], id="info"),
         pytest.param(["validate", "FILE"], id="validate"),
         pytest.param(["evaluate", PLAN, "FILE"], id="truth"),
+        pytest.param(["tracks", "FILE", "-o", "OUT"], id="tracks"),
+        pytest.param(["batch", "FILE", "--out", "OUT"], id="batch"),
+        pytest.param(["tiles", PICTURE, "--area", "FILE", "-o", "OUT.tif"], id="area"),
     ],
 )
 def test_shapes_outside_their_crs_are_refused(tmp_path: Path, arguments: list[str | Path]) -> None:
-    """Eastings with the zone in front (EPSG:4647) under EPSG:25832 ended in tracebacks."""
+    """Eastings with the zone in front (EPSG:4647) under EPSG:25832 ended in tracebacks.
+
+    `tracks` and `batch` said that no row has a position, `--area` that latitudes are infinite.
+    """
     path, out = tmp_path / "zone.gpkg", tmp_path / "out.gpkg"
     parcel = shapely.box(32500000, 5500000, 32500300, 5500200)
     gpd.GeoDataFrame(geometry=[parcel], crs="EPSG:25832").to_file(path)
-    given = {"FILE": path, "OUT": out}
+    given = {"FILE": path, "OUT": out, "OUT.tif": tmp_path / "out.tif"}
     done = run_geofield(*(given.get(str(each), each) for each in arguments))
     assert done.returncode == 1
-    assert "Coordinates are outside the area of EPSG:25832." in done.stdout + done.stderr
+    assert "are outside the area of EPSG:25832." in done.stdout + done.stderr
     assert "Check the CRS: the data may be in another one." in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     assert not out.exists()
+
+
+def test_metres_that_a_file_calls_degrees_are_not_taken_for_swapped(tmp_path: Path) -> None:
+    path = tmp_path / "metres.gpkg"
+    gpd.GeoDataFrame(geometry=[WHOLE], crs="EPSG:4326").to_file(path)
+    parcel = run_geofield("field", PICTURE, "--boundary", path, "-o", tmp_path / "out.gpkg")
+    area = run_geofield("tiles", PICTURE, "--area", path, "-o", tmp_path / "out.tif")
+    assert "latitudes from 3881450.0000 to 3881600.0000: they are none." in parcel.stderr
+    assert "in metres.gpkg are outside the area of EPSG:4326." in area.stderr
+    assert "swapped" not in parcel.stderr + area.stderr
 
 
 def test_a_polygon_that_is_nowhere_has_no_tracks() -> None:

@@ -215,8 +215,10 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
     return float(scale) if scale.ndim == 0 else scale
 
 
-def refuse_outside(crs: CRS, *brought: ArrayLike) -> None:
+def refuse_outside(crs: CRS, *brought: ArrayLike, what: str = "Coordinates") -> None:
     """Refuse places in a CRS whose coordinates are not finite where they were brought to another.
+
+    `what` says whose they are.
 
     Raises
     ------
@@ -224,7 +226,7 @@ def refuse_outside(crs: CRS, *brought: ArrayLike) -> None:
     """
     if not all(np.isfinite(each).all() for each in brought):
         raise CRSError(
-            f"Coordinates are outside the area of {authority_name(crs)}.",
+            f"{what} are outside the area of {authority_name(crs)}.",
             hint="Check the CRS: the data may be in another one.",
         )
 

@@ -201,6 +201,16 @@ def test_bad_rows_are_told_by_their_number(
         read_places(tmp_path / "bad.csv")
 
 
+def test_rows_outside_their_crs_are_told_by_their_number(tmp_path: Path) -> None:
+    sound = shapely.box(500000, 5500000, 500300, 5500200)
+    two = shapely.MultiPolygon([sound, shapely.affinity.translate(sound, 1000.0)])
+    outside = shapely.affinity.translate(sound, 32e6)
+    shapes = [None, two, outside, sound, outside]
+    gpd.GeoDataFrame(geometry=shapes, crs=25832).to_file(tmp_path / "zones.gpkg")
+    with pytest.raises(CRSError, match=r"zones\.gpkg: coordinates in row 3, 5 are outside"):
+        read_places(tmp_path / "zones.gpkg")
+
+
 def test_a_column_that_is_not_there(tmp_path: Path) -> None:
     POINTS.to_csv(tmp_path / "p.csv", index=False)
     with pytest.raises(FormatError, match=r"no column 'farmr'\. Did you mean 'farmer'"):

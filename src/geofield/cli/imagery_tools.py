@@ -218,8 +218,11 @@ def where_json(done: Acquired) -> dict[str, object]:
 
 def area_of(path: Path) -> Where:
     """The ground that a vector file covers."""
+    import numpy as np
     import shapely
+    from pyproj import CRS
 
+    from geofield.crs import LONLAT, refuse_outside
     from geofield.finite import refuse_nowhere
     from geofield.formats.foreign import read_vector
     from geofield.imagery import Where
@@ -228,7 +231,11 @@ def area_of(path: Path) -> Where:
     refuse_nowhere(table.geometry.to_numpy(), path.name)
     if table.crs is None:
         raise ImageryError(f"The area {path} does not name its coordinate reference system.")
-    shape = shapely.union_all(table.to_crs("EPSG:4326").geometry.to_numpy())
+    shapes = table.to_crs(LONLAT).geometry.to_numpy()
+    lon, lat = shapely.get_coordinates(shapes).T
+    lat[np.abs(lat) > 90.0] = np.inf
+    refuse_outside(CRS(table.crs), lon, lat, what=f"Coordinates in {path.name}")
+    shape = shapely.union_all(shapes)
     if shape.is_empty:
         raise ImageryError(f"The file {path} holds no area.")
     return Where(area=shape)

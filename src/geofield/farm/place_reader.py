@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, authority_name, parse_crs, transformer
+from geofield.crs import LONLAT, authority_name, parse_crs, refuse_outside, transformer
 from geofield.datum import datum_notes
 from geofield.errors import CRSError, FormatError
 from geofield.farm.place_files import RawPlaces, raw_of, read_raw
@@ -28,7 +28,7 @@ from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import counted, nearest
+from geofield.wording import counted, nearest, some_of
 
 _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
@@ -62,7 +62,7 @@ def read_places(
         When there is no such column, an id comes twice, there are no places, positions are no
         positions, or a column that is named like a setting holds something else.
     CRSError
-        When the file does not say its CRS.
+        When the file does not say its CRS, or has coordinates outside it.
     """
     texts = (*ID_COLUMNS, *NAME_COLUMNS, id_column, name_column)
     if isinstance(path, pd.DataFrame):
@@ -93,7 +93,7 @@ def read_places(
             hint=f"It has {', '.join(raw.table.column_names)}; name them with --lat-column and "
             "--lon-column.",
         )
-    _check_positions(raw, lat, lon)
+    _check_positions(raw, lat, lon, kept, source)
     rest = [name for name in raw.table.column_names if name not in used]
     per_place = [name for name in rest if name in setting_names()]
     own = raw.table.select([name for name in rest if name not in per_place]).take(kept)
@@ -133,7 +133,7 @@ def read_table(path: Path) -> gpd.GeoDataFrame:
         )
     x, y = (_numbers(raw, str(name)) for name in names)
     if names == lonlat:
-        _check_positions(raw, y, x)
+        _check_positions(raw, y, x, np.arange(len(x)), LONLAT)
     known = np.isfinite(x) & np.isfinite(y)
     points = np.full(len(x), None)
     points[known] = shapely.points(x[known], y[known])
@@ -262,15 +262,15 @@ def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
         ) from None
 
 
-def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
-    """Refuse what cannot be a latitude or longitude.
+def _check_positions(raw: RawPlaces, lat: Any, lon: Any, row: Any, source: CRS) -> None:
+    """Refuse what cannot be a latitude or longitude; `row` counts from 0, `source` is the file's.
 
     Raises
     ------
     FormatError
         Saying whether the two look swapped, or some rows are in another CRS.
     """
-    if not (np.isfinite(lat) & np.isfinite(lon)).any():
+    if (np.isnan(lat) | np.isnan(lon)).all():
         raise FormatError(
             f"{raw.name} holds no row with a position.",
             hint="Give each field a latitude and a longitude, or a shape.",
@@ -278,7 +278,9 @@ def _check_positions(raw: RawPlaces, lat: Any, lon: Any) -> None:
     wrong = np.flatnonzero((np.abs(lat) > 90) | (np.abs(lon) > 180))
     if not len(wrong):
         return
-    shown = ", ".join(str(row + 1) for row in wrong[:5]) + (", ..." if len(wrong) > 5 else "")
+    rows = dict.fromkeys(row[wrong] + 1)
+    shown = some_of([str(one) for one in rows], 5)
+    refuse_outside(source, lat[wrong], lon[wrong], what=f"{raw.name}: coordinates in row {shown}")
     first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
     swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
     if swapped.all():

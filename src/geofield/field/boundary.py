@@ -75,12 +75,13 @@ def field_from_boundary(
             hint="Assign one, for instance with `ogr2ogr -a_srs EPSG:25832 parcels.gpkg FILE`.",
         )
     own = CRS(parcels.crs)
-    _, south, _, north = rows.total_bounds
+    west, south, east, north = rows.total_bounds
     if own.is_geographic and max(-south, north) > 90.0:
+        swapped = max(-west, east) <= 90.0
+        wrong = "they look swapped with longitudes" if swapped else "they are none"
         raise FieldError(
-            f"The boundary file has latitudes from {south:.4f} to {north:.4f}: they look swapped "
-            "with longitudes.",
-            hint=_EXCHANGE,
+            f"The boundary file has latitudes from {south:.4f} to {north:.4f}: {wrong}.",
+            hint=_EXCHANGE if swapped else "Check the CRS: the data may be in another one.",
         )
     rows = _somewhere(rows)
     if name is not None:
