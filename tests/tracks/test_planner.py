@@ -620,6 +620,11 @@ def test_spacing_wider_than_the_field() -> None:
         {"spacing_m": 4.0, "clearance_m": None},
         {"spacing_m": 4.0, "headland_m": "12"},
         {"spacing_m": 4.0, "obstacles": ["tree"]},
+        {"spacing_m": 4.0, "obstacles": 3},
+        {"spacing_m": 4.0, "grid": 3},
+        {"spacing_m": 4.0, "edits": {}},
+        {"spacing_m": 4.0, "outside": 3},
+        {"spacing_m": 4.0, "outside": [(X, Y)]},
     ],
 )
 def test_bad_settings_are_refused(wrong: dict[str, object]) -> None:

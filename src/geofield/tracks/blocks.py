@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import geopandas as gpd
@@ -120,7 +121,7 @@ def _plain(obstacles: Any) -> gpd.GeoSeries:
     own = getattr(obstacles, "crs", None)
     if isinstance(obstacles, BaseGeometry):
         obstacles = shapely.get_parts(obstacles)
-    shapes = list(obstacles)
+    shapes = list(obstacles) if isinstance(obstacles, Iterable) else [obstacles]
     for shape in shapes:
         if shape is not None and not isinstance(shape, BaseGeometry):
             raise TrackError(

@@ -12,7 +12,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.crs import ground_scale
-from geofield.errors import CRSMismatchError, TrackError, TrackWarning
+from geofield.errors import CRSMismatchError, TrackError, TrackWarning, refuse_other
 from geofield.grid import Grid
 from geofield.model.field import Field
 from geofield.model.frame import along_frame
@@ -153,6 +153,7 @@ def plan_tracks(
             )
         crs, polygon = polygon.crs, polygon.polygon
     refuse_no_shape(polygon)
+    _refuse_other_kinds(grid, outside, edits)
     metric_crs = metric(crs)
     wide_m = spacing_m if width_m is None else width_m
     refuse_no_length(spacing_m=spacing_m, step_m=step_m, width_m=wide_m)
@@ -262,6 +263,14 @@ def clip_shapes(
         owner = np.arange(circles, circles + len(shapes.polygons))
         edges = join_edges(edges, polygon_edges(shapes.polygons, frame, owner))
     return clip_tracks(positions, edges, discs, min_length_m=min_segment_m)
+
+
+def _refuse_other_kinds(grid: object, outside: object, edits: object) -> None:
+    """Refuse what is no part of a scene or plan."""
+    refuse_other(grid, Grid | None, "grid", "Of a scene give scene.grid.", TrackError)
+    refuse_other(edits, TrackEdits | None, "edits", "Of a plan give plan.track_edits.", TrackError)
+    for line in () if outside is None else np.atleast_1d(np.asarray(outside, dtype=object)):
+        refuse_other(line, LineString, "outside", "Of a plan give plan.frame_lines.", TrackError)
 
 
 def _nothing_left(min_segment_m: float) -> str:
