@@ -831,6 +831,7 @@ def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path, door:
     refused = with_8_m(fresh=False, code=1)
     assert "b as edited" in refused
     assert "farm of other work" in refused
+    assert "or --fresh (of `geofield tracks` --overwrite)" in refused
     _edit(folder, "obstacles", _third("added"))
     assert "b as edited" in with_8_m(fresh=True, code=0)
     assert list(gf.read_farm(folder / "farm")["b"].obstacles["status"]) == ["added", "added"]

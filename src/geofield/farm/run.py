@@ -158,12 +158,13 @@ def _asked(
     there = place.Record.read(store)
     if there is None and store.names(""):
         raise OutputExistsError(
-            f"{store.shown} is not empty, and no farm.", hint="Choose another folder with --out."
+            f"{store.shown} is not empty, and no farm.", hint="Choose another folder."
         )
     if there is not None and there.digest != wanted.digest and not fresh:
         raise OutputExistsError(
             f"{store.shown} is a farm of other work: {difference(there, wanted)}.",
-            hint="Choose another folder, or --fresh: all is planned anew, what you reviewed stays.",
+            hint="Choose another folder, or --fresh (of `geofield tracks` --overwrite): all is "
+            "planned anew, what you reviewed stays.",
         )
     return wanted, there
 
