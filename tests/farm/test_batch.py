@@ -461,6 +461,7 @@ def test_parcels_without_shape_fail_alone(tmp_path: Path) -> None:
     assert "1 place has no plan" in said
     failed = pd.read_csv(tmp_path / "farm" / "failed.csv")
     assert failed["error"].to_list() == ["The row has no position."]
+    assert failed["hint"].to_list() == ["Give it a shape, or a latitude and a longitude."]
     overview = tmp_path / "farm" / "farm.gpkg"
     assert [len(gpd.read_file(overview, layer=one)) for one in ("field", "places")] == [3, 3]
 

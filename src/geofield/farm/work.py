@@ -66,7 +66,9 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     """
     settings = as_settings(job.settings, place.settings)
     if not (np.isfinite(place.lat) and np.isfinite(place.lon)):
-        raise FieldError("The row has no position.", hint="Give it a latitude and a longitude.")
+        raise FieldError(
+            "The row has no position.", hint="Give it a shape, or a latitude and a longitude."
+        )
     if previous is not None:
         reviewed, previous = previous, _around(_on_parcel(previous, place), job)
         place = _as_reviewed(place, previous)
