@@ -44,6 +44,9 @@ point differs from what was taken, make the best there a little better (.919, .9
 two to four points for .915, .932 and .944) and what is taken hardly (+.002, standard error .001,
 two to six points, 170 fields).
 
+Sides beside a point put where the picture changes most beyond it, as further outlines, changed
+nothing: with two to ten points -.003 to +.001, standard errors .001 to .003 (119 fields).
+
 Certainty is told no better by what else can be asked: whether the answers from six other places in
 the ground, or from the picture mirrored, are the same ground, and whether those from ground beside
 it take it in. Bad outlines (below .8) are told from good ones (from .88 on) with an area under the
