@@ -111,7 +111,6 @@ class Imagery:
         from geofield.imagery.acquisition import Where, acquire
         from geofield.imagery.reader import MAX_SIDE_PX
         from geofield.imagery.sources import PictureSource
-        from geofield.imagery.sources.google import MAX_FRAME_PX, GoogleStaticSource
 
         if isinstance(source, PictureSource) and (
             settings.bands or source.terms.attribution + source.terms.licence == ""
@@ -120,8 +119,7 @@ class Imagery:
             return
         # What the settings say of a picture's terms must travel with it: as a file that says so.
         own = isinstance(source, PictureSource)
-        offered_px = MAX_FRAME_PX if isinstance(source, GoogleStaticSource) else math.inf
-        most_px = offered_px if own else min(offered_px, MAX_SIDE_PX)
+        most_px = source.most_px if own else min(source.most_px, MAX_SIDE_PX)
         first_px = None if own else int(min(_SIDE_PX, most_px))
         with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
 
@@ -133,7 +131,7 @@ class Imagery:
 
             first = fetch(settings.size_m)
             most_m = (most_px + 0.5) * first.grid.ground_resolution_m
-            yield PlacePicture(str(first.path), most_px < offered_px, fetch, most_m)
+            yield PlacePicture(str(first.path), most_px < source.most_px, fetch, most_m)
 
 
 def is_own_picture(what: str) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 from urllib.parse import quote
 
 from geofield.imagery.sources.mbtiles import MBTilesSource
@@ -14,6 +16,8 @@ from geofield.imagery.tiling import Tile, TilePyramid
 class TileSource:
     """Tiles from a server; each kind of server says what to ask it for."""
 
+    #: Side of the largest picture that it gives, pixels.
+    most_px: ClassVar[float] = math.inf
     name: str
     terms: Terms = field(default_factory=Terms, kw_only=True)
     #: Never shown.
@@ -52,6 +56,8 @@ class TileSource:
 class PictureSource:
     """One picture, a folder of them, or those of a STAC file."""
 
+    #: Side of the largest picture that it gives, pixels.
+    most_px: ClassVar[float] = math.inf
     name: str
     terms: Terms
     #: File, folder, address or STAC file.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 from urllib.parse import quote
 
 from geofield.errors import ImageryError
@@ -32,6 +33,7 @@ class GoogleStaticSource(TileSource):
     that first, so that the georeference is exact for what was asked.
     """
 
+    most_px: ClassVar[float] = MAX_FRAME_PX
     name: str = "google"
     terms: Terms = GOOGLE_TERMS
     rate_per_s: float | None = 10.0

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import math
 import sqlite3
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 from PIL import Image, UnidentifiedImageError
 
@@ -22,6 +24,8 @@ _BUSY_S = 30.0
 class MBTilesSource:
     """Tiles of a file here; a picklable value, the file is opened for each tile."""
 
+    #: Side of the largest picture that it gives, pixels.
+    most_px: ClassVar[float] = math.inf
     name: str
     path: str
     terms: Terms
