@@ -233,7 +233,7 @@ def area_of(path: Path) -> Where:
         raise ImageryError(f"The area {path} does not name its coordinate reference system.")
     shapes = table.to_crs(LONLAT).geometry.to_numpy()
     lon, lat = shapely.get_coordinates(shapes).T
-    lat[np.abs(lat) > 90.0] = np.inf
+    lat[np.abs(lat) > 90.0] = np.inf  # metres that are called degrees are not brought anywhere
     refuse_outside(CRS(table.crs), lon, lat, what=f"Coordinates in {path.name}")
     shape = shapely.union_all(shapes)
     if shape.is_empty:
