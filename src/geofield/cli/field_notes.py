@@ -16,24 +16,24 @@ if TYPE_CHECKING:
 
 #: Kinds of notes that are told, and fields that are named of each beside the first.
 _KINDS, _FIELDS = 10, 5
-#: Between the notes of a field, each of which is a sentence.
+#: Between the notes of a field in a farm's status, each of which is a sentence.
 _BETWEEN = re.compile(r"(?<=\.); ")
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 
 
-def tell_fields(told: Iterable[tuple[str, str]], where: str) -> None:
+def tell_fields(told: Iterable[tuple[str, Iterable[str]]], where: str) -> None:
     """Tell the notes of fields: a line for those that differ in nothing but their numbers.
 
     Parameters
     ----------
-    told : iterable of (str, str)
-        The name of each field that has some, and its notes as they stand in a farm's status.
+    told : iterable of (str, iterable of str)
+        The name of each field, and its notes.
     where : str
         More kinds of notes than are told here are kept.
     """
     kinds: dict[str, tuple[str, dict[str, None]]] = {}
-    for name, words in told:
-        for note in _BETWEEN.split(words):
+    for name, notes in told:
+        for note in notes:
             _, names = kinds.setdefault(_NUMBER.sub("0", note), (f"{name}: {note}", {}))
             names[name] = None
     for first, names in list(kinds.values())[:_KINDS]:
@@ -59,7 +59,7 @@ def labels(places: Places) -> dict[str, str]:
     }
 
 
-def _of_farm(store: Store, places: Places) -> Iterator[tuple[str, str]]:
+def _of_farm(store: Store, places: Places) -> Iterator[tuple[str, list[str]]]:
     import pyarrow.compute as pc
 
     from geofield.farm.folder import STATUS, read_parts
@@ -73,4 +73,4 @@ def _of_farm(store: Store, places: Places) -> Iterator[tuple[str, str]]:
     for row in sorted(rows, key=lambda row: (not row["reviewed"], row["place"])):
         words = row["notes"].removeprefix(known.get(row["field_id"], "")).removeprefix("; ")
         if words:
-            yield called.get(row["field_id"], row["field_id"]), words
+            yield called.get(row["field_id"], row["field_id"]), _BETWEEN.split(words)

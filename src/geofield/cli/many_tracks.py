@@ -169,8 +169,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
                     plan = plan_place(place, job)
                 except GeofieldError as error:
                     failed[stem] = f"{error.message} {error.hint or ''}".strip()
-            if heard:
-                notes.append((called[place.field_id], "; ".join(map(str, heard))))
+            notes.append((called[place.field_id], [str(note) for note in heard]))
             if plan is None:
                 continue
             target = wanted.output / f"{stem}.gpkg"

@@ -67,7 +67,7 @@ export const SAID = {
     [/^An offset of (.*) m lies beyond the field, which is (.*) m wide across the tracks\.$/, "Die erste Spur läge $1 m weit im Feld, das quer zu den Spuren nur $2 m breit ist."],
     [/^1 obstacle has no geometry and was left out\.$/, "1 Hindernis hat keine Form und ist weggelassen."],
     [/^(\d+) obstacles have no geometry and were left out\.$/, "$1 Hindernisse haben keine Form und sind weggelassen."],
-    [/^1 obstacle was not valid and has been repaired\.$/, "Die Form 1 Hindernisses war ungültig und ist repariert."],
+    [/^1 obstacle was not valid and has been repaired\.$/, "Die Form eines Hindernisses war ungültig und ist repariert."],
     [/^(\d+) obstacles were not valid and have been repaired\.$/, "Die Formen von $1 Hindernissen waren ungültig und sind repariert."],
     [/^A point is said to belong to the field and not to belong to it\.$/, "Von einem Punkt ist gesagt, dass er zum Feld gehört und dass er nicht dazugehört."],
     [/^Leave one of the two out\.$/, "Lassen Sie eines von beiden weg."],
