@@ -211,7 +211,16 @@ def test_a_picture_in_utm_keeps_its_own_datum() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [{"zoom": 23}, {"zoom": -1}, {"lat": 86.0}, {"lat": math.nan}, {"lon": 181.0}],
+    [
+        {"zoom": 23},
+        {"zoom": -1},
+        {"zoom": 17.5},
+        {"zoom": "18"},
+        {"width_px": 9.5},
+        {"lat": 86.0},
+        {"lat": math.nan},
+        {"lon": 181.0},
+    ],
 )
 def test_impossible_web_mercator_grids_are_refused(arguments: dict[str, Any]) -> None:
     with pytest.raises(GridError):
