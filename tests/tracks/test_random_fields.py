@@ -247,30 +247,61 @@ def test_headlands_run_around_the_field_and_past_what_stands_there(cases: list[C
     assert cut_by_holes > 8
 
 
-@pytest.mark.parametrize("radius_m", [None, 2.0, 5.0])
-def test_a_drive_is_one_line_that_works_everything_and_keeps_to_the_ground(
-    cases: list[Case], radius_m: float | None
-) -> None:
-    fitting = left_out = 0
-    for at, case in enumerate(cases):
-        tracks, scale = case.tracks, case.tracks.ground_scale
-        if len(tracks.segments) > 90:
-            continue
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A case with the tables of a route, the machine's turning radius and the border's margin."""
+
+    case: Case
+    route: Any
+    turns: Any
+    radius_m: float | None
+    margin_m: float
+
+    @property
+    def work(self) -> Any:
+        """The rows of the route that drive a segment."""
+        return self.route[self.route["kind"] == "work"]
+
+
+@pytest.fixture(scope="module", params=[None, 2.0, 5.0])
+def drives(request: pytest.FixtureRequest, cases: list[Case]) -> list[Drive]:
+    """Routes of all patterns and curves; with reversing and without, with a margin and none."""
+    made = []
+    for at, case in enumerate(case for case in cases if len(case.tracks.segments) <= 90):
         margin_m = 4.0 * (at % 2)
         planned = plan_route(
-            tracks,
+            case.tracks,
             pattern=("boustrophedon", "skip", "shortest")[at % 3],
-            turning_radius_m=radius_m,
+            turning_radius_m=request.param,
             curve="reeds_shepp" if at % 4 < 2 else "dubins",
             margin_m=margin_m,
         )
-        route, turns = planned.route, planned.turns
-        assert route is not None
-        assert turns is not None
-        work = route[route["kind"] == "work"]
+        made.append(Drive(case, planned.route, planned.turns, request.param, margin_m))
+    return made
+
+
+def test_a_drive_works_every_segment_once_in_the_direction_it_tells(drives: list[Drive]) -> None:
+    left_out = 0
+    for drive in drives:
+        segments, work, turns = drive.case.tracks.segments, drive.work, drive.turns
+        key = segments.set_index(["track_no", "segment_no"]).geometry
         driven = list(zip(work["track_no"], work["segment_no"], strict=True))
-        known = zip(tracks.segments["track_no"], tracks.segments["segment_no"], strict=True)
-        assert sorted(driven) == list(known)
+        assert sorted(driven) == key.index.to_list()
+        for row in work.itertuples():
+            along = np.diff(shapely.get_coordinates([key[row.track_no, row.segment_no]]), axis=0)
+            way = np.diff(shapely.get_coordinates([row.geometry])[[0, -1]], axis=0)
+            assert ((along * way).sum() > 0.0) == (row.direction == "forward")
+        left_m = turns["skipped_m"]
+        assert (turns["from_track"] == turns["to_track"])[left_m > 0.0].all()
+        whole_m = work["length_m"].sum() + left_m.sum()
+        assert whole_m == pytest.approx(segments["length_m"].sum())
+        left_out += int((left_m > 0.0).sum())
+    assert left_out > 5 or drives[0].radius_m is None
+
+
+def test_a_drive_is_one_line_whose_metres_are_told(drives: list[Drive]) -> None:
+    for drive in drives:
+        route, turns, scale = drive.route, drive.turns, drive.case.tracks.ground_scale
         lines = route.geometry.to_numpy()
         lengths_m = shapely.length(lines) / scale
         assert route["length_m"].to_list() == pytest.approx(lengths_m.tolist(), rel=3e-3, abs=0.01)
@@ -280,33 +311,34 @@ def test_a_drive_is_one_line_that_works_everything_and_keeps_to_the_ground(
         starts = shapely.get_coordinates(shapely.get_point(lines, 0))[1:]
         follows = np.diff(route["sequence"]) == 1
         assert np.abs(ends - starts)[follows].max(initial=0.0) < 1e-3
+        track_no = drive.work.set_index("sequence")["track_no"]
+        assert turns["from_track"].to_list() == track_no.loc[turns["sequence"] - 1].to_list()
+        assert turns["to_track"].to_list() == track_no.loc[turns["sequence"] + 1].to_list()
+        kind = route.set_index("sequence")["kind"].loc[turns["sequence"]]
+        assert (kind == "drive").to_list() == (turns["kind"] == "drive").to_list()
 
-        between = work[["track_no"]].assign(next=work["track_no"].shift(-1), step=work["sequence"])
-        of = between.set_index("step")
-        assert turns["from_track"].to_list() == of.loc[turns["sequence"] - 1, "track_no"].to_list()
-        assert turns["to_track"].to_list() == of.loc[turns["sequence"] - 1, "next"].to_list()
-        left_m = turns["skipped_m"]
-        assert (turns["from_track"] == turns["to_track"])[left_m > 0.0].all()
-        worked_m = work["length_m"].sum()
-        assert worked_m + left_m.sum() == pytest.approx(tracks.segments["length_m"].sum())
-        left_out += int((left_m > 0.0).sum())
+
+def test_turns_keep_to_the_ground_and_to_the_turning_radius(drives: list[Drive]) -> None:
+    fitting = 0
+    for drive in drives:
+        case, turns, scale = drive.case, drive.turns, drive.case.tracks.ground_scale
         ways, fits = turns.geometry.to_numpy(), (turns["fits"] == "yes").to_numpy()
         may: Any = case.field
-        if margin_m:
+        if drive.margin_m:
             whole = Polygon(case.field.exterior)
-            may = shapely.union(may, whole.buffer(margin_m * scale, quad_segs=64).difference(whole))
+            around = shapely.buffer(whole, drive.margin_m * scale, quad_segs=64)
+            may = shapely.union(may, shapely.difference(around, whole))
         outside_m = shapely.length(shapely.difference(ways, shapely.buffer(may, 0.02))) / scale
         assert outside_m[fits].max(initial=0.0) < 0.05
         assert (outside_m <= turns["outside_m"] + 0.1).all()
         through = shapely.length(shapely.intersection(ways, shapely.buffer(case.barred, -0.02)))
         assert through.max(initial=0.0) < 0.05
-        curved = (turns["kind"] != "drive").to_numpy() & (radius_m is not None)
+        curved = (turns["kind"] != "drive").to_numpy() & (drive.radius_m is not None)
         assert (turns["radius_m"].notna().to_numpy() == curved).all()
         for way in ways[fits & curved]:
-            assert radius_m is not None
-            assert least_radius(way) / scale > 0.9 * radius_m
+            assert least_radius(way) / scale > 0.9 * (drive.radius_m or 0.0)
             fitting += 1
-    assert radius_m is None or (fitting > 150 and left_out > 5)
+    assert fitting > 150 or drives[0].radius_m is None
 
 
 def least_radius(way: Any) -> float:
