@@ -9,7 +9,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from formats_plan import NAME, UTM, make_dataset
+from formats_plan import NAME, ORIGIN, UTM, make_dataset
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
@@ -100,7 +100,8 @@ def test_track_lines(folder):
 
 def test_flags(folder):
     content = lines(folder / "Flags.txt")
-    assert content[:2] == ["$Flags", "3"]
+    assert content[:2] == ["$Flags", "4"]
+    assert content[5].endswith(",4,Hole 1")
     lat, lon, _, _, heading, colour, number, note = content[2].split(",")
     dataset = make_dataset()
     row = dataset.table("obstacles").iloc[0]
@@ -196,3 +197,22 @@ def test_a_crown_that_leans_in_from_outside_is_an_obstacle_again(tmp_path):
     first = back.table("obstacles").set_index("obstacle_no").geometry[1]
     assert first.area > 5
     assert back.table("field").geometry.iloc[0].buffer(0.05).covers(first)
+
+
+@pytest.mark.parametrize(("box", "parts"), [
+    ((8, 6, 16, 8), 2), ((13, 6, 16, 8), 1), ((11, 6, 13, 8), 0), (None, 0),
+])  # fmt: skip
+def test_a_hole_stays_one_and_so_does_each_part_of_an_obstacle_at_it(tmp_path, box, parts):
+    dataset = make_dataset()
+    field = dataset.table("field").geometry.iloc[0]
+    there = [] if box is None else [shapely.transform(shapely.box(*box), lambda c: c + ORIGIN)]
+    table = dataset.table("obstacles").iloc[: len(there)]
+    dataset.tables["obstacles"] = table.set_geometry(there, crs=UTM)
+    write_dataset(dataset, tmp_path, ["agopengps"])
+    back = read_dataset(tmp_path / "agopengps")
+    assert len(back.table("obstacles")) == parts
+    inside = shapely.intersection(shapely.union_all(there), field)
+    found = shapely.union_all(back.table("obstacles").geometry.to_numpy())
+    assert shapely.symmetric_difference(found, inside).area < 0.1
+    theirs = back.table("field").geometry.iloc[0]
+    assert shapely.symmetric_difference(theirs, field).area < 1

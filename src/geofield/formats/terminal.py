@@ -68,17 +68,8 @@ def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[Termina
     for each in np.unique(group):
         rows = np.flatnonzero(group == each)
         whole = shapes[rows[0]] if len(rows) == 1 else shapely.union_all(shapes[rows])
-        # A post may be small, too: only what clipping leaves over is a sliver.
-        least_m2 = 0.0
-        if not shapely.covers(field, whole):
-            whole, least_m2 = shapely.intersection(whole, field), _SLIVER_M2
         name = "Obstacle " + "+".join(str(number) for number in sorted(numbers[rows]))
-        pieces = [
-            piece
-            for piece in shapely.orient_polygons(shapely.get_parts(whole))
-            if piece.geom_type == "Polygon" and piece.area > least_m2
-        ]
-        for position, piece in enumerate(pieces, start=1):
+        for position, piece in enumerate(pieces_in(field, whole), start=1):
             trees = tuple(
                 (int(numbers[row]), centres[row])
                 for row in rows
@@ -87,6 +78,19 @@ def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[Termina
             tail = f" part {position}" if position > 1 else ""
             found.append(TerminalObstacle(f"{name}{tail}", piece, trees))
     return found
+
+
+def pieces_in(field: shapely.Polygon, shape: Any) -> list[shapely.Polygon]:
+    """The parts of an obstacle's shape that lie in the field."""
+    # A post may be small, too: only what clipping leaves over is a sliver.
+    least_m2 = 0.0
+    if not shapely.covers(field, shape):
+        shape, least_m2 = shapely.intersection(shape, field), _SLIVER_M2
+    return [
+        piece
+        for piece in shapely.orient_polygons(shapely.get_parts(shape))
+        if piece.geom_type == "Polygon" and piece.area > least_m2
+    ]
 
 
 def main_field(dataset: Dataset, field: shapely.Polygon) -> list[shapely.Polygon]:

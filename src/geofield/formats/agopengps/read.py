@@ -18,14 +18,16 @@ from geofield.model import Dataset
 #: Vertices that lie so near the line between their neighbours came from densifying, metres.
 COLLINEAR_M = 0.002
 _CURVE = 4
-_FLAG = re.compile(r"Obstacle (\d+)")
+#: What a flag of ours in a hole of the field says before its number.
+HOLE = "Hole"
+_FLAG = re.compile(rf"Obstacle (\d+)|{HOLE} \d+$")
 
 
 def read(path: Path) -> Dataset:
     """The field in a folder of AgOpenGPS, or in the folder of one of its files.
 
     The first ring is the field. Rings in it are obstacles, the program having no other word
-    for them; where some carry our flags, the others are holes of the field.
+    for them; where flags of ours stand, those that have none as an obstacle are holes.
 
     Raises
     ------
@@ -79,8 +81,8 @@ def _field(folder: Path) -> tuple[str, LocalPlane]:
     return name, LocalPlane(lat, lon)
 
 
-def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int]]:
-    """The places of our obstacle flags, longitude and latitude, and their numbers."""
+def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int | None]]:
+    """The places of our flags, longitude and latitude, and the numbers of those of obstacles."""
     path = folder / "Flags.txt"
     found = []
     for line in _text(path)[2:] if path.exists() else []:
@@ -91,24 +93,27 @@ def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int]]:
                 placed = plane.to_plane(float(parts[1]), float(parts[0]))
             except ValueError:
                 raise FormatError(f"{path}: {line[:60]!r} is no flag.") from None
-            found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), int(match.group(1))))
+            number = None if match.group(1) is None else int(match.group(1))
+            found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), number))
     return found
 
 
 def _sorted_rings(
-    rings: list[Any], flags: list[tuple[Any, int]]
+    rings: list[Any], flags: list[tuple[Any, int | None]]
 ) -> tuple[list[Any], list[dict[str, Any]]]:
     """Holes of the field, and obstacles with their numbers."""
+    if not flags:
+        return [], [{"geometry": ring} for ring in rings]
     numbered: dict[int, int] = {}
     for point, number in flags:
+        if number is None:
+            continue
         around = [index for index, ring in enumerate(rings) if ring.covers(point)]
         if around:
             # An obstacle may stand in a hole of the field: its own ring is centred on its flag.
             nearest = min(around, key=lambda index: rings[index].centroid.distance(point))
             # A ring around several has the lowest of their numbers.
             numbered[nearest] = min(number, numbered.get(nearest, number))
-    if not numbered:
-        return [], [{"geometry": ring} for ring in rings]
     holes = [ring for index, ring in enumerate(rings) if index not in numbered]
     return holes, [
         {"obstacle_no": number, "geometry": rings[index]} for index, number in numbered.items()

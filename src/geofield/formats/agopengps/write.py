@@ -14,10 +14,17 @@ from geofield import schema
 from geofield.crs import ground_areas_m2
 from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
+from geofield.formats.agopengps.read import HOLE
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.names import safe_name
 from geofield.formats.origin import imagery_day
-from geofield.formats.terminal import are_bent, avoided, main_field, terminal_obstacles
+from geofield.formats.terminal import (
+    are_bent,
+    avoided,
+    main_field,
+    pieces_in,
+    terminal_obstacles,
+)
 from geofield.model import Dataset
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
@@ -49,7 +56,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
         "Boundary.txt": _boundary(_on_plane(rings, dataset, plane), step),
         "Headland.txt": _headland(main_field(dataset, polygon), rings, dataset, plane, step),
         "TrackLines.txt": _track_lines(dataset, plane),
-        "Flags.txt": _flags(dataset, plane),
+        "Flags.txt": _flags(dataset, polygon, plane),
     }
     out.mkdir(parents=True)
     written = []
@@ -155,24 +162,28 @@ def _curve(way: FloatArray) -> list[str]:
     return _rows(points, np.arctan2(ahead[:, 0], ahead[:, 1]) % (2 * np.pi))
 
 
-def _flags(dataset: Dataset, plane: LocalPlane) -> list[str]:
-    """One flag per obstacle that is to be avoided: at its centre, or in its part in the field.
+def _flags(dataset: Dataset, polygon: shapely.Polygon, plane: LocalPlane) -> list[str]:
+    """Flags that tell what the rings in the field are: holes of it, or obstacles.
 
-    By its flag a ring is known as an obstacle, and rings end at the field's border.
+    An obstacle has one in each part that lies in the field, at its centre where that is in it.
     """
     obstacles = avoided(dataset)
-    lines = ["$Flags", str(len(obstacles))]
-    shapes = np.asarray(obstacles.geometry.to_numpy(), dtype=object)
-    centres = shapely.centroid(shapes)
-    field = shapely.union_all(dataset.table(schema.FIELD.name).geometry.to_numpy())
-    inside = shapely.intersection(shapes, field)
-    leaning = ~shapely.covers(inside, centres) & ~shapely.is_empty(inside)
-    centres[leaning] = shapely.point_on_surface(inside[leaning])
-    lonlat = shapely.get_coordinates(to_lonlat(centres, dataset.crs))
-    placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
-    for (lon, lat), (east, north), number, radius in zip(
-        lonlat, placed, obstacles["obstacle_no"], obstacles["radius_m"], strict=True
+    places, notes = [], []
+    for number, radius, shape in zip(
+        obstacles["obstacle_no"], obstacles["radius_m"], obstacles.geometry, strict=True
     ):
-        note = f"Obstacle {number}" + (f" radius {radius:.2f} m" if radius > 0 else "")
+        for piece in pieces_in(polygon, shape):
+            centred = piece.covers(shape.centroid)
+            places.append(shape.centroid if centred else piece.representative_point())
+            notes.append(f"Obstacle {number}" + (f" radius {radius:.2f} m" if radius > 0 else ""))
+    for number, ring in enumerate(polygon.interiors, start=1):
+        places.append(shapely.Polygon(ring).representative_point())
+        notes.append(f"{HOLE} {number}")
+    lonlat = shapely.get_coordinates(to_lonlat(np.array(places, dtype=object), dataset.crs))
+    placed = plane.to_plane(lonlat[:, 0], lonlat[:, 1])
+    lines = ["$Flags", str(len(notes))]
+    for number, ((lon, lat), (east, north), note) in enumerate(
+        zip(lonlat, placed, notes, strict=True), start=1
+    ):
         lines.append(f"{lat:.9f},{lon:.9f},{east:.3f},{north:.3f},0,{_RED},{number},{note}")
     return lines
