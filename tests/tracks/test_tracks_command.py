@@ -168,10 +168,10 @@ def test_many_polygons_make_a_farm(tmp_path: Path) -> None:
     assert {plan.tracks.spacing_m for plan in farm} == {8.0}
 
 
-@pytest.mark.parametrize(
-    "wanted", [["tracks", "-o", "all.gpkg"], ["tracks", "-o", "farm"],
-               ["tracks", "--each", "-o", "plans"], ["batch", "--workers", "1", "--out", "farm"]],
-)  # fmt: skip
+@pytest.mark.parametrize("wanted", [
+    ["tracks", "--json", "-o", "all.gpkg"], ["tracks", "--json", "-o", "farm"],
+    ["tracks", "--json", "--each", "-o", "plans"], ["batch", "--workers", "1", "--out", "farm"],
+])  # fmt: skip
 def test_what_is_told_of_fields_names_them_and_is_told_once(
     wanted: list[str], tmp_path: Path
 ) -> None:
@@ -196,6 +196,15 @@ def test_what_is_told_of_fields_names_them_and_is_told_once(
     (repaired,) = (note for note in notes if "was repaired" in note)
     assert repaired.startswith("Note: Field 10 (9): The field's outline was repaired")
     assert len(notes) == 2
+    for at, row in enumerate(json.loads(result.stdout)["fields"] if "--json" in wanted else ()):
+        words = "obstacles enclose" if at < 8 else "was repaired"
+        assert [words in note for note in row["notes"]] == ([] if at == 8 else [True])
+    # And of one field alone.
+    parcels[9:].to_file(tmp_path / "parcels.gpkg")
+    result = run_geofield("tracks", "parcels.gpkg", "--json", "-o", "one.gpkg", folder=tmp_path)
+    (row,) = json.loads(result.stdout)["fields"]
+    assert [f"Note: {note}" for note in row["notes"]] == result.stderr.splitlines()
+    assert "was repaired" in row["notes"][0]
 
 
 @pytest.mark.parametrize("target", ["all.gpkg", "farm", "plans"])
@@ -222,6 +231,7 @@ def test_fields_that_fail_are_told_and_the_others_written(tmp_path: Path) -> Non
         )
         assert "2 of 4 fields could not be planned" in str(done.exception)
         assert done.stderr.count("larger than the field") == 2
+        assert done.stderr.count("\nNorth (50.5523N15.00") == 2
         assert len(list(out.glob("Field_*.gpkg")) if more else read_farm(out)) == 2
 
 
@@ -352,11 +362,12 @@ def test_a_plan_that_lost_its_record_is_told(tmp_path: Path) -> None:
             tmp_path / "copy.gpkg", layer=layer
         )
     for name, lost in (("plan", False), ("copy", True)):
-        done = CliRunner().invoke(
-            cli, ["tracks", str(tmp_path / f"{name}.gpkg"), "-o", str(tmp_path / f"{name}_2.gpkg")]
-        )
-        assert done.exception is None, done.output
-        assert ("has lost the record" in " ".join(done.output.split())) == lost
+        files = f"{name}.gpkg", "-o", f"{name}_2.gpkg"
+        done = run_geofield("tracks", *files, "--json", folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert ("has lost the record" in done.stderr) == lost
+        (row,) = json.loads(done.stdout)["fields"]
+        assert any("has lost the record" in note for note in row["notes"]) == lost
 
 
 def test_tracks_that_were_imported_are_told_to_be_planned_anew(tmp_path: Path) -> None:

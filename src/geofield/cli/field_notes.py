@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import say_note
+from geofield.errors import GeofieldWarning
+from geofield.notes import listening, warn
 from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
@@ -44,6 +47,19 @@ def tell_fields(told: Iterable[tuple[str, Iterable[str]]], where: str) -> None:
         say_note(f"{left} kept {where}.")
 
 
+@contextmanager
+def telling(kept: list[str]) -> Iterator[None]:
+    """Keep what there is to tell of one field; it is told at the end of the block."""
+    heard: list[GeofieldWarning] = []
+    try:
+        with listening() as heard:
+            yield
+    finally:
+        kept += map(str, heard)
+        for note in heard:
+            warn(str(note), type(note))
+
+
 def tell_farm(store: Store, places: Places, where: str = "in the farm's status") -> None:
     """Tell the notes of a farm's fields, those that a person reviewed first."""
     tell_fields(_of_farm(store, places), where)
@@ -59,6 +75,17 @@ def labels(places: Places) -> dict[str, str]:
     }
 
 
+def remarks(places: Places) -> dict[str, str]:
+    """What was told of single places before the work, by their ids."""
+    return {places.ids[at].as_py(): words for at, words in places.remarks.items()}
+
+
+def notes_in(words: str | None, remark: str = "") -> list[str]:
+    """The notes of a field in a farm's status, without what was told of it before the work."""
+    words = (words or "").removeprefix(remark).removeprefix("; ")
+    return _BETWEEN.split(words) if words else []
+
+
 def _of_farm(store: Store, places: Places) -> Iterator[tuple[str, list[str]]]:
     import pyarrow.compute as pc
 
@@ -66,11 +93,10 @@ def _of_farm(store: Store, places: Places) -> Iterator[tuple[str, list[str]]]:
 
     called = labels(places)
     # That parcels overlap was told before the work.
-    known = {places.ids[at].as_py(): words for at, words in places.remarks.items()}
+    known = remarks(places)
     rows: list[dict[str, Any]] = []
     for _, table in read_parts(store, STATUS, ["field_id", "notes", "reviewed", "place"]):
         rows += table.filter(pc.is_valid(table["notes"])).to_pylist()
     for row in sorted(rows, key=lambda row: (not row["reviewed"], row["place"])):
-        words = row["notes"].removeprefix(known.get(row["field_id"], "")).removeprefix("; ")
-        if words:
-            yield called.get(row["field_id"], row["field_id"]), _BETWEEN.split(words)
+        one = row["field_id"]
+        yield called.get(one, one), notes_in(row["notes"], known.get(one, ""))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 import tempfile
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geofield.cli.console import progress_bar, say_note
-from geofield.cli.field_notes import labels, tell_farm, tell_fields
+from geofield.cli.field_notes import labels, notes_in, remarks, tell_farm, tell_fields
 from geofield.cli.parcels import tell_places
 from geofield.cli.standing import tell_unreached
 from geofield.errors import GeofieldError, TrackError
@@ -86,14 +87,14 @@ def of_many(places: Places, job: Job, wanted: Wanted) -> Told:
     output = wanted.output
     if not output.suffix:
         farm = _farm(places, job, output, wanted, fresh=wanted.overwrite)
-        return _figures(farm, output, wanted)
+        return _figures(farm, places, wanted)
     with (
         tempfile.TemporaryDirectory(prefix="geofield-") as folder,
         staged_plan(output, overwrite=wanted.overwrite, inputs=_inputs(places, job)) as staging,
     ):
         farm = _farm(places, job, Path(folder) / "farm", wanted, fresh=False)
         write_gpkg(dataset_of(farm, output.stem), staging, stem=output.stem, options={})
-        return _figures(farm, output, wanted)
+        return _figures(farm, places, wanted)
 
 
 def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool) -> Farm:
@@ -126,22 +127,25 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     return read_farm(folder)
 
 
-def _figures(farm: Farm, target: Path, wanted: Wanted) -> Told:
-    status = farm.status.sort_values(["place", "field_id"])
-    alike = status["name"].duplicated(keep=False)
-    told_apart = status["name"] + " (" + status["field_id"] + ")"
-    status["name"] = status["name"].where(~alike, told_apart)
-    bad = status[~status["field_id"].isin(farm.ids)]
+def _figures(farm: Farm, places: Places, wanted: Wanted) -> Told:
+    status = farm.status.sort_values(["place", "field_id"]).set_index("field_id")
+    called, before = labels(places), remarks(places)
+    bad = status[~status.index.isin(farm.ids)]
     failed = {
-        name: f"{error} {hint}".strip()
-        for name, error, hint in zip(bad["name"], bad["error"], bad["hint"], strict=True)
+        called[one]: f"{error} {hint}".strip()
+        for one, error, hint in zip(bad.index, bad["error"], bad["hint"], strict=True)
     }
     rows = []
     if wanted.quiet or len(farm) <= _LISTED:
-        found = {plan.field.field_id: figures_of(plan, target) for plan in farm}
-        rows = [found[one] for one in status["field_id"] if one in found]
+        found = {}
+        for plan in farm:
+            one = plan.field.field_id
+            remark = before.get(one, "")
+            notes = [*filter(None, [remark]), *notes_in(status["notes"][one], remark)]
+            found[one] = figures_of(plan, wanted.output, notes)
+        rows = [found[one] for one in status.index if one in found]
     else:
-        say_note(f"{counted(len(farm), 'field is', 'fields are')} planned, in {target}.")
+        say_note(f"{counted(len(farm), 'field is', 'fields are')} planned, in {wanted.output}.")
     return rows, failed
 
 
@@ -161,20 +165,20 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     called, notes = labels(places), []
     with progress_bar(quiet=wanted.quiet) as progress:
         for done, place in enumerate(places):
-            stem = unlike(file_name(place.name), taken, "_")
+            stem, name = unlike(file_name(place.name), taken, "_"), called[place.field_id]
             progress(done, len(places), stem)
             plan = None
             with listening() as heard:
                 try:
                     plan = plan_place(place, job)
                 except GeofieldError as error:
-                    failed[stem] = f"{error.message} {error.hint or ''}".strip()
-            notes.append((called[place.field_id], [str(note) for note in heard]))
+                    failed[name] = f"{error.message} {error.hint or ''}".strip()
+            notes.append((name, [str(note) for note in heard]))
             if plan is None:
                 continue
             target = wanted.output / f"{stem}.gpkg"
             save_plan(plan, target, overwrite=wanted.overwrite, inputs=_inputs(places, job))
-            rows.append(figures_of(plan, target))
+            rows.append(figures_of(plan, target, [*place.notes, *map(str, heard)]))
             outlines.append([plan.field.polygon_lonlat])
     tell_fields(notes, "by a farm: -o FOLDER without --each")
     tell_unreached(job, outlines)
@@ -191,8 +195,8 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).strip("._") or "field"
 
 
-def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
-    """Figures of one field, plain JSON values."""
+def figures_of(plan: Plan, target: Path, notes: Iterable[str]) -> dict[str, Any]:
+    """Figures of one field, plain JSON values, and what was told of it."""
     if plan.tracks is None:
         return {}
     figures = {
@@ -215,7 +219,7 @@ def figures_of(plan: Plan, target: Path) -> dict[str, Any]:
         "spacing_m": plan.tracks.spacing_m,
         "direction_why": plan.tracks.direction_why,
         **figures,
-        "notes": list(plan.tracks.notes),
+        "notes": list(dict.fromkeys([*notes, *plan.tracks.notes])),
     }
 
 

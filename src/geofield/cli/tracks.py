@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, say, say_note
+from geofield.cli.console import echo_json, say
+from geofield.cli.field_notes import telling
 from geofield.cli.files import (
     OLD_PATH,
     PATH,
@@ -36,7 +37,7 @@ from geofield.cli.options import (
 )
 from geofield.cli.refresh import say_outdated
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
-from geofield.errors import TrackError
+from geofield.errors import FieldWarning, TrackError
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
@@ -101,7 +102,9 @@ def tracks(
 
     (claim_file if output.suffix else claim_folder)(output)
     tell_unsaved(file.parent, (file.name,))
-    plan = _own_plan(file, settings)
+    notes: list[str] = []
+    with telling(notes):
+        plan = _own_plan(file, settings)
     if plan is not None and not defaults:
         settings = continued(settings, plan.settings, "tracks")
     places = None if plan is not None else parcels_in(file, settings, crs)
@@ -132,7 +135,7 @@ def tracks(
             field_id = place.field_id if places.ids_given else ""
             begun = replace(place, name=name or place.name, field_id=field_id)
         target = output if output.suffix else output / f"{stem}.gpkg"
-        rows = [_one(begun, job, target, file, overwrite=overwrite, fresh=fresh)]
+        rows = [_one(begun, job, target, file, notes, overwrite=overwrite, fresh=fresh)]
     if as_json:
         echo_json({"fields": rows, "failed": list(failed)})
     for row in () if as_json else rows:
@@ -155,6 +158,7 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
     from geofield import schema
     from geofield.formats.foreign import layer_names
     from geofield.formats.gpkg_read import record_of
+    from geofield.notes import warn
     from geofield.plan import read_plan
     from geofield.plan_files import tracks_unread
     from geofield.strangers import is_geopackage
@@ -178,15 +182,23 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
             f" Its settings are lost, too: the spacing is {settings.tracks.spacing_m:g} m now, "
             "where --spacing says no other."
         )
-        say_note(
+        warn(
             f"{file.name} {unread}: its tracks are planned anew, whatever was changed of them."
-            f"{spacing if unsaid else ''}"
+            f"{spacing if unsaid else ''}",
+            FieldWarning,
         )
     return plan
 
 
 def _one(
-    plan: Plan | Place, job: Job, target: Path, file: Path, *, overwrite: bool, fresh: bool
+    plan: Plan | Place,
+    job: Job,
+    target: Path,
+    file: Path,
+    notes: list[str],
+    *,
+    overwrite: bool,
+    fresh: bool,
 ) -> dict[str, Any]:
     """Plan one field and write it; its figures."""
     from geofield.farm.standing import with_obstacles
@@ -197,18 +209,19 @@ def _one(
     from geofield.plan_files import save_plan
 
     inputs = [] if job.obstacles is None else [job.obstacles]
-    if not isinstance(plan, Plan):
-        done, read_from = plan_place(plan, job), None
-        inputs.append(file)
-    else:
-        if job.standing is not None:
-            plan = with_obstacles(plan, job.standing)
-        if fresh:
-            evidence = replace(plan.evidence, track_edits=TrackEdits())
-            plan = replace(plan, tracks=None, evidence=evidence)
-        done, read_from = run_tracks(plan, settings=job.settings), file
+    with telling(notes):
+        if not isinstance(plan, Plan):
+            done, read_from = plan_place(plan, job), None
+            inputs.append(file)
+        else:
+            if job.standing is not None:
+                plan = with_obstacles(plan, job.standing)
+            if fresh:
+                evidence = replace(plan.evidence, track_edits=TrackEdits())
+                plan = replace(plan, tracks=None, evidence=evidence)
+            done, read_from = run_tracks(plan, settings=job.settings), file
     tell_unreached(job, [[done.field.polygon_lonlat]])
     for change in done.changes:
         say(f"Changes: {change}")
     save_plan(done, target, read_from=read_from, overwrite=overwrite, inputs=inputs)
-    return figures_of(done, target)
+    return figures_of(done, target, notes)
