@@ -52,6 +52,8 @@ _NEAR_M = 100.0
 WITHOUT_SHAPE = "without_shape"
 #: The layers that rows are of, where a file has several.
 LAYERS = "layers"
+#: How far from a field something of the file may stand that reaches into it, metres.
+_NEAR = "near_m"
 _LINES = ("LineString", "LinearRing")
 _DEGREE_M = 111_000.0
 #: A longitude of -179.9 degrees is one of 180.1, too.
@@ -95,6 +97,7 @@ def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> g
     rows = rows.reset_index(drop=True)
     rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in frame.index[empty]]
     rows.attrs[LAYERS] = layers
+    rows.attrs[_NEAR] = max(_NEAR_M, 1.1 * float(_reach_m(rows).max(initial=0.0)))
     return rows
 
 
@@ -174,7 +177,7 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
         sized = column_like(mine, RADIUS_COLUMNS)
         if sized is not None:  # a strip is no circle
             mine[sized.name] = sized.mask(line)
-    near = mine.geometry.intersects(plan.field.polygon.buffer(_near_m(standing)))
+    near = mine.geometry.intersects(plan.field.polygon.buffer(standing.attrs[_NEAR]))
     if not near.any() and _swapped_here(standing, plan):
         raise TrackError(
             f"The obstacles lie at {plan.field.name} only with latitude and longitude swapped.",
@@ -226,11 +229,6 @@ def outlines_in(store: Store) -> Iterator[np.ndarray]:
     """The outlines of a farm in degrees, chunk by chunk."""
     for _, table in read_parts(store, schema.FIELD.name, [GEOMETRY]):
         yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))
-
-
-def _near_m(standing: gpd.GeoDataFrame) -> float:
-    """How far from a field something may stand that reaches into it, metres of its CRS."""
-    return max(_NEAR_M, 1.1 * float(_reach_m(standing).max(initial=0.0)))
 
 
 def with_further(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
@@ -290,7 +288,7 @@ def _is_one_of(shapes: Any, others: Any) -> np.ndarray:
 
 def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
     """Rows of the file around a field, by its index, in the file's order."""
-    near = plan.field.polygon.buffer(2.0 * _near_m(standing))
+    near = plan.field.polygon.buffer(2.0 * standing.attrs[_NEAR])
     around = gpd.GeoSeries([near], crs=plan.field.crs)
     there = np.asarray(around.to_crs(standing.crs))
     turns: tuple[float, ...] = (0.0,)
