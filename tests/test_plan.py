@@ -16,6 +16,7 @@ from pyproj import CRS
 
 import geofield as gf
 from geofield.crs import parse_crs, transformer
+from geofield.errors import GeofieldError
 from geofield.model.obstacles import circle_polygons
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
@@ -145,3 +146,17 @@ def test_a_place_in_a_field_that_180_degrees_runs_through() -> None:
     lat, lon = Plan(field).point
     there = shapely.Point(transformer(parse_crs(4326), field.crs).transform(lon, lat))
     assert polygon.contains(there)
+
+
+def test_arguments_of_a_wrong_kind_are_refused_by_their_names(plan: Plan, tmp_path: Path) -> None:
+    field = gpd.GeoDataFrame(geometry=[plan.field.polygon], crs=UTM)
+    for name, call in {
+        "overrides": lambda: gf.load_settings(None, 3),  # type: ignore[arg-type]
+        "formats": lambda: plan.write(tmp_path, formats=3),  # type: ignore[arg-type]
+        "options": lambda: plan.write(tmp_path, formats=["gpkg"], options=3),  # type: ignore[arg-type]
+        "client": lambda: next(gf.plan_fields(field, client=3)),
+    }.items():
+        with pytest.raises(GeofieldError, match=f"`{name}` must be a .*, not int"):
+            call()
+    with pytest.raises(GeofieldError, match="no format 3"):
+        plan.write(tmp_path, formats=[3])  # type: ignore[list-item]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geofield import __version__, schema
 from geofield.crs import ground_scale_of
-from geofield.errors import FormatError
+from geofield.errors import FormatError, refuse_other
 from geofield.field_rows import alternatives_rows, field_from_row
 from geofield.grid import Grid
 from geofield.model.card import card, field_drawn, obstacles_drawn, tracks_drawn, words
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from geofield.settings import Settings
     from geofield.web.html import PlanPage
 
+_NAME_FORMATS = 'Name them: formats=["gpkg", "isoxml"].'
+_NAME_OPTIONS = 'Name their format: options={"isoxml": {"farm": "Hill"}}.'
 SOFTWARE = f"geofield {__version__}"
 
 
@@ -267,6 +269,8 @@ class Plan:
         from geofield.products import write_products
         from geofield.settings import ExportSettings
 
+        refuse_other(formats, str | Iterable | None, "formats", _NAME_FORMATS, FormatError)
+        refuse_other(options, Mapping | None, "options", _NAME_OPTIONS, FormatError)
         export = self.settings.export if self.settings else ExportSettings()
         formats = export.formats if formats is None else formats
         formats = (formats,) if isinstance(formats, str) else tuple(formats)

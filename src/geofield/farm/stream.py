@@ -110,8 +110,9 @@ def _one(place: Place, job: Job) -> tuple[Plan | None, str]:
 
 def _there(places: Iterator[Place], job: Job, client: Any) -> Iterator[tuple[Plan | None, str]]:
     """On a cluster, never more than a few places per worker in the scheduler."""
-    from distributed import as_completed
+    from distributed import Client, as_completed
 
+    refuse_other(client, Client, "client", "Make one: distributed.Client(address).")
     ahead = max(_AHEAD, _AHEAD * sum(client.nthreads().values()))
     begun = (client.submit(_one, place, job, pure=False) for place in places)
     ready = as_completed(islice(begun, ahead), loop=client.loop)

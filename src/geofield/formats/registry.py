@@ -29,7 +29,7 @@ def format_named(name: str) -> Format:
     UnknownFormatError
         When there is none; says which name is nearest.
     """
-    key = name.strip().lower()
+    key = str(name).strip().lower()
     if key in FORMATS:
         return FORMATS[key]
     names = {each: each for each in FORMATS}

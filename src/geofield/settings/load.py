@@ -44,6 +44,7 @@ def load_settings(
     SettingsError
         Naming the setting, its value and what would be right.
     """
+    refuse_other(overrides, Mapping | None, "overrides", _SAY, SettingsError)
     merged: dict[str, dict[str, Any]] = {section: {} for section in _KNOWN}
     with in_words():
         for source in (_read_toml(path), _from_environment(), overrides or {}):
