@@ -29,7 +29,7 @@ def geofield(*words: object) -> subprocess.CompletedProcess[str]:
 def out(
     simulated: SimulatedField, simulated_tif: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
-    folder = tmp_path_factory.mktemp("renewal") / "out"
+    folder = tmp_path_factory.mktemp("renewal") / "my $out; 田"
     point = ("--lat", simulated.lat, "--lon", simulated.lon)
     told = geofield("run", simulated_tif, *point, "--spacing", 8, "--out", folder)
     assert "Older than the plan" not in told.stderr
@@ -41,7 +41,8 @@ def test_a_stage_says_what_is_older_and_one_command_renews_it(out: Path) -> None
     before = {name: (out / name).read_bytes() for name in ("map.png", "tracks.rdf")}
     told = geofield("tracks", plan, "--spacing", 12, "-o", plan).stderr
     assert f"Older than the plan: {', '.join(PRODUCTS)} (" in told
-    assert f"geofield refresh {plan}" in told
+    quote = '"' if os.name == "nt" else "'"
+    assert f"geofield refresh {quote}{plan}{quote})" in told
 
     renewed = json.loads(geofield("refresh", plan, "--json").stdout)
     assert renewed["outdated"] == []

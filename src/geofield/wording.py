@@ -5,8 +5,12 @@ And the nearest name for one that was mistyped.
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
+import subprocess
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 _OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
 #: What an option is called in Python, where that is not its own name with underscores.
@@ -29,6 +33,20 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
 
     close = difflib.get_close_matches(given, list(names), n=1, cutoff=cutoff)
     return f" Did you mean {close[0]!r}?" if close else ""
+
+
+def command(*words: str | Path) -> str:
+    """A command of geofield that can be copied into a shell, whatever its paths are called.
+
+    >>> command("farm", "put", Path("farm.gpkg"), Path("-My farm"))
+    "geofield farm put farm.gpkg './-My farm'"
+    """
+    # Of a path that begins with a dash an option would be made.
+    plain = [
+        f"./{word}" if isinstance(word, Path) and str(word).startswith("-") else str(word)
+        for word in words
+    ]
+    return f"geofield {subprocess.list2cmdline(plain) if os.name == 'nt' else shlex.join(plain)}"
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:

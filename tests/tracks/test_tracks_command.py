@@ -123,10 +123,11 @@ def test_one_polygon_with_trees(tmp_path: Path) -> None:
 
 
 def test_many_polygons_make_many_plans(tmp_path: Path) -> None:
-    outlines(3).to_file(tmp_path / "parcels.shp")
+    # A file whose name began with a dash would be taken for options.
+    outlines(3).replace("Field 3", "--Field 3").to_file(tmp_path / "parcels.shp")
     report = run(tmp_path / "parcels.shp", "--spacing", "8", "--each", "-o", tmp_path / "plans")
     rows = report["fields"]
-    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "Field 3"]
+    assert [row["name"] for row in rows] == ["Field 1", "Field 2", "--Field 3"]
     assert [row["length_m"] for row in rows] == pytest.approx([2000.0 / 0.9996] * 3, abs=0.1)
     assert sorted(p.name for p in (tmp_path / "plans").glob("*.gpkg")) == [
         "Field_1.gpkg", "Field_2.gpkg", "Field_3.gpkg",

@@ -9,7 +9,7 @@ import click
 from geofield.cli.console import say, say_note
 from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
 from geofield.errors import FormatError
-from geofield.wording import nearest
+from geofield.wording import command, nearest
 
 
 @click.group(
@@ -67,8 +67,8 @@ def say_waiting(folder: str | Path) -> None:
         edited.append(OVERVIEW)
     for name in edited:
         say_note(
-            f"{name} has edits that the farm does not hold yet. Take them in: geofield farm put "
-            f"{Path(folder) / name} {folder}"
+            f"{name} has edits that the farm does not hold yet. Take them in: "
+            f"{command('farm', 'put', Path(folder) / name, Path(folder))}"
         )
 
 
@@ -137,6 +137,6 @@ def _refuse_other_edits(folder: Path, overview: Path) -> None:
     if own.is_file() and not own.samefile(overview) and is_edited(folder, own):
         raise FormatError(
             f"{own} has edits that the farm does not hold yet.",
-            hint=f"Take them in first: geofield farm put {own} {folder}; or move that file out of "
-            "the farm.",
+            hint=f"Take them in first: {command('farm', 'put', own, folder)}; or move that file "
+            "out of the farm.",
         )

@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import say_note
 from geofield.staging import claimed
+from geofield.wording import command
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -70,7 +71,7 @@ def tell_unsaved(folder: Path, names: Collection[str] | None = None) -> None:
             place = folder if notes.parent.name == REVIEWING else plan
             say_note(
                 f"{notes} holds edits of the review page that were not saved, and that are not in "
-                f"what is made now. Bring them back: geofield review {place}"
+                f"what is made now. Bring them back: {command('review', place)}"
             )
 
 

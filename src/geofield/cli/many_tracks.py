@@ -192,7 +192,7 @@ def _inputs(places: Places, job: Job) -> list[Path | str]:
 
 def file_name(name: str) -> str:
     """A field's name as that of a file on a disk, which has letters of every script."""
-    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "field"
+    return re.sub(r"[^\w.-]+", "_", name).strip("._-") or "field"
 
 
 def figures_of(plan: Plan, target: Path, notes: Iterable[str]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import click
 
 from geofield.cli.console import echo_json, say
 from geofield.cli.files import claim_folder, plan_argument
+from geofield.wording import command
 
 if TYPE_CHECKING:
     from geofield.plan import Plan
@@ -52,10 +53,12 @@ def say_outdated(plan_file: Path) -> None:
 
     old = outdated(plan_file)
     if old:
-        say(f"Older than the plan: {', '.join(old)} (renew them: geofield refresh {plan_file})")
+        renew = command("refresh", plan_file)
+        say(f"Older than the plan: {', '.join(old)} (renew them: {renew})")
 
 
 def say_removed(before: Plan | None, after: Plan, plan_file: Path) -> None:
     """Tell that a stage removed the tracks of a plan, and how they are planned again."""
     if before is not None and before.tracks is not None and after.tracks is None:
-        say(f"Tracks removed: they no longer fit (geofield tracks {plan_file} -o {plan_file})")
+        again = command("tracks", plan_file, "-o", plan_file)
+        say(f"Tracks removed: they no longer fit ({again})")

@@ -18,6 +18,7 @@ from geofield.farm.store import Store
 from geofield.farm.value import Farm
 from geofield.notes import warn
 from geofield.staging.generations import earlier_of
+from geofield.wording import command
 
 
 def changed_elsewhere(farm: Farm, overview: Path, edits: Edits) -> list[str]:
@@ -51,8 +52,9 @@ def refuse_double(overview: Path, double: Sequence[str]) -> NoReturn:
     raise FormatError(
         f"Field {double[0]} was edited in {overview.name}, and changed in the farm since that "
         "was written.",
-        hint=f"To have the one of {overview.name}: geofield farm put {overview} "
-        f"{overview.parent}; to have the other, move {overview.name} out of the farm.",
+        hint=f"To have the one of {overview.name}: "
+        f"{command('farm', 'put', overview, overview.parent)}; to have the other, move "
+        f"{overview.name} out of the farm.",
     )
 
 

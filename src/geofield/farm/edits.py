@@ -47,7 +47,7 @@ from geofield.formats import origin
 from geofield.model.merged_rows import parts_apart
 from geofield.notes import listening, warn
 from geofield.plan import Plan
-from geofield.wording import counted, some_of
+from geofield.wording import command, counted, some_of
 
 #: The edits that the farm holds already, while the overview is older than it.
 TAKEN = f"{REVIEWED}/.taken.json"
@@ -328,8 +328,8 @@ def put_edits(
     if but in edits.marks:
         raise FormatError(
             f"Field {but} is edited in {overview.name}, too.",
-            hint=f"Take those edits in first: geofield farm put {overview} {folder}. What is put "
-            "back last, holds.",
+            hint=f"Take those edits in first: {command('farm', 'put', overview, folder)}. What is "
+            "put back last, holds.",
         )
     asked = [one for one in edits.marks if only is None or one in only]
     here = [one for one in asked if one in farm]

@@ -34,6 +34,7 @@ from geofield.plan_files import save_plan
 from geofield.settings import Settings
 from geofield.staging import refuse_locked
 from geofield.staging.generations import copy_whole, earlier_of
+from geofield.wording import command
 
 #: Of a status row that a person's plan took the place of.
 _SAID = {"reviewed": True, "error": "", "hint": "", "notes": ""}
@@ -188,8 +189,8 @@ def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> N
         if but is None or not file.samefile(but):
             raise FormatError(
                 f"{file_of(one)} has edits that the farm does not hold yet.",
-                hint=f"Take them in first: geofield farm put {file} {store.place}; or move that "
-                "file out of the farm.",
+                hint=f"Take them in first: {command('farm', 'put', file, Path(store.place))}; or "
+                "move that file out of the farm.",
             )
 
 

@@ -27,6 +27,7 @@ from geofield.plan_files import save_plan
 from geofield.review.desk import Desk
 from geofield.review.plans import REVIEWING, journal_path
 from geofield.staging import claimed
+from geofield.wording import command
 
 #: Fields up to which a farm's overview is written anew (seconds) whenever one is saved; that of a
 #: larger farm when the session ends.
@@ -115,7 +116,7 @@ class FarmDesk(Desk):
             return f"{overview} does not show yet what was saved: {error}"
         return (
             f"{overview} does not show yet what was saved: it has edits of its own. Take them in: "
-            f"geofield farm put {overview} {self._folder}"
+            f"{command('farm', 'put', overview, self._folder)}"
         )
 
 
