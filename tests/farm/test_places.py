@@ -41,6 +41,9 @@ def written(kind: str, folder: Path) -> Path:
         POINTS.to_csv(path, index=False)
     elif kind == "german.csv":
         POINTS.to_csv(path, index=False, sep=";", decimal=",", encoding="utf-8-sig")
+    elif kind == "excel.csv":
+        rows = POINTS.to_csv(index=False, sep=";", decimal=",", lineterminator="\r\n")
+        path.write_bytes(f"sep=;\r\n{rows}".encode())
     elif kind == "german.txt.csv":
         POINTS.to_csv(path, index=False, sep="\t", decimal=",", encoding="utf-8-sig")
     elif kind == "plain.parquet":
@@ -61,6 +64,7 @@ def written(kind: str, folder: Path) -> Path:
     [
         "csv",
         "german.csv",
+        "excel.csv",
         "german.txt.csv",
         "wkt.csv",
         "plain.parquet",

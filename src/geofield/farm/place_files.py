@@ -91,7 +91,10 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     try:
         with path.open("rb") as file:
             head = file.read(1 << 16)
-        first = head.decode("utf-8-sig", errors="replace").partition("\n")[0].strip("\r")
+        lines = head.decode("utf-8-sig", errors="replace").split("\n", 2)
+        # A line such as sep=; is Excel's: what stands between the columns.
+        above = int(lines[0].lower().startswith("sep=") and len(lines) > 1)
+        first = lines[above].strip("\r")
         if not first:
             raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS)
         mark = max(";\t,", key=first.count)
@@ -100,7 +103,7 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
         comma = mark != "," and re.search(rb"[;\t\n]-?\d+,\d+", head) is not None
         table = pc.read_csv(
             path,
-            read_options=pc.ReadOptions(column_names=names, skip_rows=1),
+            read_options=pc.ReadOptions(column_names=names, skip_rows=above + 1),
             parse_options=pc.ParseOptions(delimiter=mark, newlines_in_values=True),
             convert_options=pc.ConvertOptions(
                 column_types={name: pa.string() for name in names if name.lower() in texts},
