@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import rasterio
 
-from geofield.cli.degrees import angle_of
+from geofield.angles import angle_of
 from geofield_command import run_geofield
 
 SAMPLE = Path(__file__).parents[1] / "sample_data/field_1.tif"

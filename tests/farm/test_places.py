@@ -44,6 +44,13 @@ def written(kind: str, folder: Path) -> Path:
     elif kind == "excel.csv":
         rows = POINTS.to_csv(index=False, sep=";", decimal=",", lineterminator="\r\n")
         path.write_bytes(f"sep=;\r\n{rows}".encode())
+    elif kind == "receiver.csv":
+        # As receivers show them: minutes with decimals and a letter.
+        shown = {
+            name: [f"{letter} {int(x)}° {x % 1 * 60:.7f}" for x in POINTS[name]]
+            for name, letter in (("lat", "N"), ("lon", "E"))
+        }
+        POINTS.assign(**shown).to_csv(path, index=False)
     elif kind == "german.txt.csv":
         POINTS.to_csv(path, index=False, sep="\t", decimal=",", encoding="utf-8-sig")
     elif kind == "plain.parquet":
@@ -65,6 +72,7 @@ def written(kind: str, folder: Path) -> Path:
         "csv",
         "german.csv",
         "excel.csv",
+        "receiver.csv",
         "german.txt.csv",
         "wkt.csv",
         "plain.parquet",

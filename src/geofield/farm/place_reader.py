@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
+from geofield.angles import angle_of
 from geofield.crs import LONLAT, authority_name, parse_crs, refuse_outside, transformer
 from geofield.datum import datum_notes
 from geofield.errors import CRSError, FormatError
@@ -85,7 +86,7 @@ def read_places(
         kept, part, outlines, lat, lon = _shapes(raw, raw.geometry, source, notes)
         used = {id_name, name_name, raw.geometry_name}
     elif lat_name and lon_name:
-        lat, lon = (_numbers(raw, name) for name in (lat_name, lon_name))
+        lat, lon = _degrees(raw, lat_name, "NS"), _degrees(raw, lon_name, "EW")
         used = {id_name, name_name, lat_name, lon_name}
     else:
         raise FormatError(
@@ -131,8 +132,10 @@ def read_table(path: Path) -> gpd.GeoDataFrame:
             f"{raw.name} has no columns lat and lon and no geometry.",
             hint=f"It has {', '.join(raw.table.column_names)}; rename them to lat and lon.",
         )
-    x, y = (_numbers(raw, str(name)) for name in names)
-    if names == lonlat:
+    if names != lonlat:
+        x, y = (_numbers(raw, str(name)) for name in names)
+    else:
+        x, y = (_degrees(raw, str(name), of) for name, of in zip(names, ("EW", "NS"), strict=True))
         _check_positions(raw, y, x, np.arange(len(x)), LONLAT)
     known = np.isfinite(x) & np.isfinite(y)
     points = np.full(len(x), None)
@@ -247,6 +250,18 @@ def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
         )
 
 
+def _degrees(raw: RawPlaces, name: str, letters: str) -> NDArray[np.float64]:
+    """A column's latitudes or longitudes, which may be written as for the options."""
+    try:
+        return _numbers(raw, name)
+    except FormatError:
+        texts = [(text or "").strip() for text in raw.table[name].to_pylist()]
+        angles = [angle_of(text, letters) if text else np.nan for text in texts]
+        if None in angles:
+            raise
+        return np.array(angles, dtype=np.float64)
+
+
 def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
     """A column's numbers; missing ones are not a number."""
     column = raw.table[name]
@@ -258,7 +273,7 @@ def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
     except pa.ArrowInvalid as error:
         raise FormatError(
             f"{raw.name}: column {name!r} holds something that is no number ({error}).",
-            hint="Write degrees as 35.0754.",
+            hint="Write degrees as 35.0754 or 35 4.524 N.",
         ) from None
 
 
