@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import subprocess
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -41,12 +40,14 @@ def command(*words: str | Path) -> str:
     >>> command("farm", "put", Path("farm.gpkg"), Path("-My farm"))
     "geofield farm put farm.gpkg './-My farm'"
     """
+    from subprocess import list2cmdline  # late: it takes as long as the rest of this module
+
     # Of a path that begins with a dash an option would be made.
     plain = [
         f"./{word}" if isinstance(word, Path) and str(word).startswith("-") else str(word)
         for word in words
     ]
-    return f"geofield {subprocess.list2cmdline(plain) if os.name == 'nt' else shlex.join(plain)}"
+    return f"geofield {list2cmdline(plain) if os.name == 'nt' else shlex.join(plain)}"
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
