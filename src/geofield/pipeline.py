@@ -38,6 +38,7 @@ from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarn
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
 from geofield.model.merge import merge
+from geofield.model.obstacles import on_grid
 from geofield.model.review import reconcile
 from geofield.model.scene import Scene
 from geofield.model.searched import searched_in
@@ -209,7 +210,7 @@ def run_field(
         edits = read_track_edits(previous).reprojected(previous.field.crs, field.crs)
     if previous is not None and previous.obstacles is not None:
         obstacles, written = reconcile(previous.obstacles, previous.evidence.written, scene.grid)
-        obstacles = obstacles.to_crs(field.crs)
+        obstacles = on_grid(obstacles, scene.grid).to_crs(field.crs)
         written = written.reprojected(previous.field.crs, field.crs)
     return Plan(
         field=field,
@@ -304,7 +305,9 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
         written = Written.of(detected, np.zeros(len(detected), bool))
     else:
         earlier, written = reconcile(plan.obstacles, plan.evidence.written, scene.grid)
-        detected, written, told = merge(detected, earlier, written)
+        detected, written, told = merge(
+            detected, earlier, written, plan.field.polygon, scene.grid, scene.shown_px
+        )
         changes += (told.in_words(),)
     return replace(
         plan,

@@ -47,7 +47,7 @@ def shown_ground(valid: NDArray[np.bool_], pixel_m: float) -> Shown | None:
 
 def edge_strip(grid: Grid, crs: CRS, shown_px: Shown | None, near: float) -> BaseGeometry:
     """What lies near to the edge of a picture, in a CRS and its units."""
-    return shapely.buffer(_ground(grid, crs, shown_px).boundary, near, join_style="mitre")
+    return shapely.buffer(ground(grid, crs, shown_px).boundary, near, join_style="mitre")
 
 
 def along_frame(
@@ -60,7 +60,7 @@ def along_frame(
     if grid is None:
         return []
     near = NEAR_PX * grid.ground_resolution_m * float(ground_scale_of(polygon, crs))
-    return along_edge(polygon, _ground(grid, crs, shown_px), near)
+    return along_edge(polygon, ground(grid, crs, shown_px), near)
 
 
 def along_edge(polygon: Polygon, shown: Shown, near: float) -> list[LineString]:
@@ -74,7 +74,7 @@ def along_edge(polygon: Polygon, shown: Shown, near: float) -> list[LineString]:
     ]
 
 
-def _ground(grid: Grid, crs: CRS, shown_px: Shown | None) -> Shown:
+def ground(grid: Grid, crs: CRS, shown_px: Shown | None) -> Shown:
     """What a picture shows, in a CRS."""
     if shown_px is None:
         w, h = grid.width_px, grid.height_px

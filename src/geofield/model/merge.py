@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import shapely
 from numpy.typing import NDArray
+from pyproj import CRS
 
 from geofield import schema
-from geofield.model.obstacles import next_number
+from geofield.grid import Grid
+from geofield.model.frame import Shown, ground
+from geofield.model.obstacles import next_number, on_grid
 from geofield.model.written import Written, matches, shapes_of_plain
 from geofield.wording import counted
 
@@ -24,6 +28,8 @@ class Changes:
 
     #: Rows that are a person's word.
     kept: int = 0
+    #: Other rows that stay, for the picture does not show where they stand.
+    unseen: int = 0
     #: found_again, new, gone: other rows that were there before and are found again; that were not;
     #: that no longer are.
     found_again: int = 0
@@ -38,33 +44,45 @@ class Changes:
         words = [kept, f"{self.found_again} found again"]
         for count, what in ((self.new, "new"), (self.gone, "gone")):
             words += [f"{count} {what}"] if count else []
+        if self.unseen:
+            words.append(f"{self.unseen} left where the picture shows nothing")
         if self.stay_deleted:
             words.append(f"{self.stay_deleted} you took away not taken up again")
         return ", ".join(words)
 
 
 def merge(
-    detected: gpd.GeoDataFrame, previous: gpd.GeoDataFrame, written: Written
+    detected: gpd.GeoDataFrame,
+    previous: gpd.GeoDataFrame,
+    written: Written,
+    outline: shapely.Polygon,
+    grid: Grid,
+    shown_px: Shown | None = None,
 ) -> tuple[gpd.GeoDataFrame, Written, Changes]:
     """Join a new detection with an earlier table, in which a person's word stands.
 
     Rows that are a person's word stay as they are; a detection of the same object gives way to
     them. What a person took away is not found again. Other detections keep the number and the
     user's own columns that they had before where they are found again; new ones get fresh numbers.
+    What stands in the field where the picture shows nothing is neither found nor gone: it stays.
 
-    `previous` is in the same CRS, and `written` its record, both as :func:`reconcile` returned
-    them.
+    `previous` and the field's `outline` are in the same CRS, and `written` is the record, as
+    :func:`reconcile` returned them. `grid` is the picture's, `shown_px` where it has data.
     """
     record = written.by_number
     kept = np.array([record[number].kept for number in previous["obstacle_no"]], dtype=bool)
-    word, earlier = previous[kept], previous[~kept].reset_index(drop=True)
-    known = matches(detected.geometry, word.geometry) >= 0
-    fresh = detected[~known].reset_index(drop=True)
-    # What was taken away competes with what is still there: a neighbour stays itself.
-    places = np.concatenate([earlier.geometry.to_numpy(), shapes_of_plain(written.removed)])
-    match = matches(fresh.geometry, places)
-    taken_away = match >= len(earlier)
-    fresh, match = fresh[~taken_away].reset_index(drop=True), match[~taken_away]
+    previous, shapes = on_grid(previous, grid), previous.geometry.to_numpy()
+    shown = ground(grid, CRS(detected.crs), shown_px)
+    unseen = shapely.intersects(shapely.Polygon(outline.exterior), shapes)
+    unseen &= ~kept & ~shapely.intersects(shown, shapely.centroid(shapes))
+    stays = kept | unseen
+    word, earlier = previous[stays], previous[~stays].reset_index(drop=True)
+    # All that was there competes: a neighbour of what a person looked at stays itself.
+    taken = [word.geometry.to_numpy(), shapes_of_plain(written.removed)]
+    match = matches(detected.geometry, np.concatenate([earlier.geometry.to_numpy(), *taken]))
+    taken_away = match >= len(earlier) + len(word)
+    free = match < len(earlier)
+    fresh, match = detected[free].reset_index(drop=True), match[free]
     again = (match >= 0) & ~pd.Series(match).duplicated().to_numpy()
     numbers = np.zeros(len(fresh), dtype=np.int64)
     old = earlier["obstacle_no"].to_numpy(dtype=np.int64)
@@ -78,15 +96,16 @@ def merge(
     joined = pd.concat(parts) if parts else fresh
     result = schema.conform(schema.OBSTACLES, joined, extras=True)
     result.attrs.update(detected.attrs)
-    stays = result["obstacle_no"].isin(word["obstacle_no"]).to_numpy(bool)
+    is_word = result["obstacle_no"].isin(previous["obstacle_no"][kept]).to_numpy(bool)
     changes = Changes(
-        kept=len(word),
+        kept=int(kept.sum()),
+        unseen=int(unseen.sum()),
         found_again=int(again.sum()),
         new=int((~again).sum()),
         gone=len(earlier) - int(again.sum()),
         stay_deleted=int(taken_away.sum()),
     )
-    return result, Written.of(result, stays, written.removed), changes
+    return result, Written.of(result, is_word, written.removed), changes
 
 
 def _taken(series: pd.Series[Any], rows: NDArray[np.int64]) -> Any:

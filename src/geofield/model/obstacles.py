@@ -30,6 +30,8 @@ QUARTER_SEGMENTS = 16
 POINT_RADIUS_M = 2.0
 #: A fence or wire drawn as a line becomes a strip of this half width, metres.
 LINE_HALF_WIDTH_M = 0.05
+#: Positions in a picture that differ by less are the same, pixels.
+_SAME_PX = 0.01
 #: A polygon with a vertex farther than this from its row's circle was redrawn by a person:
 #: metres (formats round to about a centimetre) and share of the radius (other UTM zones).
 _CIRCLE_TOLERANCE = (0.02, 0.002)
@@ -164,6 +166,16 @@ def from_polygons(
         shapely.orient_polygons(grown),
         crs,
     )
+
+
+def on_grid(obstacles: gpd.GeoDataFrame, grid: Grid) -> gpd.GeoDataFrame:
+    """The same with pixel positions and radii in the picture of a grid, which may be another."""
+    x, y = grid.from_lonlat(floats(obstacles, "lon"), floats(obstacles, "lat"))
+    off = np.hypot(x - floats(obstacles, "x_px"), y - floats(obstacles, "y_px"))
+    if (off <= _SAME_PX).all():
+        return obstacles
+    radius_px = floats(obstacles, "radius_m") / grid.resolution_at(x, y)
+    return obstacles.assign(x_px=x, y_px=y, radius_px=radius_px)
 
 
 def active(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:

@@ -199,20 +199,26 @@ def same_shapes(one: Any, other: Any, tolerance_m: float = SAME_M) -> NDArray[np
 def matches(shapes: Any, others: Any) -> NDArray[np.int64]:
     """For each shape the nearest other that is the same object, by position; -1 for none.
 
-    Two shapes are the same object when the centre of one lies in the other.
+    Two shapes are the same object when the centre of one lies in the other; that of a bent shape
+    is a point in it.
     """
     mine, theirs = np.asarray(shapes, dtype=object), np.asarray(others, dtype=object)
     result = np.full(len(mine), -1, dtype=np.int64)
     if not len(mine) or not len(theirs):
         return result
     rows, candidates = shapely.STRtree(theirs).query(mine, predicate="intersects")
-    centre, other = shapely.centroid(mine)[rows], shapely.centroid(theirs)[candidates]
+    centre, other = _middles(mine)[rows], _middles(theirs)[candidates]
     same = shapely.intersects(centre, theirs[candidates]) | shapely.intersects(other, mine[rows])
     distance = shapely.distance(centre, other)
     for index in np.argsort(distance, kind="stable"):
         if same[index] and result[rows[index]] < 0:
             result[rows[index]] = candidates[index]
     return result
+
+
+def _middles(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
+    centre = shapely.centroid(shapes)
+    return np.where(shapely.intersects(centre, shapes), centre, shapely.point_on_surface(shapes))
 
 
 def _moved(shape: PlainShape, source: CRS, target: CRS) -> PlainShape:
