@@ -56,7 +56,7 @@ def save_plan(
     `output` may be `read_from`, the GeoPackage that the plan was read from: a stage that adds to a
     file replaces it in one step. `overwrite` allows to replace another, but none of the `inputs`:
     all other files that were read. The project shows the `picture`, by default that which belongs
-    to `read_from`.
+    to `read_from` where the plan still is of that.
     """
     from geofield.formats import write_dataset
     from geofield.formats.gpkg_read import scene_beside
@@ -67,7 +67,7 @@ def save_plan(
         output = read_from = output.resolve()
     dataset = plan.to_dataset()
     if picture is None and read_from is not None:
-        picture = scene_beside(read_from)
+        picture = scene_beside(read_from, dataset.provenance.source)
     if picture is not None and output.resolve().parent == picture.resolve().parent:
         # The project goes on showing the picture that lies there.
         dataset = replace(dataset, scene_path=picture)

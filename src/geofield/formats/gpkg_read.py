@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,14 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.errors import FormatError, FormatWarning
+from geofield.errors import FormatError, FormatWarning, ImageryError
 from geofield.formats import origin
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
+from geofield.imagery import source_of
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
 from geofield.model.merged_rows import parts_apart
+from geofield.model.scene import ImagerySource
 from geofield.notes import warn
 from geofield.strangers import database, is_geopackage
 from geofield.wording import counted
@@ -124,16 +127,39 @@ def _points_in(path: Path, crs: CRS) -> Iterator[gpd.GeoDataFrame]:
                 yield _own_table(layer, frame, crs, path)
 
 
-def scene_beside(path: Path) -> Path | None:
-    """The picture beside a GeoPackage of geofield that belongs to it, where it is there."""
-    return _scene(record_of(path), path)
+def scene_beside(path: Path, source: ImagerySource | None = None) -> Path | None:
+    """The picture beside a GeoPackage of geofield that belongs to it, where it is there.
+
+    It is of the `source`, by default that of the plan: one of another year shows other trees.
+    """
+    return _scene(record_of(path), path, source)
 
 
-def _scene(record: origin.Origin | None, path: Path) -> Path | None:
+def _scene(
+    record: origin.Origin | None, path: Path, source: ImagerySource | None = None
+) -> Path | None:
     # A name alone: a stranger's file leads to no other folder.
     name = None if record is None else Path(str(record.scene or "")).name
     scene = path.parent / name if name else None
-    return scene if scene is not None and scene.is_file() else None
+    if record is None or scene is None or not scene.is_file():
+        return None
+    source = source or record.provenance.source
+    with suppress(ImageryError):  # one that cannot be opened is told where it is drawn
+        shown = source_of(scene)
+        told = source.name and shown.name != scene.name
+        if told and (shown.name, shown.date) != (source.name, source.date):
+            warn(
+                f"{scene.name} beside {path.name} is of {_dated(shown)}, the plan of "
+                f"{_dated(source)}: it is not shown. `geofield run` puts the plan's picture there.",
+                FormatWarning,
+                stacklevel=3,
+            )
+            return None
+    return scene
+
+
+def _dated(source: ImagerySource) -> str:
+    return f"{source.name} ({source.date})" if source.date else source.name
 
 
 def in_own_terms(

@@ -12,7 +12,7 @@ from geofield.late import late_names
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
-    from geofield.imagery.facts import picture_facts
+    from geofield.imagery.facts import picture_facts, source_of
     from geofield.imagery.opening import FetchOptions
     from geofield.imagery.pictures import open_reader
     from geofield.imagery.place_picture import Imagery, PlacePicture, is_own_picture
@@ -34,6 +34,7 @@ __all__ = [
     "open_reader",
     "picture_facts",
     "read_scene",
+    "source_of",
     "write_scene",
 ]
 
@@ -41,7 +42,7 @@ __getattr__ = late_names(
     __name__,
     {
         "acquisition": "Acquired Where acquire",
-        "facts": "picture_facts",
+        "facts": "picture_facts source_of",
         "opening": "FetchOptions",
         "pictures": "open_reader",
         "place_picture": "Imagery PlacePicture is_own_picture",

@@ -15,7 +15,8 @@ from rasterio.windows import Window
 from geofield.errors import CRSError
 from geofield.imagery.bands import OPAQUE, BandRoles, Look, find_roles, look_of
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, to_pyproj
-from geofield.imagery.tags import notes_from_tags, roles_from_tags
+from geofield.imagery.tags import notes_from_tags, roles_from_tags, source_from_tags
+from geofield.model.scene import ImagerySource
 
 _SAMPLE_PX = 128
 
@@ -50,6 +51,12 @@ def picture_facts(path: str | Path) -> dict[str, list[str]]:
     with gdal_env(str(path)), open_picture(str(path)) as dataset:
         tags = dataset.tags()
     return {"bands": list(roles_from_tags(tags) or ()), "notes": list(notes_from_tags(tags))}
+
+
+def source_of(path: str | Path) -> ImagerySource:
+    """Where a picture comes from, by its own word."""
+    with gdal_env(str(path)), open_picture(str(path)) as dataset:
+        return source_from_tags(dataset.tags(), str(path))
 
 
 def _sample(dataset: Any, band: int) -> NDArray[Any]:
