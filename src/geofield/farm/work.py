@@ -13,14 +13,21 @@ import shapely
 
 from geofield.crs import LONLAT, metric_crs, parse_crs, reproject, transformer
 from geofield.earlier import drew_outline, holds, with_said_tracks
-from geofield.errors import FieldError, FieldWarning, GeofieldWarning
+from geofield.errors import (
+    FieldError,
+    FieldWarning,
+    GeofieldWarning,
+    ImageryError,
+    PointOutsideError,
+)
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
-from geofield.notes import warn
+from geofield.model.scene import ImagerySource
+from geofield.notes import listening, warn
 from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
 from geofield.settings import Settings
@@ -56,8 +63,8 @@ class Job:
 def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
     """The plan of one place; of a `previous` one what a person said stays.
 
-    It gets the parcel as it is now, unless they drew its outline, and what is new in the file of
-    obstacles.
+    It gets the parcel as it is now, unless they drew its outline, what is new in the file of
+    obstacles, and what other pictures than its own show.
 
     Raises
     ------
@@ -75,7 +82,8 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
         settings, said = with_said_tracks(settings, previous)
         for words in said:
             warn(words, FieldWarning, stacklevel=2)
-        if previous is reviewed and _same_stages(previous.settings, settings):
+        same = previous is reviewed and _same_stages(previous.settings, settings)
+        if same and not _shown_anew(previous, place, settings, job.imagery):
             return _named(previous, place)
     boundary = None if place.outline is None or previous is not None else parcel_of(place)
     if job.imagery is not None:
@@ -201,8 +209,40 @@ def _on_picture(
         )  # fmt: skip
         if previous is not None:
             plan = replace(plan, evidence=replace(plan.evidence, farm=previous.evidence.farm))
-        plan = _around(plan, job)
-        return run_obstacles(plan, plan.scene or window, settings=seen)
+        plan = run_obstacles(_around(plan, job), plan.scene or window, settings=seen)
+        if previous is not None and not _of_one_picture(plan.source, previous.source):
+            warn(
+                f"Planned on {plan.source.name}, no longer on "
+                f"{previous.source.name or 'no picture'}: {'; '.join(plan.changes)}.",
+                FieldWarning,
+                stacklevel=2,
+            )
+        return plan
+
+
+def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Imagery | None) -> bool:
+    """Whether the pictures of now are others than a reviewed plan was made on, and show its field.
+
+    Warns
+    -----
+    FieldWarning
+        When they do not show it.
+    """
+    if imagery is None:
+        return False
+    if imagery.source is not None:
+        return imagery.source.name != reviewed.source.name  # nothing is fetched to ask
+    try:
+        with listening():  # told where it is planned on
+            scene = open_scene(imagery.path, place.lat, place.lon, settings, outline=reviewed.field)
+    except (FieldError, ImageryError, PointOutsideError) as error:
+        warn(f"It stays as reviewed: {error.message}", FieldWarning, stacklevel=3)
+        return False
+    return not _of_one_picture(scene.source, reviewed.source)
+
+
+def _of_one_picture(one: ImagerySource, other: ImagerySource) -> bool:
+    return (one.name, one.date) == (other.name, other.date)
 
 
 def _around(plan: Plan, job: Job) -> Plan:
