@@ -198,7 +198,7 @@ def run_field(
         field = replace(
             field,
             imagery=scene.source.name,
-            imagery_date=scene.source.date,
+            imagery_date=scene.source.day,
             licence=scene.source.licence,
         )
         field = field if previous is None else renamed(field, previous)

@@ -176,7 +176,7 @@ def extract_field(
         method=method if not regions else "study-manual",
         quality=quality,
         imagery=scene.source.name,
-        imagery_date=scene.source.date,
+        imagery_date=scene.source.day,
         licence=scene.source.licence,
         alternatives=tuple(
             Alternative(_to_metric(part.to_picture(one), whole), dict(its.figures)["certainty"])

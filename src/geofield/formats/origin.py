@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -151,8 +150,7 @@ def lineage(dataset: Dataset) -> str:
 
 def imagery_day(dataset: Dataset) -> str | None:
     """The day of the imagery, ISO 8601; None where nobody knows it."""
-    date = (dataset.provenance.source.date or "")[:10]
-    return date if re.fullmatch(r"\d{4}-\d{2}-\d{2}", date) else None
+    return dataset.provenance.source.day
 
 
 def timestamp(dataset: Dataset) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
+from datetime import date
 from functools import cached_property
 from typing import Any
 
@@ -56,6 +58,15 @@ class ImagerySource:
     may_cache: bool = True
     zoom: int | None = None
     details: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def day(self) -> str | None:
+        """The day of `date`, YYYY-MM-DD; None where that tells none, as a year alone does not."""
+        parts = re.match(r"(\d{4})[-:]?(\d\d)[-:]?(\d\d)(?!\d)", self.date or "")
+        try:
+            return str(date(*map(int, parts.groups()))) if parts else None
+        except ValueError:
+            return None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
