@@ -21,13 +21,14 @@ from geofield_command import run_geofield
 CROWN, BARE, HALF_PX = (265, 111), (230, 230), 16
 
 
-def of_year(folder: Path, year: int, *, first: int = 0, tree: bool = False, date: str = "") -> Path:
-    """The picture of another year: some of its columns, with one more `tree` in the field."""
+def of_year(folder: Path, year: int, *, first: int = 0, tree: int = 0, date: str = "") -> Path:
+    """The picture of another year: some of its columns, with one `tree` more or less."""
     path = folder / f"{year}.tif"
     with rasterio.open(folder / "picture.tif") as picture:
         pixels, profile, tags = picture.read(), picture.profile, picture.tags()
         if tree:
-            (x, y), (to_x, to_y), half = CROWN, BARE, HALF_PX
+            (x, y), (to_x, to_y) = (CROWN, BARE) if tree > 0 else (BARE, CROWN)
+            half = HALF_PX
             crown = pixels[:, y - half : y + half, x - half : x + half].copy()
             pixels[:, to_y - half : to_y + half, to_x - half : to_x + half] = crown
         shift = rasterio.Affine.translation(first, 0)
@@ -86,6 +87,18 @@ def test_what_a_picture_does_not_show_is_not_gone(folder: Path) -> None:
     again = rows(plan_in(folder))
     assert sorted(again.index) == sorted(set(before.index) - {4})
     assert np.allclose(again["x_px"], before["x_px"][again.index], atol=0.01)
+
+
+def test_a_confirmed_tree_that_is_not_there_any_more_stays_and_is_told(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    rewritten(file, "obstacles", lambda table: table.assign(status="confirmed"))
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert f"{len(before)} obstacles of yours kept" in told
+    assert "not found" not in told
+    told = geofield("obstacles", of_year(folder, 2018, tree=-1), file, "-o", file)
+    assert "1 you confirmed not found (1)" in told
+    assert rows(plan_in(folder))["status"][1] == "confirmed"
 
 
 def test_no_plan_is_shown_on_the_picture_of_another_year(
@@ -149,7 +162,7 @@ def test_a_reviewed_field_of_a_farm_is_searched_in_the_picture_of_another_year(
     rewritten(mine, "obstacles", said)
     geofield("farm", "put", mine, folder / "farm")
     before = rows(read_farm(folder / "farm")["a"])
-    told = geofield(*batch, of_year(folder, 2018, tree=True), *more, "--fresh")
+    told = geofield(*batch, of_year(folder, 2018, tree=1), *more, "--fresh")
     assert "Planned on 2018, no longer on simulated-11: " in told
     assert "1 obstacle of yours kept, 9 found again, 1 new, 1 you took" in " ".join(told.split())
     plan = read_farm(folder / "farm")["a"]

@@ -16,7 +16,7 @@ from geofield.grid import Grid
 from geofield.model.frame import Shown, ground
 from geofield.model.obstacles import next_number, on_grid
 from geofield.model.written import Written, matches, shapes_of_plain
-from geofield.wording import counted
+from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -28,6 +28,8 @@ class Changes:
 
     #: Rows that are a person's word.
     kept: int = 0
+    #: Numbers of those that a person confirmed, where the picture shows nothing like them.
+    unfound: tuple[int, ...] = ()
     #: Other rows that stay, for the picture does not show where they stand.
     unseen: int = 0
     #: found_again, new, gone: other rows that were there before and are found again; that were not;
@@ -44,6 +46,9 @@ class Changes:
         words = [kept, f"{self.found_again} found again"]
         for count, what in ((self.new, "new"), (self.gone, "gone")):
             words += [f"{count} {what}"] if count else []
+        if self.unfound:
+            numbers = some_of([str(number) for number in self.unfound], 8)
+            words.append(f"{len(self.unfound)} you confirmed not found ({numbers})")
         if self.unseen:
             words.append(f"{self.unseen} left where the picture shows nothing")
         if self.stay_deleted:
@@ -72,16 +77,21 @@ def merge(
     record = written.by_number
     kept = np.array([record[number].kept for number in previous["obstacle_no"]], dtype=bool)
     previous, shapes = on_grid(previous, grid), previous.geometry.to_numpy()
-    shown = ground(grid, CRS(detected.crs), shown_px)
-    unseen = shapely.intersects(shapely.Polygon(outline.exterior), shapes)
-    unseen &= ~kept & ~shapely.intersects(shown, shapely.centroid(shapes))
+    shown, field = ground(grid, CRS(detected.crs), shown_px), shapely.Polygon(outline.exterior)
+    centres = shapely.centroid(shapes)
+    seen = shapely.intersects(shown, centres)
+    unseen = ~seen & ~kept & shapely.intersects(field, shapes)
     stays = kept | unseen
     word, earlier = previous[stays], previous[~stays].reset_index(drop=True)
     # All that was there competes: a neighbour of what a person looked at stays itself.
     taken = [word.geometry.to_numpy(), shapes_of_plain(written.removed)]
     match = matches(detected.geometry, np.concatenate([earlier.geometry.to_numpy(), *taken]))
-    taken_away = match >= len(earlier) + len(word)
     free = match < len(earlier)
+    met = match[~free] - len(earlier)
+    # Outside the field nothing is looked for.
+    sought = (seen & shapely.intersects(field, centres))[stays]
+    confirmed = (word["status"] == "confirmed").to_numpy() & sought
+    unfound = np.setdiff1d(np.flatnonzero(confirmed), met)
     fresh, match = detected[free].reset_index(drop=True), match[free]
     again = (match >= 0) & ~pd.Series(match).duplicated().to_numpy()
     numbers = np.zeros(len(fresh), dtype=np.int64)
@@ -99,11 +109,12 @@ def merge(
     is_word = result["obstacle_no"].isin(previous["obstacle_no"][kept]).to_numpy(bool)
     changes = Changes(
         kept=int(kept.sum()),
+        unfound=tuple(word["obstacle_no"].iloc[unfound].tolist()),
         unseen=int(unseen.sum()),
         found_again=int(again.sum()),
         new=int((~again).sum()),
         gone=len(earlier) - int(again.sum()),
-        stay_deleted=int(taken_away.sum()),
+        stay_deleted=int((met >= len(word)).sum()),
     )
     return result, Written.of(result, is_word, written.removed), changes
 
