@@ -96,9 +96,22 @@ def test_a_confirmed_tree_that_is_not_there_any_more_stays_and_is_told(folder: P
     told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
     assert f"{len(before)} obstacles of yours kept" in told
     assert "not found" not in told
+    assert "smaller" not in told
     told = geofield("obstacles", of_year(folder, 2018, tree=-1), file, "-o", file)
     assert "1 you confirmed not found (1)" in told
     assert rows(plan_in(folder))["status"][1] == "confirmed"
+
+
+def test_a_tree_that_grew_out_of_its_confirmed_shape_is_told(folder: Path) -> None:
+    file = folder / "out/field.gpkg"
+
+    def small(table: Frame) -> Frame:
+        table.loc[at(table, 1), "geometry"] = table.geometry[at(table, 1)].centroid.buffer(1)
+        return table.assign(status=np.where(at(table, 2), "rejected", "confirmed"))
+
+    rewritten(file, "obstacles", small)
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert "1 of yours smaller than what is found there (1)" in told
 
 
 def test_no_plan_is_shown_on_the_picture_of_another_year(

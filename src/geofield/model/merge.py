@@ -14,12 +14,15 @@ from pyproj import CRS
 from geofield import schema
 from geofield.grid import Grid
 from geofield.model.frame import Shown, ground
-from geofield.model.obstacles import next_number, on_grid
+from geofield.model.obstacles import active, floats, next_number, on_grid
 from geofield.model.written import Written, matches, shapes_of_plain
 from geofield.wording import counted, some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
+
+#: Share of a crown outside all that is driven around from which that is told.
+_OUTGROWN = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,8 @@ class Changes:
     kept: int = 0
     #: Numbers of those that a person confirmed, where the picture shows nothing like them.
     unfound: tuple[int, ...] = ()
+    #: Numbers of those beside which a larger part of what is found there is driven through.
+    outgrown: tuple[int, ...] = ()
     #: Other rows that stay, for the picture does not show where they stand.
     unseen: int = 0
     #: found_again, new, gone: other rows that were there before and are found again; that were not;
@@ -46,9 +51,12 @@ class Changes:
         words = [kept, f"{self.found_again} found again"]
         for count, what in ((self.new, "new"), (self.gone, "gone")):
             words += [f"{count} {what}"] if count else []
-        if self.unfound:
-            numbers = some_of([str(number) for number in self.unfound], 8)
-            words.append(f"{len(self.unfound)} you confirmed not found ({numbers})")
+        for numbers, what in (
+            (self.unfound, "you confirmed not found"),
+            (self.outgrown, "of yours smaller than what is found there"),
+        ):
+            told = some_of([str(number) for number in numbers], 8)
+            words += [f"{len(numbers)} {what} ({told})"] if numbers else []
         if self.unseen:
             words.append(f"{self.unseen} left where the picture shows nothing")
         if self.stay_deleted:
@@ -107,8 +115,10 @@ def merge(
     result = schema.conform(schema.OBSTACLES, joined, extras=True)
     result.attrs.update(detected.attrs)
     is_word = result["obstacle_no"].isin(previous["obstacle_no"][kept]).to_numpy(bool)
+    found = detected[~free][met < len(word)]
     changes = Changes(
         kept=int(kept.sum()),
+        outgrown=_outgrown(found, word.iloc[met[met < len(word)]], result),
         unfound=tuple(word["obstacle_no"].iloc[unfound].tolist()),
         unseen=int(unseen.sum()),
         found_again=int(again.sum()),
@@ -117,6 +127,23 @@ def merge(
         stay_deleted=int((met >= len(word)).sum()),
     )
     return result, Written.of(result, is_word, written.removed), changes
+
+
+def _outgrown(
+    found: gpd.GeoDataFrame, said: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame
+) -> tuple[int, ...]:
+    """Numbers of rows that a person `said`, each found as in `found`, that grew out of all."""
+    sure = ~found["status"].isin(schema.NOT_AVOIDED).to_numpy(bool)
+    sure &= said["status"].isin({"confirmed", "added"}).to_numpy(bool)
+    found, said = found[sure], said[sure]
+    crowns = shapely.buffer(found.geometry.to_numpy(), -floats(found, "buffer_m"))
+    some = shapely.area(crowns) * _OUTGROWN
+    left = shapely.difference(crowns, said.geometry.to_numpy())
+    more = shapely.area(left) > some
+    if more.any():
+        left[more] = shapely.difference(left[more], shapely.union_all(active(obstacles).geometry))
+        more = shapely.area(left) > some
+    return tuple(sorted(set(said["obstacle_no"][more].tolist())))
 
 
 def _taken(series: pd.Series[Any], rows: NDArray[np.int64]) -> Any:
