@@ -99,6 +99,7 @@ def test_every_edit_survives_every_stage(
     once = plan_in(folder)
     count = len(before)
     said = f"outline as before; 8 obstacles of yours kept, {count - 9} found again, "
+    said += "1 you confirmed not found (8), "  # it was moved to where nothing stands
     assert said + "2 you took away not taken up again" in told
     assert len(json.loads((folder / "out/report.json").read_text())["changes"]) == 2
     check(before, rows(once))

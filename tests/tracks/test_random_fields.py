@@ -336,7 +336,8 @@ def test_turns_keep_to_the_ground_and_to_the_turning_radius(drives: list[Drive])
         curved = (turns["kind"] != "drive").to_numpy() & (drive.radius_m is not None)
         assert (turns["radius_m"].notna().to_numpy() == curved).all()
         for way in ways[fits & curved]:
-            assert least_radius(way) / scale > 0.9 * (drive.radius_m or 0.0)
+            assert drive.radius_m is not None
+            assert least_radius(way) / scale > 0.9 * drive.radius_m
             fitting += 1
     assert fitting > 150 or drives[0].radius_m is None
 
