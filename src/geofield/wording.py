@@ -40,7 +40,7 @@ def command(*words: str | Path) -> str:
     >>> command("farm", "put", Path("farm.gpkg"), Path("-My farm"))
     "geofield farm put farm.gpkg './-My farm'"
     """
-    from subprocess import list2cmdline  # late: it takes as long as the rest of this module
+    from subprocess import list2cmdline  # late: most commands tell no other
 
     # Of a path that begins with a dash an option would be made.
     plain = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -135,6 +136,21 @@ def test_no_plan_is_shown_on_the_picture_of_another_year(
     geofield("undo", file)
     told = geofield("refresh", file)
     assert "scene.tif beside field.gpkg is of 2022 (2022), the plan of 2020 (2020)" in told
+
+
+def test_a_plan_is_read_where_its_picture_may_not_be(
+    folder: Path, made: SimulatedField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(folder, made, "--overwrite")
+    opened = Path.open
+
+    def refused(path: Path, *args: Any, **more: Any) -> Any:
+        if path.name == "scene.tif":
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *args, **more)
+
+    monkeypatch.setattr(Path, "open", refused)
+    assert len(rows(plan_in(folder))) > 3
 
 
 def _project(out: Path) -> bytes:

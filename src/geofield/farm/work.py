@@ -26,7 +26,6 @@ from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
 from geofield.model.evidence import Evidence, outline_digest
 from geofield.model.field import Field
-from geofield.model.scene import ImagerySource
 from geofield.notes import listening, warn
 from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
@@ -210,7 +209,7 @@ def _on_picture(
         if previous is not None:
             plan = replace(plan, evidence=replace(plan.evidence, farm=previous.evidence.farm))
         plan = run_obstacles(_around(plan, job), plan.scene or window, settings=seen)
-        if previous is not None and not _of_one_picture(plan.source, previous.source):
+        if previous is not None and not plan.source.is_same_picture(previous.source):
             warn(
                 f"Planned on {plan.source.name}, no longer on "
                 f"{previous.source.name or 'no picture'}: {'; '.join(plan.changes)}.",
@@ -238,11 +237,7 @@ def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Image
     except (FieldError, ImageryError, PointOutsideError) as error:
         warn(f"It stays as reviewed: {error.message}", FieldWarning, stacklevel=3)
         return False
-    return not _of_one_picture(scene.source, reviewed.source)
-
-
-def _of_one_picture(one: ImagerySource, other: ImagerySource) -> bool:
-    return (one.name, one.date) == (other.name, other.date)
+    return not scene.source.is_same_picture(reviewed.source)
 
 
 def _around(plan: Plan, job: Job) -> Plan:

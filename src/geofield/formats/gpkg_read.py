@@ -143,14 +143,14 @@ def _scene(
     if record is None or scene is None or not scene.is_file():
         return None
     source = source or record.provenance.source
-    if _begins_with(scene, source):
-        return scene
-    from geofield.imagery import source_of
+    with suppress(ImageryError, OSError):  # one that cannot be opened is told where it is drawn
+        if _begins_with(scene, source):
+            return scene
+        from geofield.imagery import source_of
 
-    with suppress(ImageryError):  # one that cannot be opened is told where it is drawn
         shown = source_of(scene)
         told = source.name and shown.name != scene.name
-        if told and (shown.name, shown.date) != (source.name, source.date):
+        if told and not shown.is_same_picture(source):
             warn(
                 f"{scene.name} beside {path.name} is of {_dated(shown)}, the plan of "
                 f"{_dated(source)}: it is not shown. `geofield run` puts the plan's picture there.",

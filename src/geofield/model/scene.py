@@ -59,6 +59,10 @@ class ImagerySource:
     zoom: int | None = None
     details: tuple[tuple[str, str], ...] = ()
 
+    def is_same_picture(self, other: ImagerySource) -> bool:
+        """Whether both tell of one picture, as far as name and date tell pictures apart."""
+        return (self.name, self.date) == (other.name, other.date)
+
     @property
     def day(self) -> str | None:
         """The day of `date`, YYYY-MM-DD; None where that tells none, as a year alone does not."""
