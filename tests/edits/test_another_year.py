@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
+from shapely import LineString
 from shapely.affinity import translate
 
 from geofield import read_farm
@@ -65,6 +66,33 @@ def test_a_neighbour_of_what_was_reviewed_is_found_again(
         assert len(after) == len(before)
     assert plan.tracks is not None
     assert not plan.tracks.segments.intersects(before.geometry[3].buffer(-0.1)).any()
+
+
+def test_one_rejected_place_is_one_thing(folder: Path) -> None:
+    """A tree that grew half into a rejected circle was taken for it, and driven through."""
+    file = folder / "out/field.gpkg"
+    crown = rows(plan_in(folder)).geometry[1].centroid
+    told = geofield("obstacles", of_year(folder, 2017, tree=-1), file, "-o", file)
+    assert " found again, 1 gone (1)" in " ".join(told.split())
+    before = rows(plan_in(folder))
+    number = int(before.distance(crown).idxmin())
+
+    def rejected(table: Frame) -> Frame:
+        line = LineString([before.geometry[number].centroid, crown])
+        # The centres of both trees lie in it, and half of the new one.
+        circle = line.interpolate(0.45, normalized=True).buffer(0.57 * line.length)
+        table.loc[at(table, number), "geometry"] = circle
+        table.loc[at(table, number), "status"] = "rejected"
+        return table
+
+    rewritten(file, "obstacles", rejected)
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    new = int(before.index.max()) + 1
+    said = f"1 obstacle of yours kept, {len(before) - 1} found again, 1 new ({new})"
+    assert said in " ".join(told.split())
+    after = rows(plan_in(folder))
+    assert after["status"][[number, new]].tolist() == ["rejected", "detected"]
+    assert after.geometry[new].distance(crown) == 0
 
 
 def test_what_a_picture_does_not_show_is_not_gone(folder: Path) -> None:
@@ -193,7 +221,8 @@ def test_a_reviewed_field_of_a_farm_is_searched_in_the_picture_of_another_year(
     before = rows(read_farm(folder / "farm")["a"])
     told = geofield(*batch, of_year(folder, 2018, tree=1), *more, "--fresh")
     assert "Planned on 2018, no longer on simulated-11: " in told
-    assert "1 obstacle of yours kept, 9 found again, 1 new, 1 you took" in " ".join(told.split())
+    said = "1 obstacle of yours kept, 9 found again, 1 new (12), 1 you took"
+    assert said in " ".join(told.split())
     plan = read_farm(folder / "farm")["a"]
     after = rows(plan)
     assert plan.source.name == "2018"

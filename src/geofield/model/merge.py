@@ -21,7 +21,7 @@ from geofield.wording import counted, some_of
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: Share of a crown outside all that is driven around from which that is told.
+#: Share of a shape outside another from which it is more than that.
 _OUTGROWN = 0.3
 
 
@@ -37,11 +37,11 @@ class Changes:
     outgrown: tuple[int, ...] = ()
     #: Other rows that stay, for the picture does not show where they stand.
     unseen: int = 0
-    #: found_again, new, gone: other rows that were there before and are found again; that were not;
-    #: that no longer are.
+    #: Other rows that were there before and are found again.
     found_again: int = 0
-    new: int = 0
-    gone: int = 0
+    #: Numbers of rows that were not there before, and of other rows that no longer are.
+    new: tuple[int, ...] = ()
+    gone: tuple[int, ...] = ()
     #: Detections left out because a person took the obstacle away.
     stay_deleted: int = 0
 
@@ -49,9 +49,9 @@ class Changes:
         """One line for people."""
         kept = f"{counted(self.kept, 'obstacle')} of yours kept"
         words = [kept, f"{self.found_again} found again"]
-        for count, what in ((self.new, "new"), (self.gone, "gone")):
-            words += [f"{count} {what}"] if count else []
         for numbers, what in (
+            (self.new, "new"),
+            (self.gone, "gone"),
             (self.unfound, "you confirmed not found"),
             (self.outgrown, "of yours smaller than what is found there"),
         ):
@@ -75,9 +75,10 @@ def merge(
     """Join a new detection with an earlier table, in which a person's word stands.
 
     Rows that are a person's word stay as they are; a detection of the same object gives way to
-    them. What a person took away is not found again. Other detections keep the number and the
-    user's own columns that they had before where they are found again; new ones get fresh numbers.
-    What stands in the field where the picture shows nothing is neither found nor gone: it stays.
+    them, as does a further one that hardly reaches out of them. What a person took away is not
+    found again. Other detections keep the number and the user's own columns that they had before
+    where they are found again; new ones get fresh numbers. What stands in the field where the
+    picture shows nothing is neither found nor gone: it stays.
 
     `previous` and the field's `outline` are in the same CRS, and `written` is the record, as
     :func:`reconcile` returned them. `grid` is the picture's, `shown_px` where it has data.
@@ -93,7 +94,10 @@ def merge(
     word, earlier = previous[stays], previous[~stays].reset_index(drop=True)
     # All that was there competes: a neighbour of what a person looked at stays itself.
     taken = [word.geometry.to_numpy(), shapes_of_plain(written.removed)]
-    match = matches(detected.geometry, np.concatenate([earlier.geometry.to_numpy(), *taken]))
+    before = np.concatenate([earlier.geometry.to_numpy(), *taken])
+    match = matches(detected.geometry, before, once=True)
+    further = np.flatnonzero(match < 0)
+    match[further] = _mostly_in(detected.geometry.to_numpy()[further], before, len(earlier))
     free = match < len(earlier)
     met = match[~free] - len(earlier)
     # Outside the field nothing is looked for.
@@ -101,7 +105,7 @@ def merge(
     confirmed = (word["status"] == "confirmed").to_numpy() & sought
     unfound = np.setdiff1d(np.flatnonzero(confirmed), met)
     fresh, match = detected[free].reset_index(drop=True), match[free]
-    again = (match >= 0) & ~pd.Series(match).duplicated().to_numpy()
+    again = match >= 0
     numbers = np.zeros(len(fresh), dtype=np.int64)
     old = earlier["obstacle_no"].to_numpy(dtype=np.int64)
     numbers[again] = old[match[again]]
@@ -122,11 +126,23 @@ def merge(
         unfound=tuple(word["obstacle_no"].iloc[unfound].tolist()),
         unseen=int(unseen.sum()),
         found_again=int(again.sum()),
-        new=int((~again).sum()),
-        gone=len(earlier) - int(again.sum()),
+        new=tuple(numbers[~again].tolist()),
+        gone=tuple(np.delete(old, match[again]).tolist()),
         stay_deleted=int((met >= len(word)).sum()),
     )
     return result, Written.of(result, is_word, written.removed), changes
+
+
+def _mostly_in(
+    shapes: NDArray[np.object_], others: NDArray[np.object_], first: int
+) -> NDArray[np.int64]:
+    """For each shape an other, from the `first` on, that it hardly reaches out of; or -1."""
+    result = np.full(len(shapes), -1, dtype=np.int64)
+    rows, candidates = shapely.STRtree(others[first:]).query(shapes, predicate="intersects")
+    out = shapely.area(shapely.difference(shapes[rows], others[first:][candidates]))
+    held = out <= _OUTGROWN * shapely.area(shapes[rows])
+    result[rows[held]] = first + candidates[held]
+    return result
 
 
 def _outgrown(

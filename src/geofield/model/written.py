@@ -196,11 +196,11 @@ def same_shapes(one: Any, other: Any, tolerance_m: float = SAME_M) -> NDArray[np
     return result
 
 
-def matches(shapes: Any, others: Any) -> NDArray[np.int64]:
+def matches(shapes: Any, others: Any, *, once: bool = False) -> NDArray[np.int64]:
     """For each shape the nearest other that is the same object, by position; -1 for none.
 
     Two shapes are the same object when the centre of one lies in the other; that of a bent shape
-    is a point in it.
+    is a point in it. With `once` the nearest pairs come first, and no other is two shapes' match.
     """
     mine, theirs = np.asarray(shapes, dtype=object), np.asarray(others, dtype=object)
     result = np.full(len(mine), -1, dtype=np.int64)
@@ -210,9 +210,11 @@ def matches(shapes: Any, others: Any) -> NDArray[np.int64]:
     centre, other = _middles(mine)[rows], _middles(theirs)[candidates]
     same = shapely.intersects(centre, theirs[candidates]) | shapely.intersects(other, mine[rows])
     distance = shapely.distance(centre, other)
+    met = np.zeros(len(theirs), dtype=bool)
     for index in np.argsort(distance, kind="stable"):
-        if same[index] and result[rows[index]] < 0:
-            result[rows[index]] = candidates[index]
+        row, candidate = rows[index], candidates[index]
+        if same[index] and result[row] < 0 and not (once and met[candidate]):
+            result[row], met[candidate] = candidate, True
     return result
 
 
