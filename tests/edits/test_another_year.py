@@ -221,8 +221,8 @@ def test_a_reviewed_field_of_a_farm_is_searched_in_the_picture_of_another_year(
     before = rows(read_farm(folder / "farm")["a"])
     told = geofield(*batch, of_year(folder, 2018, tree=1), *more, "--fresh")
     assert "Planned on 2018, no longer on simulated-11: " in told
-    said = "1 obstacle of yours kept, 9 found again, 1 new (12), 1 you took"
-    assert said in " ".join(told.split())
+    changes = "1 obstacle of yours kept, 9 found again, 1 new (12), 1 you took"
+    assert changes in " ".join(told.split())
     plan = read_farm(folder / "farm")["a"]
     after = rows(plan)
     assert plan.source.name == "2018"

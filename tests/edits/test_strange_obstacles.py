@@ -89,3 +89,37 @@ def test_a_radius_of_nothing_is_none(folder: Path) -> None:
     after = rows(plan_in(folder))
     assert after.geometry[2].equals_exact(before.geometry[2], 1e-6)
     assert after["radius_m"].equals(before["radius_m"])
+
+
+@pytest.mark.parametrize("typed", [None, 2**31 - 1])
+def test_the_number_of_what_was_taken_away_is_no_other_s(folder: Path, typed: int | None) -> None:
+    """The last obstacle, taken away while another was drawn, was found again; a huge number that
+    was typed led to numbers that no file holds."""
+    file = folder / "out/field.gpkg"
+    before = rows(plan_in(folder))
+    last = int(before.index.max())
+    place = plan_in(folder).field.polygon.representative_point().buffer(1.5)
+
+    def exchanged(table: Frame) -> Frame:
+        rest = table[~at(table, last)].copy()
+        if typed:
+            rest.loc[at(rest, 1), "obstacle_no"] = typed
+        return pd.concat([rest, gpd.GeoDataFrame(geometry=[place], crs=table.crs)])
+
+    rewritten(file, "obstacles", exchanged)
+    told = geofield("obstacles", folder / "picture.tif", file, "-o", file)
+    assert "1 you took away not taken up again" in " ".join(told.split())
+    after = rows(plan_in(folder))
+    assert after["status"][last + 1] == "added"
+    assert not after.intersects(before.geometry[last].centroid).any()
+    assert sorted(set(after.index) - set(before.index)) == [last + 1, *[typed][: bool(typed)]]
+    # Nor once that, too, was taken away and forgotten.
+    rewritten(file, "obstacles", lambda table: table[~at(table, last + 1)])
+    geofield("tracks", file, "-o", file)
+
+    def drawn(table: Frame) -> Frame:
+        return pd.concat([table, gpd.GeoDataFrame(geometry=[place], crs=table.crs)])
+
+    rewritten(file, "obstacles", drawn)
+    geofield("tracks", file, "-o", file)
+    assert rows(plan_in(folder))["status"][last + 2] == "added"

@@ -270,7 +270,7 @@ def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
     table, written = schema.empty(schema.OBSTACLES, plan.field.crs), plan.evidence.written
     if plan.obstacles is not None:
         table, written = reconcile(plan.obstacles, written, plan.grid)
-    first = next_number(table)
+    first = max(next_number(table), written.last_no + 1 if written else 1)
     rows = rows.assign(obstacle_no=np.arange(first, first + len(rows)))
     parts = [part for part in (table, rows) if len(part)]
     joined = schema.conform(schema.OBSTACLES, pd.concat(parts, ignore_index=True), extras=True)

@@ -14,7 +14,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.grid import Grid
 from geofield.model.frame import Shown, ground
-from geofield.model.obstacles import active, floats, next_number, on_grid
+from geofield.model.obstacles import active, floats, on_grid
 from geofield.model.written import Written, matches, shapes_of_plain
 from geofield.wording import counted, some_of
 
@@ -109,7 +109,7 @@ def merge(
     numbers = np.zeros(len(fresh), dtype=np.int64)
     old = earlier["obstacle_no"].to_numpy(dtype=np.int64)
     numbers[again] = old[match[again]]
-    numbers[~again] = next_number(previous) + np.arange((~again).sum())
+    numbers[~again] = written.last_no + 1 + np.arange((~again).sum())
     fresh["obstacle_no"] = pd.array(numbers, dtype="Int64")
     source = np.where(again, match, -1)
     for name in schema.own_columns(schema.OBSTACLES, previous):
@@ -130,7 +130,7 @@ def merge(
         gone=tuple(np.delete(old, match[again]).tolist()),
         stay_deleted=int((met >= len(word)).sum()),
     )
-    return result, Written.of(result, is_word, written.removed), changes
+    return result, Written.of(result, is_word, written.removed, written.last_no), changes
 
 
 def _mostly_in(

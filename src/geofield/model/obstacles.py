@@ -30,6 +30,8 @@ QUARTER_SEGMENTS = 16
 POINT_RADIUS_M = 2.0
 #: A fence or wire drawn as a line becomes a strip of this half width, metres.
 LINE_HALF_WIDTH_M = 0.05
+#: Numbers from here on were typed; a file holds some of them.
+_TYPED = 1e9
 #: Positions in a picture that differ by less are the same, pixels.
 _SAME_PX = 0.01
 #: A polygon with a vertex farther than this from its row's circle was redrawn by a person:
@@ -191,7 +193,16 @@ def active(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
 def next_number(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> int:
     """The next free number of a table's rows."""
-    return int(np.nanmax(floats(table, column), initial=0)) + 1
+    return last_number(floats(table, column)) + 1
+
+
+def last_number(numbers: ArrayLike) -> int:
+    """The highest number, behind which others follow; 0 of none.
+
+    A huge one that a person typed is not counted on from: what follows would not fit in a file.
+    """
+    given = np.asarray(numbers, dtype=float)
+    return int(np.max(given, where=given < _TYPED, initial=0))
 
 
 def numbered(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> gpd.GeoDataFrame:

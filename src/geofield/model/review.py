@@ -97,7 +97,8 @@ def reconcile(
     """
     areas = obstacles if written is None else as_areas(obstacles, written.by_number)
     table = _with_shapes(areas)
-    record = (from_earlier_version(table) if written is None else written).by_number
+    earlier = from_earlier_version(table) if written is None else written
+    record = earlier.by_number
     table = without_copies(unmerged(table, record), record)
     rows = _Rows.of(table)
     _fill_lost_numbers(rows, list(record.values()))
@@ -122,7 +123,9 @@ def reconcile(
     if drawn.any():
         said = table[drawn].assign(kind=rows.at["kind"][drawn], status=status[drawn])
         said = said.set_geometry(rows.shapes[drawn], crs=table.crs)
-        added = _added(said, record, next_number(result), grid)
+        # The number of what was taken away is no other's: it would not be missed.
+        first_no = max(next_number(result), earlier.last_no + 1)
+        added = _added(said, record, first_no, grid)
         parts = [part for part in (result, added) if len(part)]
         result = schema.conform(schema.OBSTACLES, pd.concat(parts) if parts else added, extras=True)
         kept = np.append(kept, np.ones(len(added), bool))
@@ -133,7 +136,7 @@ def reconcile(
         elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
     gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
     former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
-    return result, Written.of(result, kept, former)
+    return result, Written.of(result, kept, former, earlier.last_no)
 
 
 @dataclass(frozen=True)

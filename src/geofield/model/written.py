@@ -7,7 +7,7 @@ that differs from its record was changed by a person; a row that is missing was 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS
 
 from geofield.crs import LONLAT, reproject, transformer
-from geofield.model.obstacles import circle_polygons, floats, plain_circles, still_round
+from geofield.model.obstacles import (
+    circle_polygons,
+    floats,
+    last_number,
+    plain_circles,
+    still_round,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -58,10 +64,16 @@ class Written:
     rows: tuple[WrittenRow, ...] = ()
     #: Where a person deleted an obstacle, or moved it away from: nothing is found there again.
     removed: tuple[PlainShape, ...] = ()
+    #: The highest number that an obstacle ever had: none is given a second time.
+    last_no: int = 0
 
     @classmethod
     def of(
-        cls, obstacles: gpd.GeoDataFrame, kept: ArrayLike, removed: Sequence[PlainShape] = ()
+        cls,
+        obstacles: gpd.GeoDataFrame,
+        kept: ArrayLike,
+        removed: Sequence[PlainShape] = (),
+        last_no: int = 0,
     ) -> Written:
         """The record of a table in which every row has a number; a person's word is `kept`."""
         radius, margin = floats(obstacles, "radius_m"), floats(obstacles, "buffer_m")
@@ -75,6 +87,7 @@ class Written:
                 for no, kind, status, r, m, k, shape in rows
             ),
             tuple(dict.fromkeys(removed)),
+            max(last_no, last_number(numbers)),
         )
 
     @property
@@ -99,25 +112,27 @@ class Written:
         if source == target:
             return self
         rows = [row._replace(shape=_moved(row.shape, source, target)) for row in self.rows]
-        return Written(tuple(rows), tuple(_moved(each, source, target) for each in self.removed))
+        removed = tuple(_moved(each, source, target) for each in self.removed)
+        return replace(self, rows=tuple(rows), removed=removed)
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; see :meth:`from_json`."""
         return {
             "rows": [[*row[:-1], listed(row.shape)] for row in self.rows],
             "removed": [listed(shape) for shape in self.removed],
+            "last_no": self.last_no,
         }
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> Written:
         """The record that was written with :meth:`to_json`."""
-        return cls(
-            tuple(
-                WrittenRow._make((number, _word(kind), _word(status), *rest, unlisted(shape)))
-                for number, kind, status, *rest, shape in value["rows"]
-            ),
-            tuple(unlisted(shape) for shape in value["removed"]),
+        rows = tuple(
+            WrittenRow._make((number, _word(kind), _word(status), *rest, unlisted(shape)))
+            for number, kind, status, *rest, shape in value["rows"]
         )
+        # Earlier versions wrote no last number.
+        last_no = value.get("last_no") or last_number([row.obstacle_no for row in rows])
+        return cls(rows, tuple(unlisted(shape) for shape in value["removed"]), last_no)
 
 
 def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:

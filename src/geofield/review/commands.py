@@ -226,6 +226,8 @@ def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: floa
     buffer_m = 0.0 if radius_m is None else settings.obstacles.buffer_m
     crs, before = plan.field.crs, plan.obstacles
     number = 1 if before is None else next_number(before)
+    if (written := plan.evidence.written) is not None:
+        number = max(number, written.last_no + 1)
     row = from_polygons(
         np.array([footprint], dtype=object),
         crs,
