@@ -116,7 +116,9 @@ def headland_track_table(
     # In a headland narrower than half the machine, too, that stays within the border.
     last_m = max(first_m, width_m)
     offsets_m = [min(first_m + index * spacing_m, last_m) for index in range(passes)]
-    areas = [inset(outline, offset_m * scale, holes=holes) for offset_m in offsets_m]
+    # Not along holes, where the strip does not run around them: they cut the rings.
+    border = outline if holes else Polygon(outline.exterior)
+    areas = [inset(border, offset_m * scale, holes=holes) for offset_m in offsets_m]
     blocked = _blocked(shapes, shapely.union_all(shapely.boundary(areas)))
     rows: list[tuple[int, int, float]] = []
     lines: list[BaseGeometry] = []
