@@ -167,6 +167,17 @@ def test_a_farm_is_not_written_over_something_else(plans: list[gf.Plan], tmp_pat
     assert len(read_farm(tmp_path / "farm")) == 1
 
 
+def test_a_farm_that_was_read_may_be_written_over_itself(
+    plans: list[gf.Plan], tmp_path: Path
+) -> None:
+    """All of it was taken away first, and the rest was a traceback."""
+    folder = Farm(plans).write(tmp_path / "farm")
+    read_farm(folder).write(folder, overwrite=True)
+    assert [plan.field.field_id for plan in read_farm(folder)] == [
+        plan.field.field_id for plan in plans
+    ]
+
+
 def test_the_same_plans_give_the_same_bytes(plans: list[gf.Plan], tmp_path: Path) -> None:
     for name in ("one", "two"):
         Farm(plans).write(tmp_path / name)

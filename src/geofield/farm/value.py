@@ -220,14 +220,15 @@ class Farm:
             The folder.
         """
         store = Store.of(folder)
-        if store.names(""):
-            if not overwrite or place.Record.read(store) is None:
-                raise OutputExistsError(
-                    f"{folder} is not empty.", hint="Choose another folder, or allow overwriting."
-                )
+        there = store.names("")
+        if there and not (overwrite and place.Record.read(store) is not None):
+            raise OutputExistsError(
+                f"{folder} is not empty.", hint="Choose another folder, or allow overwriting."
+            )
+        # Read before it is cleared: it may be this very farm.
+        parts = [(self._part(one), self._table(place.STATUS, one)) for one in self._chunks]
+        if there:
             clear(store)
-        chunks = self._chunks
-        parts = [(self._part(one), self._table(place.STATUS, one)) for one in chunks]
         store.put(place.RECORD, place.Record(chunks=len(parts)).to_json())
         for number, (tables, status) in enumerate(parts):
             place.write_chunk(store, number, tables, status)
