@@ -323,6 +323,13 @@ def test_a_machine_says_width_turning_radius_and_clearance() -> None:
     # What is said beside the machine wins over it.
     tracks = load_settings(None, {"tracks": {"machine": "sprayer", "spacing_m": 10}}).tracks
     assert (tracks.spacing_m, tracks.width_m, tracks.overlap_m) == (10.0, 12.0, None)
+    # So does where the tracks lie, over the machine's offset.
+    there = {"machine": {"width_m": 4, "offset_m": 1}, "through_lonlat": (33.0, 35.0)}
+    assert with_values(None, **there).tracks.offset_m is None
+    line = {"tracks": {"ab_lonlat": (33.0, 35.0, 33.1, 35.0)}}
+    Path("geofield.toml").write_text(MACHINES + "offset_m = 1\n")
+    assert load_settings(None, line).tracks.offset_m is None
+    assert load_settings(None, {"tracks": {"skip": 2}}).tracks.offset_m == 1.0
     # Of another machine nothing stays.
     settings = with_values(load_settings(), machine="sprayer", headland_passes=2)
     assert settings.tracks.headland_m == 23.0

@@ -93,9 +93,9 @@ def _tracks_said(
     """Settings of the tracks, with what a machine that is named brings along."""
     machine = said.get("machine")
     if isinstance(machine, str):
-        said = {**machine_named(machine, machines).track_values(), **said}
+        said = said_over(machine_named(machine, machines).track_values(), said)
     elif isinstance(machine, Machine | Mapping):
-        said = {**Machine.model_validate(machine).track_values(), **said, "machine": None}
+        said = said_over(Machine.model_validate(machine).track_values(), said) | {"machine": None}
     return said_over(earlier if machine is None else _without_machine(earlier), said)
 
 
