@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,19 @@ def test_the_svg_holds_lines_and_words(maps: Path) -> None:
     drawn = [each.get("d", "") for each in root.iter(f"{SVG}path")]
     assert len(drawn) > len(plan.tracks.segments)
     assert len(list(root.iter(f"{SVG}image"))) == 1
+
+
+@pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
+def test_a_name_is_no_formula(maps: Path, tmp_path: Path) -> None:
+    """`Field $1 and $2` lost its blanks, others ended in a traceback."""
+    plan = gf.read_plan(maps / "field.gpkg")
+    for name in ("Field $1 and $2", r"A $\frac$ B"):
+        named = replace(plan, field=replace(plan.field, name=name))
+        named.write(tmp_path, formats=["map-svg"], overwrite=True)
+        root = ET.parse(tmp_path / "map.svg").getroot()
+        assert name in " ".join("".join(each.itertext()) for each in root.iter(f"{SVG}text"))
+        assert named.plot().get_title() == name
+        named.plot().figure.canvas.draw()
 
 
 def test_the_pdf_is_one_page_of_a4(maps: Path) -> None:

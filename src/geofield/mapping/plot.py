@@ -78,7 +78,8 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
             text = f"{counted(len(rows), 'obstacle')}, {status}"
             marks.append(Line2D([], [], color=look.color, linestyle=dash, label=text))
     ax.set_aspect("equal")
-    ax.set_title(dataset.name)
+    # A name is no formula, whatever signs it has.
+    ax.set_title(dataset.name, parse_math=False)
     ax.set_xlabel("easting, m")
     ax.set_ylabel("northing, m")
     ax.ticklabel_format(useOffset=False, style="plain")
@@ -115,10 +116,11 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
     figure = Figure(figsize=(11.7, 8.3), layout="constrained")
     ax = plot_dataset(dataset, scene, figure.subplots())
     ax.set_title("")
-    ax.set_title("\n".join(figures_in_words(dataset)), loc="left", fontsize=9)
+    plain = {"parse_math": False}
+    ax.set_title("\n".join(figures_in_words(dataset)), loc="left", fontsize=9, **plain)
     _scale_bar(ax, dataset)
     told = [*doubts_in_words(dataset), credit_in_words(dataset)]
-    figure.supxlabel("\n".join(told), fontsize=8)
+    figure.supxlabel("\n".join(told), fontsize=8, **plain)
     words = figure.findobj(Text)
     families = _families("".join(each.get_text() for each in words))
     for each in words:
