@@ -315,6 +315,29 @@ def test_last_strips(last_strip: Any, expected: list[float]) -> None:
     assert y == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("last_strip", ["overrun", "leave", "shift"])
+@pytest.mark.parametrize("y", [1.0, 17.5])
+def test_a_track_passes_a_place_near_either_border(last_strip: Any, y: float) -> None:
+    """In the last half spacing `leave` and `shift` passed up to a spacing beside it, in silence."""
+    field, place = box(0, 0, 100, 19), shapely.Point(X + 33.0, Y + y)
+    a_b = [(X + 33.0, Y + y), (X + 60.0, Y + y)]
+    for how in ({"through": place, "direction": 90}, {"direction": a_b}):
+        tracks = plan_tracks(field, crs=CRS, spacing_m=4.0, last_strip=last_strip, **how)
+        assert tracks.segments.distance(place).min() < 1e-6
+
+
+@pytest.mark.filterwarnings("ignore::geofield.errors.TrackWarning")
+def test_tracks_that_are_spread_tell_how_far_beside_a_place_they_lie() -> None:
+    how: Any = {"crs": CRS, "spacing_m": 4.0, "direction": 90, "last_strip": "spread"}
+    for y in (1.0, 11.3, 17.5):
+        place = shapely.Point(X + 33.0, Y + y)
+        tracks = plan_tracks(box(0, 0, 100, 19), through=place, **how)
+        (note,) = (note for note in tracks.notes if "spread evenly" in note)
+        told_m = float(note.split(" they lie ")[1].split()[0])
+        assert told_m == pytest.approx(tracks.segments.distance(place).min(), abs=0.006)
+    assert not plan_tracks(box(0, 0, 100, 19), **how).notes
+
+
 def test_offset_and_place() -> None:
     first = plan_tracks(box(0, 0, 100, 40), crs=CRS, spacing_m=4.0, offset_m=1.0).segments
     distance = box(0, 0, 100, 40).exterior.distance(first.geometry.iloc[0])

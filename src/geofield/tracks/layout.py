@@ -138,8 +138,9 @@ def track_positions(
     low, high = near_m + idle, far_m - idle
     if last_strip == "leave":
         low = near_m + half - SNAP_M
+    limit = high if last_strip == "overrun" else far_m - half + SNAP_M
     if near_m - SNAP_M <= first_m <= far_m + SNAP_M:
-        low, high = min(low, first_m), max(high, first_m)
+        low, limit = min(low, first_m), max(limit, first_m)
     index = np.ceil((low - first_m) / spacing_m)
     start = first_m + index * spacing_m
     if last_strip == "spread":
@@ -153,7 +154,6 @@ def track_positions(
         count = max(1, int(np.ceil((far_m - edge) / spacing_m - 1e-9)))
         width = (far_m - edge) / count
         return np.asarray(edge + (np.arange(count) + 0.5) * width)
-    limit = high if last_strip == "overrun" else far_m - half + SNAP_M
     count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
     # Multiples of the spacing from the one place, so that numbers far away do not drift.
     positions = first_m + (index + np.arange(count)) * spacing_m

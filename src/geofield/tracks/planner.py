@@ -55,6 +55,8 @@ from geofield.tracks.tables import (
 
 MOST_PIECES = 10_000_000
 MOST_POINTS = 10_000_000
+#: A track so near to a place passes it.
+_BESIDE_M = 0.01
 
 
 def plan_tracks(
@@ -329,7 +331,9 @@ def _positions(
     spacing_m, run, first = strips.spacing_m, baseline.edge, None
     if baseline.through is not None and strips.offset_m is not None:
         raise TrackError(
-            "An offset and a place to pass through were both given.", hint="Give one of the two."
+            "An offset and a place to pass through (an A-B line passes through its A) were both "
+            "given.",
+            hint="Give one of the two.",
         )
     if baseline.through is not None:
         first = float(frame.to_frame(*baseline.through)[1])
@@ -346,7 +350,22 @@ def _positions(
         return np.array([(near + far) / 2.0]), spacing_m, (note,)
     if strips.last_strip == "spread" and len(positions) > 1:
         spacing_m = float(positions[1] - positions[0])
-    return positions, spacing_m, ()
+    if strips.last_strip != "spread" or baseline.through is None or first is None:
+        return positions, spacing_m, ()
+    apart_m = positions[0] - first
+    return positions, spacing_m, _beside_note(abs(apart_m - round(apart_m / spacing_m) * spacing_m))
+
+
+def _beside_note(beside_m: float) -> tuple[str, ...]:
+    """That tracks which are spread evenly pass beside a place, where they do."""
+    if beside_m < _BESIDE_M:
+        return ()
+    note = (
+        "Tracks that are spread evenly do not pass the place asked for (of an A-B line its A): "
+        f"they lie {beside_m:.2f} m beside it."
+    )
+    warn(note, TrackWarning, stacklevel=4)
+    return (note,)
 
 
 def _tracks(
