@@ -131,6 +131,27 @@ def test_an_own_boundary_is_taken_as_it_is(
     assert all(shape.buffer(0.01).covers(each) for each in plan.tracks.segments.geometry)
 
 
+def test_figures_that_are_none_are_null_in_json(
+    ran: Path, simulated_tif: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The radius of what is not round was NaN, which is no JSON."""
+    import geopandas as gpd
+    import pandas as pd
+
+    plan = tmp_path / "field.gpkg"
+    plan.write_bytes((ran / "field.gpkg").read_bytes())
+    table = gpd.read_file(plan, layer="obstacles")
+    inside = (
+        gpd.read_file(plan, layer="field").representative_point().buffer(3.0, cap_style="square")
+    )
+    pond = gpd.GeoDataFrame({"kind": ["other"], "status": ["added"]}, geometry=inside)
+    pd.concat([table, pond]).to_file(plan, layer="obstacles", driver="GPKG", geometry_name="geom")
+    capsys.readouterr()
+    assert geofield("obstacles", simulated_tif, plan, "-o", plan, "--json") == 0
+    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["obstacles"]
+    assert [row["radius_m"] for row in told if row["kind"] == "other"] == [None]
+
+
 def test_overwriting_keeps_a_persons_edits(
     ran: Path, simulated: SimulatedField, simulated_tif: Path
 ) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import stat
 import sys
@@ -32,7 +33,16 @@ _LOG.addHandler(logging.NullHandler())
 
 def echo_json(value: Mapping[str, Any] | list[Any]) -> None:
     """Data for other programs: one JSON document on stdout."""
-    click.echo(json.dumps(value, indent=2, default=str))
+    click.echo(json.dumps(_plain(value), indent=2, default=str, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    """A value in which what is no finite number, for which JSON has no word, is null."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def say(message: str, **style: Any) -> None:

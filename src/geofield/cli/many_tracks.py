@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
 from collections.abc import Iterable
@@ -199,10 +198,7 @@ def figures_of(plan: Plan, target: Path, notes: Iterable[str]) -> dict[str, Any]
     """Figures of one field, plain JSON values, and what was told of it."""
     if plan.tracks is None:
         return {}
-    figures = {
-        name: None if isinstance(value, float) and math.isnan(value) else value
-        for name, value in asdict(plan.tracks.statistics).items()
-    }
+    figures = asdict(plan.tracks.statistics)
     turns = plan.tracks.turns
     if turns is not None:
         figures |= {
