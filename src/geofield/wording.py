@@ -50,6 +50,15 @@ def command(*words: str | Path) -> str:
     return f"geofield {list2cmdline(plain) if os.name == 'nt' else shlex.join(plain)}"
 
 
+def cell_text(value: object) -> str:
+    """A table's value as a person writes it: 7 in a column of numbers with a point, too.
+
+    >>> cell_text(7.0), cell_text(7.5), cell_text("07")
+    ('7', '7.5', '07')
+    """
+    return f"{value:.0f}" if isinstance(value, float) and value.is_integer() else str(value)
+
+
 def counted(number: int, one: str, many: str | None = None) -> str:
     """A number and what is counted: its plural is `many`, or ends with an s.
 

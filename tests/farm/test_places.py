@@ -9,6 +9,8 @@ from typing import Any
 import geopandas as gpd
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shapely
 import shapely.affinity
@@ -99,6 +101,48 @@ def test_every_kind_of_file_gives_the_same_places(kind: str, tmp_path: Path) -> 
     ]  # fmt: skip
     assert dict(places[0].own) == {"farmer": "Öz", "place_area_ha": 1.0}
     assert dict(places[2].own) == {"farmer": "x"}
+
+
+def test_ids_in_columns_of_numbers(tmp_path: Path) -> None:
+    """20 digits, as cadastres have them and Shapefiles hold as numbers, ended in a traceback."""
+    for given, ids in (
+        ([1e19, 2e19, 7.0], ["10000000000000000000", "20000000000000000000", "7"]),
+        ([1.5, np.inf, 3.0], ["1.5", "inf", "3"]),
+    ):
+        as_frame(POINTS.assign(id=given)).to_file(tmp_path / "ids.gpkg")
+        assert read_places(tmp_path / "ids.gpkg").ids.to_pylist() == ids
+
+
+def test_columns_of_lists_objects_and_time_spans_are_text(tmp_path: Path) -> None:
+    """A list beside a parcel, as fiboa's categories are, ended a whole farm in a traceback."""
+    frame = as_frame(POINTS[["id"]].join(POINTS[["lat", "lon"]]))
+    frame = frame.set_geometry(frame.to_crs(32632).buffer(40).to_crs(4326))
+    frame["crops"] = [["rye", "öats"], [], None]
+    frame["by"] = [{"name": "May"}, None, {"name": None}]
+    frame["took"] = pd.to_timedelta([5, None, 90], unit="s")
+    frame.to_parquet(tmp_path / "lists.parquet")
+    for places in (tmp_path / "lists.parquet", frame):
+        farm = gf.Farm(gf.plan_fields(places, spacing_m=10))
+        fields = farm.fields.set_index("field_id")
+        assert fields.loc["007", "crops"] == '["rye", "öats"]'
+        assert fields.loc["007", "by"] == '{"name": "May"}'
+        assert fields.loc["9", "took"] == "0:01:30"
+        assert fields.loc[["9", "8"], ["crops", "by"]].isna().to_numpy().tolist() == [
+            [True, False], [False, True]
+        ]  # fmt: skip
+
+
+def test_texts_that_are_views_are_read(tmp_path: Path) -> None:
+    """As Polars writes them: they ended in a traceback."""
+    table = pa.Table.from_pandas(POINTS, preserve_index=False)
+    views = [
+        one if pa.types.is_floating(one.type) else one.with_type(pa.string_view())
+        for one in table.schema
+    ]
+    pq.write_table(table.cast(pa.schema(views)), tmp_path / "views.parquet")
+    places = read_places(tmp_path / "views.parquet")
+    assert places.ids.to_pylist() == ["007", "8", "9"]
+    assert dict(next(iter(places)).own)["farmer"] == "Öz"
 
 
 def test_neighbours_lie_beside_each_other(tmp_path: Path) -> None:

@@ -38,6 +38,13 @@ def test_a_plain_boundary_in_any_crs(tmp_path):
         assert field["field_id"].iloc[0]
 
 
+def test_numbers_as_names_have_no_point(tmp_path):
+    """As Shapefiles and tables with empty cells have them: the field was called 12.0."""
+    columns = {"NAME": [12.0], "ID": [17.0]}
+    field = read_dataset(write(tmp_path / "field.shp", [BOX], **columns)).table("field")
+    assert list(field[["name", "field_id"]].iloc[0]) == ["12", "17"]
+
+
 def test_feet_become_metres(tmp_path):
     feet = "EPSG:2227"  # California zone 3, US survey feet
     shape = gpd.GeoSeries([shapely.box(-121.5, 37.5, -121.498, 37.501)], crs="EPSG:4326")

@@ -141,7 +141,10 @@ def _parquet(path: Path) -> RawPlaces:
     except (pa.ArrowInvalid, OSError) as error:
         raise unreadable(path, error) from None
     geo = json.loads((table.schema.metadata or {}).get(b"geo", b"{}"))
-    table = table.replace_schema_metadata(None)
+    # Texts that are views, as Polars has them, are not sorted or taken from.
+    kinds = {pa.string_view(): pa.string(), pa.binary_view(): pa.binary()}
+    plain = [each.with_type(kinds.get(each.type, each.type)) for each in table.schema]
+    table = table.cast(pa.schema(plain))
     name = geo.get("primary_column")
     if name not in table.column_names:
         return RawPlaces(path.name, table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,7 @@ from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import counted, nearest, some_of
+from geofield.wording import cell_text, counted, nearest, some_of
 
 _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
@@ -97,7 +98,7 @@ def read_places(
     _check_positions(raw, lat, lon, kept, source)
     rest = [name for name in raw.table.column_names if name not in used]
     per_place = [name for name in rest if name in setting_names()]
-    own = raw.table.select([name for name in rest if name not in per_place]).take(kept)
+    own = _plain(raw.table.select([name for name in rest if name not in per_place])).take(kept)
     said = raw.table.select(per_place).take(kept)
     check_settings(raw.name, said, settings)
     ids, names = _names(raw, id_name, name_name, unnamed, kept, part, lat, lon)
@@ -154,6 +155,20 @@ def _without_ours(raw: RawPlaces) -> RawPlaces:
     return replace(
         raw, table=raw.table.select([n for n in raw.table.column_names if n not in gone])
     )
+
+
+def _plain(table: pa.Table) -> pa.Table:
+    """A table in which lists, objects and time spans are text, as all files of a farm have it."""
+    for at, each in enumerate(table.schema):
+        if pa.types.is_nested(each.type) or pa.types.is_duration(each.type):
+            text = str if pa.types.is_duration(each.type) else _as_json
+            values = [None if one is None else text(one) for one in table[at].to_pylist()]
+            table = table.set_column(at, each.name, pa.array(values, pa.string()))
+    return table
+
+
+def _as_json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def _found(raw: RawPlaces, asked: str | None, usual: Sequence[str]) -> str | None:
@@ -363,9 +378,8 @@ def _names(
 def _texts(column: Any) -> Any:
     """A column as text; whole numbers without a point, what is empty missing."""
     if pa.types.is_floating(column.type):
-        whole = pc.equal(pc.floor(column), column)
-        if pc.all(whole.drop_null()).as_py():
-            column = column.cast(pa.int64())
+        texts = [None if one is None else cell_text(one) for one in column.to_pylist()]
+        column = pa.chunked_array([pa.array(texts, pa.string())])
     text = pc.utf8_trim_whitespace(column.cast(pa.string()).combine_chunks())
     return pc.if_else(pc.equal(text, ""), pa.scalar(None, pa.string()), text)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -16,7 +16,7 @@ from geofield.errors import CRSError, FieldError, FieldWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
 from geofield.notes import warn
-from geofield.wording import counted, none_of
+from geofield.wording import cell_text, counted, none_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -202,7 +202,7 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: 
     label = ""
     for column in _NAME_COLUMNS:
         if column in row.columns and row[column].notna().iloc[0]:
-            label = _text(row[column].iloc[0])
+            label = cell_text(row[column].iloc[0])
             break
     quality = FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons)
     return Field(polygon, target, name=label, method="boundary", quality=quality)
@@ -229,12 +229,7 @@ def _named(rows: gpd.GeoDataFrame, name: str) -> np.ndarray:
     others = [c for c in rows.columns if c != rows.geometry.name and c not in _NAME_COLUMNS]
     hit = np.zeros(len(rows), bool)
     for column in [c for c in _NAME_COLUMNS if c in rows.columns] + others:
-        hit = np.array([_text(value) == name for value in rows[column]], dtype=bool)
+        hit = np.array([cell_text(value) == name for value in rows[column]], dtype=bool)
         if hit.any():
             break
     return hit
-
-
-def _text(value: Any) -> str:
-    """A value as a person writes it; a whole number where missing ones beside it made it 7.0."""
-    return f"{value:.0f}" if isinstance(value, float) and value.is_integer() else str(value)

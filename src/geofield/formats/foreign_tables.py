@@ -18,7 +18,7 @@ from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
 from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
 from geofield.notes import warn
-from geofield.wording import counted
+from geofield.wording import cell_text, counted
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -84,8 +84,8 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     }
     field = Field(polygon, crs)
     data |= {
-        "name": [path.stem if names is None else str(names.iloc[0])],
-        "field_id": [field.field_id if ids is None else str(ids.iloc[0])],
+        "name": [path.stem if names is None else cell_text(names.iloc[0])],
+        "field_id": [field.field_id if ids is None else cell_text(ids.iloc[0])],
         "area_ha": [field.area_ha],
         "perimeter_m": [field.perimeter_m],
     }
