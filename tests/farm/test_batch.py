@@ -180,6 +180,17 @@ def test_obstacles_of_a_file_are_avoided(tmp_path: Path) -> None:
     assert set(whole.gaps["cause"].str.startswith("obstacle")) == {True}
 
 
+def test_another_file_of_obstacles_is_other_work(tmp_path: Path) -> None:
+    """One called `trees[1].gpkg` counted as the same, whatever was in it."""
+    places, trees = parcels(tmp_path / "p.gpkg", 10), tmp_path / "trees[1].gpkg"
+    asked = (places, "--obstacles", trees, "--spacing", 8, "--out", tmp_path / "farm")
+    middle = gpd.read_file(places).to_crs(32632).centroid
+    for radius_m, code in ((6.0, 0), (7.0, 1)):
+        gpd.GeoDataFrame(geometry=middle.buffer(radius_m), crs=32632).to_file(trees)
+        told = batch(*asked, code=code)
+    assert "the pictures or obstacles differ" in told
+
+
 def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> None:
     places = parcels(tmp_path / "p.gpkg", 2)
     middle = gpd.read_file(places).to_crs(32632).centroid

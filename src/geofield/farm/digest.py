@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 from collections.abc import Mapping
@@ -38,7 +39,7 @@ def _obstacles(job: Job) -> dict[str, Any]:
         return {}
     digest = hashlib.sha256()
     # A Shapefile is several files.
-    for part in sorted(job.obstacles.parent.glob(job.obstacles.stem + ".*")):
+    for part in sorted(job.obstacles.parent.glob(glob.escape(job.obstacles.stem) + ".*")):
         if part == job.obstacles or part.suffix.lower() in (".dbf", ".shx", ".prj"):
             digest.update(part.read_bytes())
     return {"obstacles": job.obstacles.name, "obstacles_digest": digest.hexdigest()}
