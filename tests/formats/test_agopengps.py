@@ -140,6 +140,27 @@ def test_a_folder_without_the_file_says_so(tmp_path):
         read_dataset(tmp_path)
 
 
+def test_what_the_program_itself_writes(folder, tmp_path):
+    """Its fields were all called FieldNew, its curves along borders were straight lines."""
+    there = tmp_path / "North 40"
+    shutil.copytree(folder, there)
+    field = (there / "Field.txt").read_text().replace(NAME, "FieldNew")
+    (there / "Field.txt").write_text(field)
+    ring = ["-20,-20,0", "-20,20,0", "20,20,0"]
+    tracks = [
+        *("Straight", "0", "0,-50", "0,50", "0.3", "2", "True", "0"),
+        *("Border", "0", "-20,-20", "20,20", "0", "8", "True", str(len(ring)), *ring),
+        *("Pivot", "0", "5,5", "0,0", "0", "64", "True", "0"),
+    ]
+    (there / "TrackLines.txt").write_text("\r\n".join(["$TrackLines", *tracks]))
+    back = read_dataset(there)
+    assert back.name == back.table("field")["name"].iloc[0] == "North 40"
+    assert back.table("tracks")["length_m"].tolist() == pytest.approx([100.0, 80.0], abs=0.1)
+    told = "; ".join(back.notes)
+    assert "'Straight' taken where it was drawn, not nudged 0.3 m" in told
+    assert "'Pivot' left out: it goes around a pivot" in told
+
+
 def test_a_count_below_zero_is_refused(folder, tmp_path):
     broken = tmp_path / "Field"
     shutil.copytree(folder, broken)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,10 @@ from geofield.model import Dataset
 
 #: Vertices that lie so near the line between their neighbours came from densifying, metres.
 COLLINEAR_M = 0.002
-_CURVE = 4
+#: Kinds of tracks: straight from A to B, and around a centre; all others go by their points.
+_STRAIGHT, _PIVOT = 2, 64
+#: What the program writes where the field's name would stand: its folder has it.
+_NAMELESS = "FieldNew"
 #: What a flag of ours in a hole of the field says before its number.
 HOLE = "Hole"
 _FLAG = re.compile(rf"Obstacle (\d+)|{HOLE} \d+$")
@@ -46,13 +50,15 @@ def read(path: Path) -> Dataset:
         layers.append(RawLayer.of_rows("boundary", [{"name": name, "geometry": outline}]))
         if obstacles:
             layers.append(RawLayer.of_rows("obstacles", obstacles))
+    tracks, told = _lines(folder)
     lines = [
-        {"name": name, "geometry": shapely.LineString(plane.to_lonlat(*points.T))}
-        for name, points in _lines(folder)
+        {"name": track, "geometry": shapely.LineString(plane.to_lonlat(*points.T))}
+        for track, points in tracks
     ]
     if lines:
         layers.append(RawLayer.of_rows("guidance", lines))
-    return read_foreign(layers, folder, name=name)
+    dataset = read_foreign(layers, folder, name=name)
+    return replace(dataset, notes=(*dataset.notes, *told))
 
 
 def field_folder(path: Path) -> Path:
@@ -77,8 +83,8 @@ def _field(folder: Path) -> tuple[str, LocalPlane]:
     except (ValueError, IndexError) as error:
         raise FormatError(f"{folder / 'Field.txt'} has no StartFix.") from error
     after = lines.index("$FieldDir") + 1 if "$FieldDir" in lines else len(lines)
-    name = lines[after] if after < len(lines) and lines[after] else folder.name
-    return name, LocalPlane(lat, lon)
+    name = lines[after] if after < len(lines) else ""
+    return folder.name if name in ("", _NAMELESS) else name, LocalPlane(lat, lon)
 
 
 def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int | None]]:
@@ -140,29 +146,35 @@ def boundary_rings(path: Path) -> Iterator[list[list[float]]]:
         raise FormatError(f"{path} breaks off or is damaged in ring {number}.") from error
 
 
-def _lines(folder: Path) -> list[tuple[str, np.ndarray]]:
-    """The tracks of ``TrackLines.txt`` as names and (n, 2) arrays."""
+def _lines(folder: Path) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
+    """The tracks of ``TrackLines.txt`` as names and (n, 2) arrays, and what to tell of them."""
     path = folder / "TrackLines.txt"
+    told: list[str] = []
     if not path.exists():
-        return []
+        return [], told
     lines = _text(path)[1:]
     while lines and not lines[-1]:
         lines.pop()
-    found, position = [], 0
+    found, position, number = [], 0, 1
     try:
         while position < len(lines):
-            name, _, start, end, _, mode, _, count = lines[position : position + 8]
+            name, _, start, end, nudge, mode, _, count = lines[position : position + 8]
             end_row = position + 8 + int(count)
             if not position + 8 <= end_row <= len(lines):
                 raise ValueError
             points = [_numbers(row)[:2] for row in lines[position + 8 : end_row]]
-            if int(mode) != _CURVE or len(points) < 2:
+            if int(mode) == _STRAIGHT or len(points) < 2:
                 points = [_numbers(start)[:2], _numbers(end)[:2]]
-            found.append((name, np.array(points)))
-            position = end_row
+            if int(mode) == _PIVOT:
+                told.append(f"track {name!r} left out: it goes around a pivot")
+            else:
+                found.append((name, np.array(points)))
+                if float(nudge):
+                    told.append(f"track {name!r} taken where it was drawn, not nudged {nudge} m")
+            position, number = end_row, number + 1
     except ValueError as error:
-        raise FormatError(f"{path} breaks off or is damaged in track {len(found) + 1}.") from error
-    return found
+        raise FormatError(f"{path} breaks off or is damaged in track {number}.") from error
+    return found, told
 
 
 def _lonlat_polygon(ring: list[list[float]], plane: LocalPlane) -> Any:
