@@ -8,6 +8,7 @@ import re
 import sqlite3
 from contextlib import closing
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pyogrio
@@ -285,6 +286,16 @@ def test_long_numbers_and_names_of_placemarks_survive_kml(dataset, tmp_path):
     )
     back = read_dataset(tmp_path / "field.kml").table("field").iloc[0]
     assert {name: back[name] for name in own} == own | {"parcel": "3210000123"}
+
+
+def test_long_numbers_survive_shapefiles(dataset, tmp_path):
+    """Readers take 19 digits for a number with a point: the last three were others."""
+    own = {"parcel": 1234567890123456789, "crop_no": 7}
+    field = dataset.tables["field"].assign(**own)
+    owned = dataclasses.replace(dataset, tables={**dataset.tables, "field": field})
+    write_dataset(owned, tmp_path, ["shapefile"])
+    back = gpd.read_file(tmp_path / "shapefile" / "boundary.shp").iloc[0]
+    assert {name: back[name] for name in own} == own | {"parcel": str(own["parcel"])}
 
 
 def test_text_that_a_shapefile_cuts_is_told(dataset, tmp_path):

@@ -98,9 +98,13 @@ def _short(name: str, taken: Iterable[str]) -> str:
 
 
 def _own(series: Any) -> Column:
-    """A user's own column: whole numbers, numbers, or what can be read as text."""
+    """A user's own column: whole numbers, numbers, or what can be read as text.
+
+    Of whole numbers with more digits readers make numbers with a point, which lack the last ones.
+    """
     kind = schema.own_type(series)
-    if kind != "str":
+    long_ones = kind == "int" and (series.abs() >= 10 ** _WIDTHS["int"]).any()
+    if kind != "str" and not long_ones:
         return kind, list(series)
     texts = [None if pd.isna(value) else str(value) for value in series]
     long = [text for text in texts if text is not None and len(text.encode()) > TEXT_BYTES]
@@ -110,7 +114,7 @@ def _own(series: Any) -> Column:
             FormatWarning,
             stacklevel=2,
         )
-    return kind, [None if text is None else _cut(text) for text in texts]
+    return "str", [None if text is None else _cut(text) for text in texts]
 
 
 def identified(layer: ShapefileLayer, dataset: Dataset) -> ShapefileLayer:
