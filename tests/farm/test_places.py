@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pyogrio
 import pytest
 import shapely
 import shapely.affinity
@@ -143,6 +145,23 @@ def test_texts_that_are_views_are_read(tmp_path: Path) -> None:
     places = read_places(tmp_path / "views.parquet")
     assert places.ids.to_pylist() == ["007", "8", "9"]
     assert dict(next(iter(places)).own)["farmer"] == "Öz"
+
+
+def test_parcels_with_arcs_are_read(tmp_path: Path) -> None:
+    """As cadastres have them: they ended in a traceback."""
+    file, (x, y) = tmp_path / "arcs.gpkg", (500_100.0, 5_500_100.0)
+    ring = [(x - 100, y), (x, y + 100), (x + 100, y), (x, y - 100), (x - 100, y)]
+    arcs = struct.pack("<BII", 1, 8, len(ring)) + np.array(ring).tobytes()
+    circle = struct.pack("<BII", 1, 10, 1) + arcs
+    square = shapely.to_wkb(shapely.box(x + 200, y, x + 300, y + 100))
+    how = {"geometry_type": "Unknown", "crs": "EPSG:32633", "driver": "GPKG"}
+    pyogrio.raw.write(
+        file, np.array([circle, square], object), [np.array(["a", "b"])], ["id"], **how
+    )
+    whole = gf.Farm(gf.plan_fields(file, spacing_m=20))
+    areas_ha = whole.fields.set_index("field_id")["area_ha"]
+    assert areas_ha["a"] == pytest.approx(np.pi / 0.9996**2, rel=1e-3)
+    assert areas_ha["b"] == pytest.approx(1.0 / 0.9996**2, rel=1e-6)
 
 
 def test_neighbours_lie_beside_each_other(tmp_path: Path) -> None:

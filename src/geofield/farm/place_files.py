@@ -12,6 +12,7 @@ from typing import Any
 import geopandas as gpd
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import shapely
 
 from geofield.errors import CRSError, FormatError
@@ -22,6 +23,8 @@ from geofield.wording import nearest
 
 CSV = (".csv", ".tsv", ".txt")
 _ROWS = "Give one row per field."
+#: Kinds of shapes that may have arcs: circular strings to multi-surfaces.
+_CURVED = range(8, 13)
 _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
 
 
@@ -86,7 +89,7 @@ def raw_of(frame: pd.DataFrame) -> RawPlaces:
 
 
 def _csv(path: Path, texts: set[str]) -> RawPlaces:
-    import pyarrow.csv as pc
+    import pyarrow.csv as table_csv
 
     try:
         with path.open("rb") as file:
@@ -101,11 +104,11 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
         names = [name.strip().strip('"') for name in first.split(mark)]
         # 35,0754;33,5311 is how spreadsheets write it in half of Europe.
         comma = mark != "," and re.search(rb"[;\t\n]-?\d+,\d+", head) is not None
-        table = pc.read_csv(
+        table = table_csv.read_csv(
             path,
-            read_options=pc.ReadOptions(column_names=names, skip_rows=above + 1),
-            parse_options=pc.ParseOptions(delimiter=mark, newlines_in_values=True),
-            convert_options=pc.ConvertOptions(
+            read_options=table_csv.ReadOptions(column_names=names, skip_rows=above + 1),
+            parse_options=table_csv.ParseOptions(delimiter=mark, newlines_in_values=True),
+            convert_options=table_csv.ConvertOptions(
                 column_types={name: pa.string() for name in names if name.lower() in texts},
                 strings_can_be_null=True,
                 quoted_strings_can_be_null=True,
@@ -199,4 +202,12 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
     if name not in table.column_names:
         return RawPlaces(path.name, table)
     geometry = table[name].combine_chunks()
+    if _is_curved(geometry):  # only here GDAL makes lines of arcs
+        geometry = pa.array(pyogrio.raw.read(path, layer=layer, columns=[])[2], pa.binary())
     return RawPlaces(path.name, table.drop_columns(name), geometry, name, meta["crs"])
+
+
+def _is_curved(geometry: pa.Array) -> bool:
+    """Whether some shapes have arcs, as those of cadastres, by the kinds of well-known binary."""
+    kinds = pc.unique(pc.binary_slice(geometry, 1, 5)).drop_null().to_pylist()
+    return any(int.from_bytes(kind, "little") % 1000 in _CURVED for kind in kinds)
