@@ -24,6 +24,9 @@ SAMPLE = Path(__file__).parents[1] / "sample_data/field_1.tif"
         ("-35:04:31.44", -35.0754),
         ("\N{MINUS SIGN}35.0754°", -35.0754),
         ("0 30 S", -0.5),
+        ("35 04 31.44 S", -35.0754),
+        ("35:04:31.44S", -35.0754),
+        ("35d4m31.44s", 35.0754),
     ],
 )
 def test_an_angle_in_parts(text: str, degrees: float) -> None:
@@ -32,10 +35,25 @@ def test_an_angle_in_parts(text: str, degrees: float) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["35.0754 33.5311", "35 64 N", "35 4 60", "33 31 E", "-35 N", "35'4", "O 35", "N", "4 5 6 7"],
+    [
+        "35.0754 33.5311",
+        "35 64 N",
+        "35 4 60",
+        "33 31 E",
+        "-35 N",
+        "35'4",
+        "O 35",
+        "N",
+        "4 5 6 7",
+        "35d4m31S",
+    ],
 )
 def test_what_is_no_angle(text: str) -> None:
     assert angle_of(text, "NS") is None
+
+
+def test_a_latitude_is_no_longitude() -> None:
+    assert angle_of("33 31 52 S", "EW") is None
 
 
 def test_a_place_as_a_receiver_shows_it(tmp_path: Path) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 
+# An s of the seconds goes with an m of the minutes; without one it is the south.
 _ANGLE = re.compile(
     r"""(?P<before>[NSEW]?)\s*(?P<sign>[-+\N{MINUS SIGN}]?)\s*
     (?P<degrees>\d+(?:\.\d*)?|\.\d+)\s*
     (?:[°ºd:\s]\s*(?:(?P<minutes>\d+(?:\.\d*)?)\s*
-    (?:['′’m:\s]\s*(?:(?P<seconds>\d+(?:\.\d*)?)\s*(?:"|″|”|''|′′|s)?\s*)?)?)?)?
+    (?:(?:['′’:\s]|(?P<m>m))\s*(?:(?P<seconds>\d+(?:\.\d*)?)\s*
+    (?:"|″|”|''|′′|(?(m)(?-i:s)|(?!))|(?(m)(?!\s*(?-i:S))))\s*)?)?)?)?
     (?P<after>[NSEW]?)""",
     re.VERBOSE | re.IGNORECASE,
 )
