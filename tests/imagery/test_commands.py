@@ -97,6 +97,25 @@ def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture
     assert max(33.52 - west, east - 33.53, 35.07 - south, north - 35.08) < 2e-4
 
 
+@pytest.mark.parametrize(("right_px", "width_px"), [(118, 108), (250, 118)])
+def test_the_middle_of_an_area_need_not_be_seen(right_px: int, width_px: int) -> None:
+    import geopandas as gpd
+
+    mask = np.full((96, 128), 255, np.uint8)
+    mask[40:60, 50:70] = 0
+    path = write(Path("gap.tif"), ground(), mask=mask, photometric="RGB")
+    with rasterio.open(path) as file:
+        left, top = file.transform @ (10, 10)
+        right, bottom = file.transform @ (right_px, 86)
+        area = gpd.GeoDataFrame(geometry=[box(left, bottom, right, top)], crs=file.crs)
+    area.to_file("area.gpkg")
+    assert run("tiles", path, "--area", "area.gpkg", "-o", "a.tif") == 0
+    with rasterio.open("a.tif") as file:
+        # Its box in longitude and latitude lies askew in the zone, and holds whole pixels.
+        assert (file.width, file.height) == pytest.approx((width_px, 76), abs=4)
+        assert 0 < (file.dataset_mask() == 0).sum() <= 400
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -187,6 +206,32 @@ def test_a_named_picture_carries_its_terms(
     found = imagery_of(path, load_settings(), (lon, lat))
     with found.at(lat, lon, ImagerySettings()) as picture:
         assert picture.path == path
+
+
+@pytest.mark.parametrize(
+    ("said", "source"),
+    [
+        ('attribution = "Me"\n', {"attribution": "Me", "licence": "", "date": None}),
+        ('date = "2023-06-01"\n', {"attribution": "", "licence": "", "date": "2023-06-01"}),
+    ],
+)
+def test_what_is_said_of_a_picture_goes_with_its_bands_and_crs(
+    tmp_path: Path, said: str, source: dict[str, str | None]
+) -> None:
+    from geofield.cli.imagery_tools import imagery_of
+    from geofield.settings import ImagerySettings, load_settings
+
+    path = write(tmp_path / "drone.tif", ground(bands=4), crs=None)
+    known: dict[str, Any] = {"bands": ("blue", "green", "red", "other"), "crs": "EPSG:32636"}
+    lon, lat = read_scene(path, **known).grid.centre_lonlat
+    text = f'[fetch.sources.drone]\nkind = "picture"\nurl = "{path}"\nmay_derive = true\n{said}'
+    Path("geofield.toml").write_text(text)
+    found = imagery_of("drone", load_settings(), (lon, lat))
+    with found.at(lat, lon, ImagerySettings(**known)) as picture:
+        scene = read_scene(picture.path, **known)
+    assert {name: getattr(scene.source, name) for name in source} == source
+    assert scene.roles == ("blue", "green", "red")
+    assert np.array_equal(scene.bands, ground())
 
 
 def test_sources_of_ones_own(

@@ -387,6 +387,20 @@ def test_internal_mask(tmp_path: Path) -> None:
     assert np.array_equal(read_scene(path).valid, mask > 0)
 
 
+def test_a_file_of_ours_says_its_own_bands_and_crs(tmp_path: Path) -> None:
+    # As settings of a plan say them of the picture that its scene.tif was made from.
+    known: dict[str, Any] = {"bands": ("red", "green", "blue", "other"), "crs": "EPSG:4326"}
+    transform = Affine(5e-6, 0, 25.0, 0, -5e-6, 62.0)
+    path = write(tmp_path / "x.tif", ground(bands=4), crs=None, transform=transform)
+    source = ImagerySource("drone", attribution="Me")
+    scene = read_scene(path, source=source, **known)
+    again = read_scene(write_scene(scene, tmp_path / "scene.tif"), **known)
+    assert again.roles == ("red", "green", "blue")
+    assert again.grid == scene.grid
+    assert again.source == source
+    assert np.array_equal(again.bands, scene.bands)
+
+
 # -- grids ---------------------------------------------------------------------------------------
 
 

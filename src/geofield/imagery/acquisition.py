@@ -7,13 +7,12 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from geofield.crs import GEOD
 from geofield.errors import ImageryError, ImageryWarning
 from geofield.grid import Grid
 from geofield.imagery.cache import TileCache
@@ -21,14 +20,16 @@ from geofield.imagery.client import Client
 from geofield.imagery.fetch import FetchReport, Progress, TileFetcher, absence_error
 from geofield.imagery.mosaic import stage_rows, stage_to_cog
 from geofield.imagery.opening import FetchOptions
-from geofield.imagery.scene import read_scene
+from geofield.imagery.pictures import open_reader
+from geofield.imagery.reader import SceneReader
+from geofield.imagery.scene import read_part, read_scene
 from geofield.imagery.sources.base import PictureSource, Source, Tiles, TileSource
 from geofield.imagery.sources.google import GoogleStaticSource
 from geofield.imagery.tags import source_tags
 from geofield.imagery.terms import check_terms
 from geofield.imagery.tiling import Block
 from geofield.imagery.write import replacing, write_scene
-from geofield.model.scene import ImagerySource, Scene
+from geofield.model.scene import ImagerySource, Scene, outside
 from geofield.notes import warn
 
 Zoom = int | Literal["max", "fit"] | None
@@ -277,21 +278,13 @@ def _picture(
     """A window of the user's own picture."""
     if Path(source.path).exists() and Path(path).exists() and Path(path).samefile(source.path):
         raise ImageryError(f"{path} is the picture itself.", hint="Give the output another name.")
+    lat, lon = place.point
+    known: dict[str, Any] = {"allow": allow, "bands": source.bands, "crs": source.crs}
     if place.area is not None and place.size_px is None and place.size_m is None:
-        lat, lon = replace(place, lat=None, lon=None).point
-        size_m = _across_m(place.area, lat, lon)
-        around = read_scene(source.path, lat=lat, lon=lon, size_m=size_m, allow=allow)
-        scene = _cut_to(place.area, around)
+        scene = _over(place.area, open_reader(source.path, lat=lat, lon=lon, **known))
     else:
-        lat, lon = place.point
-        scene = read_scene(
-            source.path,
-            lat=lat,
-            lon=lon,
-            size_m=place.size_m,
-            size_px=place.size_px,
-            allow=allow,
-        )
+        size: dict[str, Any] = {"size_m": place.size_m, "size_px": place.size_px}
+        scene = read_scene(source.path, lat=lat, lon=lon, **size, **known)
     scene = _with_provenance(scene, source)
     for guess in scene.guesses:
         warn(guess, ImageryWarning, stacklevel=3)
@@ -299,22 +292,16 @@ def _picture(
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 
 
-def _across_m(area: BaseGeometry, lat: float, lon: float) -> float:
-    """The side of a square around a point that holds an area's box however it is turned."""
-    west, south, east, north = area.bounds
-    lons, lats = [west, west, east, east], [south, north, south, north]
-    _, _, radii = GEOD.inv(lons, lats, [lon] * 4, [lat] * 4)
-    return float(max(2.0 * np.max(radii), 1.0))
-
-
-def _cut_to(area: BaseGeometry, scene: Scene) -> Scene:
-    """What a scene shows of an area's box: its pixels may be at an angle to lon/lat."""
+def _over(area: BaseGeometry, reader: SceneReader) -> Scene:
+    """What a picture shows of an area's box: its pixels may be at an angle to lon/lat."""
     west, south, east, north = area.bounds
     lon, lat = np.meshgrid(np.linspace(west, east, 17), np.linspace(south, north, 17))
-    x, y = scene.grid.from_lonlat(lon.ravel(), lat.ravel())
-    left, right = _span(x, scene.grid.width_px)
-    top, bottom = _span(y, scene.grid.height_px)
-    return scene.crop(left, top, right - left, bottom - top)
+    x, y = reader.grid.from_lonlat(lon.ravel(), lat.ravel())
+    rows, columns = reader.grid.shape
+    if not (x.max() > 0 and x.min() < columns and y.max() > 0 and y.min() < rows):
+        raise outside(reader.grid, (south + north) / 2, (west + east) / 2)
+    (left, right), (top, bottom) = _span(x, columns), _span(y, rows)
+    return read_part(reader, (left, top, right - left, bottom - top))
 
 
 def _span(position_px: NDArray[np.float64], side_px: int) -> tuple[int, int]:

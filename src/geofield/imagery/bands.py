@@ -127,6 +127,12 @@ def look_of(values: NDArray[Any]) -> Look:
     return "flat" if values.min() == top else "picture"
 
 
+def kept_roles(given: Sequence[str]) -> tuple[str, ...]:
+    """Of roles as the user gives them those of the bands that a scene keeps."""
+    roles = (_WORDS.get(_key(role), "") for role in given)
+    return tuple(role for role in roles if role not in ("", "alpha"))
+
+
 def _checked(given: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     """Roles as the user gives them, of bands that the file calls `names`."""
     count = len(names)

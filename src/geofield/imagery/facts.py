@@ -13,7 +13,7 @@ from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from geofield.errors import CRSError
-from geofield.imagery.bands import OPAQUE, BandRoles, Look, find_roles, look_of
+from geofield.imagery.bands import OPAQUE, BandRoles, Look, find_roles, kept_roles, look_of
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, to_pyproj
 from geofield.imagery.tags import notes_from_tags, roles_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource
@@ -31,10 +31,13 @@ def palette_of(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
 
 
 def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
-    """What each band shows: as given, as our own tag says, or as found."""
+    """What each band shows: as given, as our own tag says, or as found.
+
+    What is given may be of the picture that a file of ours was made from: it has fewer bands.
+    """
     remembered = roles_from_tags(dataset.tags())
-    if not given and remembered and len(remembered) == dataset.count:
-        given = remembered
+    if remembered and len(remembered) == dataset.count:
+        given = remembered if not given or kept_roles(given) == remembered else given
     marked = [interpretation.name for interpretation in dataset.colorinterp]
     looks: list[Look] = ["picture"] * dataset.count
     if not given:

@@ -9,7 +9,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -112,12 +112,13 @@ class Imagery:
         from geofield.imagery.reader import MAX_SIDE_PX
         from geofield.imagery.sources import PictureSource
 
-        if isinstance(source, PictureSource) and (
-            settings.bands or source.terms.attribution + source.terms.licence == ""
-        ):
-            yield PlacePicture(source.path)
-            return
-        # What the settings say of a picture's terms must travel with it: as a file that says so.
+        if isinstance(source, PictureSource):
+            terms = source.terms
+            if not (terms.attribution or terms.licence or source.date):
+                yield PlacePicture(source.path)
+                return
+            source = replace(source, bands=settings.bands, crs=settings.crs)
+        # What the settings say of a picture must travel with it: as a file that says so.
         own = isinstance(source, PictureSource)
         most_px = source.most_px if own else min(source.most_px, MAX_SIDE_PX)
         first_px = None if own else int(min(_SIDE_PX, most_px))

@@ -32,7 +32,7 @@ from geofield.imagery.opening import OpenOptions
 from geofield.imagery.placing import WarpOrigin, find_place
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scaled_bands
-from geofield.imagery.tags import notes_from_tags, scaling_from_tags, source_from_tags
+from geofield.imagery.tags import is_ours, notes_from_tags, scaling_from_tags, source_from_tags
 from geofield.model.scene import ImagerySource, Scene, outside
 from geofield.wording import counted
 
@@ -132,7 +132,8 @@ class SceneReader:
                 fill = None
                 if not palette and not has_mask:
                     fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha, top=top)
-            own_crs = parse_crs(crs) if crs is not None else crs_of(dataset, path)
+            # A file of ours says its own, which may be another than that of what it was made from.
+            own_crs = crs_of(dataset, path) if crs is None or is_ours(tags) else parse_crs(crs)
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
             negative = dataset.tags(ns="IMAGE_STRUCTURE").get("MINISWHITE") == "YES"

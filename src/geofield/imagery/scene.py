@@ -103,15 +103,32 @@ def read_scene(
         window = reader.window_around(
             lat=lat, lon=lon, size_m=size_m, size_px=size_px, least_m=least_m
         )
-    shape = _shape(reader, window, resolution_m, exact=size_px is not None)
-    scene = reader.read(window, shape_px=shape)
+    scene = read_part(reader, window, resolution_m, exact=size_px is not None)
+    if lat is not None and lon is not None:
+        scene.pixel_of(lat=lat, lon=lon)  # says why when it lies on no data
+    return scene
+
+
+def read_part(
+    reader: SceneReader,
+    window: tuple[int, int, int, int],
+    resolution_m: float | None = None,
+    *,
+    exact: bool = False,
+) -> Scene:
+    """Read a window that holds data, as :func:`read_scene` says coarser where it is large.
+
+    Raises
+    ------
+    ImageryError
+        No data at all.
+    """
+    scene = reader.read(window, shape_px=_shape(reader, window, resolution_m, exact=exact))
     if not scene.valid.any():
         raise ImageryError(
             f"The picture {scene.source.name} holds no data in the part asked for.",
             hint="Choose another point, or check its mask and no-data value with `gdalinfo`.",
         )
-    if lat is not None and lon is not None:
-        scene.pixel_of(lat=lat, lon=lon)  # says why when it lies on no data
     return scene
 
 

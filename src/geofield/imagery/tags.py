@@ -46,6 +46,11 @@ def source_tags(source: ImagerySource) -> dict[str, str]:
     return {name: value for name, value in tags.items() if value}
 
 
+def is_ours(tags: Mapping[str, str]) -> bool:
+    """Whether geofield wrote a file: it says of itself all that there is to say."""
+    return _PREFIX + "MAY_DERIVE" in tags
+
+
 def source_from_tags(tags: Mapping[str, str], path: str) -> ImagerySource:
     """The source that a file's tags tell, named after the file where they tell none."""
 
@@ -59,7 +64,7 @@ def source_from_tags(tags: Mapping[str, str], path: str) -> ImagerySource:
         name=tag("SOURCE") or display_name(path),
         date=date or None,
         attribution=tag("ATTRIBUTION"),
-        licence=tag("LICENCE") or tags.get("TIFFTAG_COPYRIGHT", ""),
+        licence=tag("LICENCE") if is_ours(tags) else tags.get("TIFFTAG_COPYRIGHT", ""),
         may_derive=tag("MAY_DERIVE") != "no",
         may_cache=tag("MAY_CACHE") != "no",
         zoom=int(zoom) if zoom.isdecimal() else None,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 from urllib.parse import quote
 
 from geofield.imagery.sources.mbtiles import MBTilesSource
@@ -63,6 +64,9 @@ class PictureSource:
     #: File, folder, address or STAC file.
     path: str
     date: str | None = None
+    #: bands, crs: what its file does not say of itself (see `OpenOptions`).
+    bands: Sequence[str] | None = None
+    crs: Any = None
 
 
 Tiles = TileSource | MBTilesSource
