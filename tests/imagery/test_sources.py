@@ -27,7 +27,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from geofield.cli.main import cli
-from geofield.crs import parse_crs
+from geofield.crs import LONLAT, WEB_MERCATOR, parse_crs, transformer
 from geofield.errors import (
     ImageryError,
     ImageryWarning,
@@ -837,6 +837,44 @@ def test_stac_items(tmp_path: Path) -> None:
     scene = read_scene(file, lat=lat, lon=lon)
     assert scene.roles == ("red", "green", "blue")
     assert np.array_equal(scene.bands, values[:3])
+
+
+def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:
+    # Web Mercator pixels are finer on the ground towards the north, where the old sheet reaches.
+    x, y = transformer(LONLAT, WEB_MERCATOR).transform(33.0, 35.0)
+
+    def item(year: int, rows: int, pixel: float) -> dict[str, Any]:
+        place = Affine(pixel, 0, x - 20, 0, -pixel, y + pixel * rows - 20)
+        values = np.full((3, rows, 100), year - 1900, np.uint8)
+        values[:, ::2] += 1
+        path = tmp_path / f"{year}_{pixel}.tif"
+        write(path, values, crs="EPSG:3857", transform=place, photometric="RGB")
+        asset = {"href": path.name, "type": "image/tiff", "roles": ["visual"]}
+        properties = {"datetime": f"{year}-06-01T00:00:00Z"}
+        return {"id": str(year), "properties": properties, "assets": {"visual": asset}}
+
+    def shown(*items: dict[str, Any]) -> tuple[int, str]:
+        file = tmp_path / "items.json"
+        file.write_text(json.dumps({"type": "FeatureCollection", "features": items}))
+        scene = read_scene(file, lat=35.0, lon=33.0, size_m=10)
+        return int(scene.bands.min()) + 1900, (scene.source.date or "")[:4]
+
+    assert shown(item(2015, 9000, 0.6), item(2023, 100, 0.6)) == (2023, "2023")
+    assert shown(item(2015, 9000, 0.3), item(2023, 100, 0.6)) == (2015, "2015")
+
+
+@pytest.mark.parametrize(("lat", "lon"), [(35.28, 33.02), (35.15, 33.299), (35.15, 33.301)])
+def test_a_set_of_sheets_in_degrees_is_seen_to_their_borders(
+    tmp_path: Path, lat: float, lon: float
+) -> None:
+    # Sheets of 27 km: each one reprojected reaches 10 km from its middle, or from the point.
+    for n in (0, 1):
+        place = Affine(1e-3, 0, 33.0 + 0.3 * n, 0, -1e-3, 35.3)
+        values = ground(300, 300)
+        write(tmp_path / f"{n}.tif", values, crs="EPSG:4326", transform=place, photometric="RGB")
+    scene = read_scene(tmp_path, lat=lat, lon=lon, size_m=3000)
+    assert min(scene.grid.shape) * scene.grid.ground_resolution_m > 2800
+    assert scene.valid.mean() > 0.97
 
 
 def test_own_pictures_are_cut_as_they_are(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from geofield.grid import Grid
 from geofield.imagery.bands import BandRoles
 from geofield.imagery.gdal import display_name
 from geofield.imagery.opening import OpenOptions
-from geofield.imagery.placing import REACH_M, WarpOrigin, border_px
+from geofield.imagery.placing import REACH_M, WarpOrigin, border_px, square_grid
 from geofield.imagery.reader import SceneReader
 from geofield.model.scene import swapped
 from geofield.notes import warn
@@ -143,7 +143,8 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
             f"{name or 'The collection'} holds no picture that can be read.",
             hint=told or "Give a folder with GeoTIFF files.",
         )
-    reference = _reference(readers, options.point, name, told)
+    at = _reference(readers, options.point, name, told)
+    reference = readers[at] = _around_point(readers[at], options.point)
     if damaged:
         warn(told, ImageryWarning, stacklevel=2)
     unlike = [_unlike(each, reference) for each in readers]
@@ -222,37 +223,46 @@ def _looked_at(path: str, options: OpenOptions) -> SceneReader:
 
 def on_grid(reader: SceneReader, grid: Grid) -> SceneReader:
     """The same picture read through a reprojection to another grid."""
-    origin = reader.warped_from or WarpOrigin(reader.grid.crs, reader.grid.transform)
+    origin = reader.warped_from or WarpOrigin(reader.grid.crs, reader.grid)
     return replace(reader, grid=grid, warped_from=origin)
+
+
+def _around_point(reader: SceneReader, point: tuple[float, float] | None) -> SceneReader:
+    """A picture that is reprojected, for a point that it shows."""
+    if point is None or reader.own_grid is reader.grid:
+        return reader
+    return replace(reader, grid=square_grid(reader.own_grid, point))
 
 
 def _reference(
     readers: list[SceneReader], point: tuple[float, float] | None, name: str, left_out: str
-) -> SceneReader:
-    """The finest picture at the point; the first of equals."""
-    here = readers
+) -> int:
+    """The number of the finest picture at the point; the first of equals."""
+    grids = [each.own_grid for each in readers]
+    places = [(grid.width_px / 2, grid.height_px / 2) for grid in grids]
+    here = list(range(len(grids)))
     if point is not None:
-        here = [each for each in readers if each.grid.contains_px(*each.grid.from_lonlat(*point))]
+        places = [grid.from_lonlat(*point) for grid in grids]
+        here = [at for at in here if grids[at].contains_px(*places[at])]
         if not here:
-            raise PointOutsideError(_outside(readers, *point, name), hint=left_out)
-    return min(here, key=lambda each: round(each.grid.ground_resolution_m, 4))
+            raise PointOutsideError(_outside(grids, *point, name), hint=left_out)
+    # At the point itself: in most systems pixels of one size are others from place to place.
+    return min(here, key=lambda at: round(grids[at].resolution_at(*places[at]), 4))
 
 
-def _outside(readers: list[SceneReader], lon: float, lat: float, name: str) -> str:
-    corners = [corner for each in readers for corner in each.grid.corners_lonlat()]
+def _outside(grids: list[Grid], lon: float, lat: float, name: str) -> str:
+    corners = [corner for each in grids for corner in each.corners_lonlat()]
     lons, lats = [c[0] for c in corners], [c[1] for c in corners]
-    one = len(readers) == 1
+    one = len(grids) == 1
     all_of, covers = (
-        ("the picture", "covers a part") if one else (f"all {len(readers)} pictures", "cover parts")
+        ("the picture", "covers a part") if one else (f"all {len(grids)} pictures", "cover parts")
     )
     message = (
         f"The point lat {lat}, lon {lon} lies outside {all_of} of {name or 'the collection'}, "
         f"which {covers} of lat {min(lats):.6f} to {max(lats):.6f}, lon {min(lons):.6f} to "
         f"{max(lons):.6f}."
     )
-    if abs(lon) <= 90 and any(
-        each.grid.contains_px(*each.grid.from_lonlat(lat, lon)) for each in readers
-    ):
+    if abs(lon) <= 90 and any(each.contains_px(*each.from_lonlat(lat, lon)) for each in grids):
         message += f" {swapped(lat, lon)}"
     return message
 
@@ -261,7 +271,7 @@ def _unlike(reader: SceneReader, reference: SceneReader) -> str:
     """Why a picture cannot be joined to the reference; "" where it can."""
     name, own = display_name(reference.path), reader.shown_roles
     wanted = [role for role in reference.shown_roles if role != "nir"] or reference.shown_roles
-    by_points = reader.warped_from is not None and reader.warped_from.transform is None
+    by_points = reader.warped_from is not None and reader.warped_from.grid is None
     if reader is reference:
         return ""
     if reader.dtype != reference.dtype:
@@ -296,7 +306,10 @@ def _common_grid(
     if point is not None:
         x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
-    px = np.array([_border_px(reader, base) for reader in readers])
+    # All of the others; of the reference what its grid shows around the point.
+    px = np.array(
+        [_border_px(base if each is reference else each.own_grid, base) for each in readers]
+    )
     low = np.maximum(px.min(axis=2), (x0 - reach, y0 - reach))
     high = np.minimum(px.max(axis=2), (x0 + reach, y0 + reach))
     there = np.isfinite(px).all(axis=(1, 2)) & (high > low).all(axis=1)
@@ -312,15 +325,14 @@ def _common_grid(
     return grid, places
 
 
-def _border_px(reader: SceneReader, base: Grid) -> NDArray[np.float64]:
+def _border_px(grid: Grid, base: Grid) -> NDArray[np.float64]:
     """Where the border of a picture lies on another one's grid: columns and rows."""
-    border = reader.grid.to_native(*border_px(reader.grid, 9))
-    return np.array(base.from_crs(*border, reader.grid.crs))
+    return np.array(base.from_crs(*grid.to_native(*border_px(grid, 9)), grid.crs))
 
 
 def _around(reader: SceneReader, grid: Grid) -> _Box | None:
     """The pixels of a grid, inside or not, near which a picture lies; None where it is far."""
-    px = _border_px(reader, grid)
+    px = _border_px(reader.own_grid, grid)
     if not np.isfinite(px).all():
         return None
     (left, top), (right, bottom) = px.min(axis=1) - _NEAR_PX, px.max(axis=1) + _NEAR_PX

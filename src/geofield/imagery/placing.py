@@ -39,22 +39,21 @@ LonLat = tuple[float, float]
 class WarpOrigin:
     """How the file itself is placed, for a picture that is read through a reprojection.
 
-    Without a transform its ground control points place it.
+    Without a grid its ground control points place it.
     """
 
     crs: CRS
-    transform: Affine | None = None
+    grid: Grid | None = None
 
     def window(self, shape: tuple[int, int], grid: Grid) -> Window:
         """The pixels of the file, of `shape` (rows, columns), that a reprojected grid shows."""
         height, width = shape
         whole = Window(0, 0, width, height)
-        if self.transform is None:
+        if self.grid is None:
             return whole
         edge = np.linspace(0.0, 1.0, 9)
         x, y = (each.ravel() for each in np.meshgrid(edge * grid.width_px, edge * grid.height_px))
-        native = Grid(width, height, self.transform, self.crs)
-        x, y = native.from_crs(*grid.to_crs(x, y, self.crs), self.crs)
+        x, y = self.grid.from_crs(*grid.to_crs(x, y, self.crs), self.crs)
         if not (np.isfinite(x).all() and np.isfinite(y).all()):
             return whole
         # Between the places looked at, and to sample between pixels, a little more is shown.
@@ -116,9 +115,9 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     why = f"its pixels are skewed by {skew_deg:.0f} degrees"
     if aspect > MAX_ASPECT:
         why = f"its pixels are {aspect:.2f} times longer one way"
-    grid = _square_grid(native, point)
+    grid = square_grid(native, point)
     note = f"Reprojected from {crs.name} to {grid.crs.name}: {why} on the ground."
-    return Place(grid, WarpOrigin(crs, transform), (note,), guesses)
+    return Place(grid, WarpOrigin(crs, native), (note,), guesses)
 
 
 def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
@@ -153,8 +152,8 @@ def border_px(grid: Grid, per_side: int) -> tuple[NDArray[np.float64], NDArray[n
     return x * grid.width_px, y * grid.height_px
 
 
-def _square_grid(native: Grid, point: LonLat | None) -> Grid:
-    """Square metres over a picture: in the metric CRS of the point, else of its centre."""
+def square_grid(native: Grid, point: LonLat | None) -> Grid:
+    """Square metres over a picture: around the point, in its metric CRS, else around its centre."""
     here = native.centre_lonlat if point is None else point
     local = native
     if point is not None:

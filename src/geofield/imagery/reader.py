@@ -83,7 +83,7 @@ class SceneReader:
     negative: bool = False
     #: The scaling that made the file's own bytes.
     scaled_before: tuple[float, float] | None = None
-    #: Set where the file is read through a warp: its own CRS, control points or transform.
+    #: Set where the file is read through a warp: its own CRS, control points or grid.
     warped_from: WarpOrigin | None = None
     #: What a VRT may lead to.
     reach: Reach = OWN_FOLDER
@@ -162,6 +162,12 @@ class SceneReader:
     def shown_roles(self) -> tuple[str, ...]:
         """What the bands that a scene keeps show, in the file's order."""
         return tuple(self.roles.roles[i] for i in self.roles.shown)
+
+    @property
+    def own_grid(self) -> Grid:
+        """Where all of the file lies: what is reprojected reaches no farther than 10 km."""
+        origin = self.warped_from
+        return self.grid if origin is None or origin.grid is None else origin.grid
 
     # -- which part ------------------------------------------------------------------------
 
@@ -337,9 +343,9 @@ class SceneReader:
             return
         origin = self.warped_from
         options: dict[str, Any] = {"src_crs": to_rasterio(origin.crs)}
-        if origin.transform is not None:
+        if origin.grid is not None:
             options |= {
-                "src_transform": origin.transform,
+                "src_transform": origin.grid.transform,
                 "transform": self.grid.transform,
                 "width": self.grid.width_px,
                 "height": self.grid.height_px,

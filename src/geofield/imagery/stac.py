@@ -37,7 +37,7 @@ def is_stac(path: Path) -> bool:
 
 
 def open_stac(path: Path, options: OpenOptions) -> SceneReader:
-    """A reader over the items of a file that hold the point, the newest first.
+    """A reader over the items of a file that hold the point: the finest, of equals the newest.
 
     Raises
     ------
@@ -65,7 +65,9 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
             f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
             hint="Give items with assets of the role `data` or `visual`.",
         )
-    return open_collection([picture for picture, _ in items], items[0][1], name=path.name)
+    reader = open_collection([picture for picture, _ in items], items[0][1], name=path.name)
+    # Of the one that is shown at the point: a finer one may be older.
+    return replace(reader, source=dict(items)[reader.path].source or reader.source)
 
 
 def _document(path: Path) -> Any:
