@@ -53,6 +53,7 @@ from geofield.windows import (
     open_scene,
     refuse_elsewhere,
     shows_all,
+    shows_points,
     tell_guesses,
     wider,
 )
@@ -117,11 +118,11 @@ def plan_field(
     Plan
     """
     settings = with_values(settings, **by_name)
-    tell = progress or (lambda done, total, what: None)
-    timings = timings_s if timings_s is not None else {}
+    tell, timings = progress or (lambda *_: None), {} if timings_s is None else timings_s
     with _timed("picture", timings, tell):
         known = known_outline(boundary, previous, lat, lon)
-        picture = _seen(scene, lat, lon, settings, known)
+        previous = of_the_same_field(previous, lat, lon)
+        picture = _seen(scene, lat, lon, with_points(settings, previous), known)
     with _timed("field", timings, tell):
         plan = run_field(
             scene,
@@ -165,10 +166,10 @@ def run_field(
     previous = of_the_same_field(previous, lat, lon)
     # Regions have the numbers that a list of them gave, before there was an outline.
     known = None if regions else known_outline(boundary, previous, lat, lon)
-    scene = _seen(picture, lat, lon, settings, known) if window is None else window
-    told = set() if previous is None else points_said(previous.settings)
+    told = points_said(None if previous is None else previous.settings)
     said = bool(points_said(settings) - told or regions)
     settings, told_tracks = with_said_tracks(with_points(settings, previous), previous)
+    scene = _seen(picture, lat, lon, settings, known) if window is None else window
     choosing = bool(previous is not None and choose and previous.field.alternatives)
     kept = previous is not None and not choosing and _keeps(previous, boundary, said=said)
     if previous is not None and choose and choosing:
@@ -269,11 +270,11 @@ def _find(
         # Numbers of regions, and a picture that is given as a value, do not change.
         return extract_field(scene, lat=lat, lon=lon, regions=regions, **options), scene
     first_m = first_side_m(scene, lat, lon, settings)
-    latest = scene
+    shown, latest = shows_points(scene, settings), scene
 
     def read(size_m: float) -> Scene:
         nonlocal latest
-        if size_m == first_m:
+        if shown and size_m == first_m:
             return scene
         path = fetch_wider(size_m) if fetch_wider is not None else picture
         if path is None:
@@ -382,9 +383,7 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
 
 def _with_section(old: Settings | None, new: Settings, section: str) -> Settings:
     """The settings that led to the plan: each stage's own, from the run that did it."""
-    if old is None:
-        return new
-    return old.model_copy(update={section: getattr(new, section)})
+    return new if old is None else old.model_copy(update={section: getattr(new, section)})
 
 
 @contextmanager

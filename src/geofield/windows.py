@@ -135,10 +135,18 @@ def showing(settings: Settings, lat: float, lon: float, outline: Field | None) -
 
 
 def first_side_m(scene: Scene, lat: float, lon: float, settings: Settings) -> float:
-    """Side of the window that a scene was read in, ground metres."""
-    if settings.imagery.size_m is None:
-        return max(scene.grid.shape) * scene.grid.ground_resolution_m
-    return max(settings.imagery.size_m, reach_m(lat, lon, settings, None))
+    """Side of the window that a scene was read in, or must be to show the points, ground metres."""
+    size_m = settings.imagery.size_m
+    side_m = size_m or max(scene.grid.shape) * scene.grid.ground_resolution_m
+    if size_m is None and shows_points(scene, settings):
+        return side_m
+    return max(side_m, reach_m(lat, lon, settings, None))
+
+
+def shows_points(scene: Scene, settings: Settings) -> bool:
+    """Whether a scene shows all further points; one that was fetched is around the point alone."""
+    places = (*settings.field.include, *settings.field.exclude)
+    return all(scene.grid.contains_px(*scene.grid.from_lonlat(*place)) for place in places)
 
 
 def shows_all(path: str | Path, lat: float, lon: float, scene: Scene, settings: Settings) -> bool:

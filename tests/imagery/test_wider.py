@@ -140,6 +140,25 @@ def test_a_server_is_asked_for_more(
         assert plan.frame_lines
 
 
+@pytest.mark.parametrize("fetched", [False, True])
+def test_a_further_point_is_shown_now_and_by_the_next_run(
+    tiles: Path, tmp_path: Path, fetched: bool
+) -> None:
+    # 80 m from the point, in a first window that ends 30 m from it.
+    picture, further = tiles if fetched else tiles.parent / "rgb.tif", (33.5318, 35.0758)
+    command = ["field", picture, *POINT, "--size-m", 60, "-o", tmp_path / "f.gpkg"]
+    told(*command, "--include-lonlat", "{},{}".format(*further))
+    assert overlap(read_plan(tmp_path / "f.gpkg")) > 0.97
+    told(*command, "--overwrite")
+    again = read_plan(tmp_path / "f.gpkg")
+    assert again.settings is not None
+    assert again.settings.field.include == (further,)
+    assert overlap(again) > 0.97
+    slip = [*command[:-1], tmp_path / "slip.gpkg", "--include-lonlat", "34.5318,35.0758"]
+    refused = CliRunner().invoke(cli, [str(each) for each in slip])
+    assert "of include lies outside the picture" in str(refused.exception)
+
+
 def test_terms_are_acknowledged_by_the_field_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
