@@ -99,6 +99,14 @@ def test_tracks_need_their_field():
         gf.evaluate(around("detected", 0.9, (1, 1)), points((1, 1)), segments=lines(5))
 
 
+def test_segments_of_another_zone_are_brought_to_the_area():
+    found, truth = around("detected", 0.9, (80, 50)), points((20, 11), (50, 50))
+    here = gf.evaluate(found, truth, area=FIELD, segments=lines(10)).driving
+    beside = gf.evaluate(found, truth, area=FIELD, segments=lines(10).to_crs(32635)).driving
+    assert (beside.things, beside.driven_through) == (here.things, here.driven_through) == (2, 1)
+    assert beside.driven_through_m == pytest.approx(here.driven_through_m, rel=1e-4)
+
+
 def geofield(*arguments, folder):
     return run_geofield(*arguments, folder=folder)
 

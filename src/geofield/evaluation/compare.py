@@ -78,7 +78,8 @@ def evaluate(
     Parameters
     ----------
     detected : GeoDataFrame, or mapping of picture name to GeoDataFrame
-        Obstacles as :func:`geofield.detect_obstacles` returns them; rejected ones are left out.
+        Obstacles as :func:`geofield.detect_obstacles` returns them; those that are rejected or
+        merely possible are left out.
     truth : GeoDataFrame, or mapping of picture name to GeoDataFrame
         Points, boxes or polygons; a column ``radius_m``, where there is one, or the radius of
         the circle of a polygon's area is the true radius. Of a reviewed plan's obstacles those
@@ -136,7 +137,7 @@ def evaluate(
         for name in found:
             lines = segments[name] if isinstance(segments, Mapping) else segments
             ground = area[name] if isinstance(area, Mapping) else area
-            lost += driving(lines, found[name], active(true[name]), ground)
+            lost += driving(lines.to_crs(found[name].crs), found[name], active(true[name]), ground)
     return Evaluation(pooled, images, matches, distance_m, lost, dict(false_kinds))
 
 
