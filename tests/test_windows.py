@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rasterio
 import rasterio.shutil
@@ -12,6 +13,7 @@ import rasterio.windows
 from shapely.affinity import translate
 
 import geofield as gf
+from geofield.crs import LONLAT, transformer
 from geofield.errors import ObstacleWarning, PointOutsideError
 from geofield.imagery import reader, scene
 from geofield.pipeline import plan_field, run_obstacles
@@ -106,3 +108,26 @@ def test_a_parcel_of_which_the_picture_shows_a_part_beside_its_middle(tmp_path: 
     lon, lat = elsewhere.inside_lonlat
     with pytest.raises(PointOutsideError):
         plan_field(tmp_path / "part.tif", lat=lat, lon=lon, settings=settings(), boundary=elsewhere)
+
+
+def test_a_parcel_with_a_gap_of_the_data_in_its_middle(tmp_path: Path) -> None:
+    lon, lat = TRUTH.field.inside_lonlat
+    with rasterio.open(PICTURE) as opened:
+        profile, pixels = {**opened.profile, "driver": "GTiff"}, opened.read()
+        row, column = opened.index(*transformer(LONLAT, TRUTH.field.crs).transform(lon, lat))
+    mask = np.full(pixels.shape[1:], 255, np.uint8)
+    mask[row - 20 : row + 20, column - 20 : column + 20] = 0
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True),
+        rasterio.open(tmp_path / "gap.tif", "w", **profile) as gap,
+    ):
+        gap.write(pixels)
+        gap.write_mask(mask)
+        gap.set_band_description(4, "nir")
+    at = {"lat": lat, "lon": lon, "settings": settings()}
+    with pytest.warns(ObstacleWarning, match="does not show 2% of the field"):
+        plan = plan_field(tmp_path / "gap.tif", **at, boundary=TRUTH.field)
+    assert plan.obstacles is not None
+    assert len(plan.obstacles) >= 20
+    with pytest.raises(PointOutsideError, match="no data"):
+        plan_field(tmp_path / "gap.tif", **at)

@@ -96,8 +96,9 @@ def _read(
     shown_m = reach_m(lat, lon, settings, outline)
     if asked["size_m"] is not None:
         asked["size_m"] = max(asked["size_m"], shown_m)
-    least_m = max(WINDOW_M, shown_m)
-    return read_scene(path, lat=lat, lon=lon, allow=settings.fetch.allow, least_m=least_m, **asked)
+    # Of a field that is known a gap of the data in its middle is one as any other.
+    asked |= {"least_m": max(WINDOW_M, shown_m), "on_data": outline is None}
+    return read_scene(path, lat=lat, lon=lon, allow=settings.fetch.allow, **asked)
 
 
 def _point_shown(

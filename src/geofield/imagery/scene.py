@@ -29,6 +29,7 @@ def read_scene(
     source: ImagerySource | None = None,
     allow: Sequence[str] = (),
     least_m: float = 0.0,
+    on_data: bool = True,
 ) -> Scene:
     """Read the picture around a point.
 
@@ -46,7 +47,7 @@ def read_scene(
     path : path or str
         A raster file, or an http(s) address of a GeoTIFF.
     lat, lon : float, optional
-        The point, degrees, WGS 84; it must lie on the picture's data.
+        The point, degrees, WGS 84; it must lie on the picture.
     size_m, size_px : optional
         Side of the square around the point, ground metres or pixels; by default all of the
         picture, or the part around the point where the picture is enormous.
@@ -67,6 +68,8 @@ def read_scene(
     least_m : float
         Of an enormous picture without a size, at least a square of this side is read, ground
         metres; coarser where that would be more than 4096 pixels.
+    on_data : bool
+        Whether the point must lie where the picture has data.
 
     Raises
     ------
@@ -104,7 +107,7 @@ def read_scene(
             lat=lat, lon=lon, size_m=size_m, size_px=size_px, least_m=least_m
         )
     scene = read_part(reader, window, resolution_m, exact=size_px is not None)
-    if lat is not None and lon is not None:
+    if lat is not None and lon is not None and on_data:
         scene.pixel_of(lat=lat, lon=lon)  # says why when it lies on no data
     return scene
 
