@@ -228,6 +228,27 @@ def test_a_reader_gives_the_same_as_its_scene(simulated, simulated_tif):
     assert found["x_px"].to_numpy() == pytest.approx(whole["x_px"].to_numpy(), abs=1e-6)
 
 
+def test_windows_of_a_very_fine_picture_fit_into_memory():
+    class Reader:
+        grid = gf.Grid(
+            200_000, 200_000, Affine(0.02, 0, 548_000, 0, -0.02, 3_881_000), "EPSG:32636"
+        )
+
+        def read(self, window=None, *, shape_px=None, scaling=None, nir_scaling=None):
+            if shape_px is None:
+                raise InterruptedError(window)
+            rows, columns = shape_px
+            bands = np.random.default_rng(0).integers(0, 255, (3, rows, columns), dtype=np.uint8)
+            grid = self.grid.resized(columns, rows)
+            return Scene(grid, bands, ("red", "green", "blue"), np.ones((rows, columns), bool))
+
+    with pytest.raises(InterruptedError) as asked:
+        gf.detect_obstacles(Reader())
+    _, _, width_px, height_px = asked.value.args[0]
+    # Of 31 000 px without its overlap it had more than 3 GB in three bands.
+    assert 8_000 < width_px == height_px < 14_000
+
+
 def test_a_coarse_picture_warns(simulated):
     scene = simulated.scene
     grid = scene.grid.resized(scene.grid.width_px // 4, scene.grid.height_px // 4)

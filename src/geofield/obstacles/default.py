@@ -48,6 +48,8 @@ FloatArray = NDArray[np.float64]
 
 CORE_PX = 1728
 """Side of a window without its overlap, working pixels: 1024 px of 0.6 m are one."""
+_CORE_PX_READ = 8192
+"""The same at most in pixels of the picture: of 2 cm, 1728 working pixels are 31 000."""
 _BESIDE_PX = 96
 """So far around what is in reach crowns are looked for, too, working pixels."""
 _BELOW, _ABOVE = 0.6, 1.4
@@ -197,7 +199,8 @@ def _look(
     """
     # Stronger crowns a little farther away may be the same ones as those within reach.
     wide = None if reach is None else reach.buffer(_BESIDE_PX * factor).bounds
-    todo = list(windows(picture.grid.shape, CORE_PX, OVERLAP_PX, WHOLE_PX, factor, wide))
+    core_px = min(CORE_PX, max(int(_CORE_PX_READ / factor) // WHOLE_PX, 1) * WHOLE_PX)
+    todo = list(windows(picture.grid.shape, core_px, OVERLAP_PX, WHOLE_PX, factor, wide))
     if reach is not None:
         todo = [w for w in todo if reach.intersects(shapely.box(*w.core))]
     crowns, seen_px, gaps_px = Circles(), 0, 0
