@@ -25,6 +25,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from rasterio.control import GroundControlPoint
 
 from geofield.cli.main import cli
 from geofield.crs import LONLAT, WEB_MERCATOR, parse_crs, transformer
@@ -861,6 +862,33 @@ def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:
 
     assert shown(item(2015, 9000, 0.6), item(2023, 100, 0.6)) == (2023, "2023")
     assert shown(item(2015, 9000, 0.3), item(2023, 100, 0.6)) == (2015, "2015")
+
+
+@pytest.mark.parametrize("pixel", [RESOLUTION, 200.0])
+def test_a_picture_with_control_points_lies_in_a_set_as_alone(tmp_path: Path, pixel: float) -> None:
+    # Beside a sheet that reaches farther to the north-west, or wider than what is looked at.
+    def place(column: float, row: float) -> tuple[float, float]:
+        return EAST + pixel * column, NORTH - pixel * row
+
+    corners = [(c, r) for c in (0, 128) for r in (0, 96)]
+    gcps = [
+        GroundControlPoint(row=r, col=c, x=place(c, r)[0], y=place(c, r)[1]) for c, r in corners
+    ]
+    profile: dict[str, Any] = {"driver": "GTiff", "count": 3, "dtype": "uint8", "crs": UTM}
+    path = tmp_path / "set" / "points.tif"
+    path.parent.mkdir()
+    with rasterio.open(path, "w", width=128, height=96, gcps=gcps, **profile) as file:
+        file.write(ground())
+    beside = Affine(2 * pixel, 0, EAST - 20 * pixel, 0, -2 * pixel, NORTH + 20 * pixel)
+    write(path.with_name("beside.tif"), ground(), transform=beside, photometric="RGB")
+    lon, lat = transformer(parse_crs(UTM), LONLAT).transform(*place(90, 60))
+    at = {"lat": lat, "lon": lon, "size_px": 21}
+    alone, among = read_scene(path, **at), read_scene(path.parent, **at)
+    assert among.grid == alone.grid
+    assert np.array_equal(among.bands, alone.bands)
+    assert "beside.tif was left out: only control points place points.tif" in " ".join(
+        among.guesses
+    )
 
 
 @pytest.mark.parametrize(("lat", "lon"), [(35.28, 33.02), (35.15, 33.299), (35.15, 33.301)])

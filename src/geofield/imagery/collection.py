@@ -271,7 +271,6 @@ def _unlike(reader: SceneReader, reference: SceneReader) -> str:
     """Why a picture cannot be joined to the reference; "" where it can."""
     name, own = display_name(reference.path), reader.shown_roles
     wanted = [role for role in reference.shown_roles if role != "nir"] or reference.shown_roles
-    by_points = reader.warped_from is not None and reader.warped_from.grid is None
     if reader is reference:
         return ""
     if reader.dtype != reference.dtype:
@@ -285,9 +284,16 @@ def _unlike(reader: SceneReader, reference: SceneReader) -> str:
             f"it shows {shows}, unlike {name}; make it a picture of the same bands, as with "
             "gdal_translate -b or -expand rgb"
         )
-    if by_points:
-        return "only control points place it; make a GeoTIFF of it with gdalwarp"
+    for each in (reader, reference):
+        if _by_points(each):
+            which = display_name(each.path)
+            return f"only control points place {which}; make a GeoTIFF of it with gdalwarp"
     return ""
+
+
+def _by_points(reader: SceneReader) -> bool:
+    """Whether control points alone place a picture: GDAL fits them on a grid of its own choice."""
+    return reader.warped_from is not None and reader.warped_from.grid is None
 
 
 def _meet(one: _Box, other: _Box) -> bool:
@@ -303,7 +309,7 @@ def _common_grid(
     base = reference.grid
     reach = math.inf
     x0, y0 = base.width_px / 2, base.height_px / 2
-    if point is not None:
+    if point is not None and not _by_points(reference):
         x0, y0 = base.from_lonlat(*point)
         reach = REACH_M / base.ground_resolution_m
     # All of the others; of the reference what its grid shows around the point.

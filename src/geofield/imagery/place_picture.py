@@ -125,7 +125,7 @@ class Imagery:
         with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
 
             def fetch(size_m: float | None) -> Acquired:
-                path = Path(folder) / f"scene_{size_m or 0:.0f}.tif"
+                path = Path(folder) / f"scene_{size_m or 0}.tif"
                 side_px = None if size_m else first_px
                 where = Where(lat=lat, lon=lon, size_m=size_m, size_px=side_px)
                 return acquire(source, where, path, options=options, progress=progress)
