@@ -193,6 +193,19 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
         main(["evaluate", *arguments, "--draw", str(tmp_path / "hits.png"), "--overwrite"])
 
 
+@pytest.mark.parametrize("rows", ["", '{"type": "Feature", "properties": {}, "geometry": null}'])
+def test_a_file_in_degrees_in_which_nothing_lies_anywhere(tmp_path, capsys, rows):
+    from geofield.cli import main
+
+    none = tmp_path / "none.geojson"
+    none.write_text(f'{{"type": "FeatureCollection", "features": [{rows}]}}')
+    with pytest.raises(SystemExit, match="0"):
+        main(["evaluate", str(none), "sample_data/field_1.gpkg", "--json"])
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures["hits"], figures["detected"], figures["truth"]) == (0, 0, 21)
+    assert figures["recall"] == 0.0
+
+
 def test_a_truth_of_another_place_is_told():
     found = table([(500_000, 4_000_000)])
     turned = found.to_crs(4326).geometry.transform(lambda xy: xy[:, ::-1])

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from geofield import schema
-from geofield.crs import is_utm
+from geofield.crs import is_utm, utm_crs
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.evaluation.scores import reliability
@@ -72,8 +72,9 @@ def read_obstacles(
     refuse_nowhere(frame.geometry.to_numpy(), path.name)
     if frame.crs is None:
         raise CRSError(f"{path.name} has no CRS.", hint="Set it in QGIS: Set layer CRS.")
-    if metric and len(frame) and not is_utm(frame.crs):
-        frame = frame.to_crs(frame.estimate_utm_crs())
+    if metric and not is_utm(frame.crs):
+        lies = np.isfinite(frame.total_bounds).all()  # else any zone will do
+        frame = frame.to_crs(frame.estimate_utm_crs() if lies else utm_crs(0.0, 0.0))
     return frame
 
 
