@@ -45,6 +45,14 @@ def test_numbers_as_names_have_no_point(tmp_path):
     assert list(field[["name", "field_id"]].iloc[0]) == ["12", "17"]
 
 
+@pytest.mark.parametrize("name", ["field.geoparquet", "field.pq"])
+def test_geoparquet_under_its_other_names(tmp_path, name):
+    """`tracks` read them, `import`, `info` and `validate` did not know them."""
+    gpd.GeoDataFrame(geometry=[BOX], crs=UTM).to_parquet(tmp_path / name)
+    assert read_dataset(tmp_path / name).table("field").geometry.iloc[0].equals(BOX)
+    assert read_dataset(tmp_path).has("field")
+
+
 def test_feet_become_metres(tmp_path):
     feet = "EPSG:2227"  # California zone 3, US survey feet
     shape = gpd.GeoSeries([shapely.box(-121.5, 37.5, -121.498, 37.501)], crs="EPSG:4326")

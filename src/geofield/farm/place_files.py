@@ -17,7 +17,7 @@ import shapely
 
 from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
-from geofield.formats.foreign import PARQUET
+from geofield.formats.catalogue import PARQUET
 from geofield.strangers import check_vector, unreadable
 from geofield.wording import nearest
 

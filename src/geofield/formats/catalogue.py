@@ -12,6 +12,9 @@ _ALL = tuple(layer.name for layer in schema.LAYERS if not layer.working)
 _MAP = ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns")
 _ORIGIN = Drop("settings and evidence", "provenance")
 
+#: Endings of GeoParquet.
+PARQUET = (".parquet", ".geoparquet", ".pq")
+
 _PASSED = Drop("obstacles that tracks run through", "passed")
 
 _TERMINAL_DROPS = (
@@ -119,7 +122,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("geoparquet/<layer>.parquet",),
         writer="geofield.formats.geoparquet:write",
         reader="geofield.formats.geoparquet:read",
-        suffixes=(".parquet",),
+        suffixes=PARQUET,
         precision_m=0.0,
         crs="metric",
     ),

@@ -23,6 +23,7 @@ from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
 from geofield.errors import EmptyFileError, FormatError, FormatWarning
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
+from geofield.formats.catalogue import PARQUET
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.notes import warn
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RawLayer", "files_in", "layer_names", "read_foreign", "read_parquet", "read_vector"]
 
-
-#: Endings of GeoParquet.
-PARQUET = (".parquet", ".geoparquet", ".pq")
 #: Of GDAL's opening a file that has no layer, of dates that are none, of systems in pieces.
 _DAMAGED = (IndexError, ValueError, ProjError)
 #: No coordinate of a metric CRS is larger.

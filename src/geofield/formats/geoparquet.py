@@ -20,6 +20,7 @@ from pyproj import CRS
 from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.arrow import layer_batches
+from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import RawLayer, files_in, read_foreign, read_parquet
 from geofield.model import Dataset
 
@@ -114,7 +115,7 @@ def read(path: Path) -> Dataset:
     import pyarrow.parquet as pq
 
     layers, record = [], None
-    for file in files_in(path, ".parquet"):
+    for file in files_in(path, *PARQUET):
         try:
             text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
             if text is not None:
