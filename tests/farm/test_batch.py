@@ -466,13 +466,17 @@ def test_parcels_without_shape_fail_alone(tmp_path: Path) -> None:
     # A point that came along with a parcel is no field.
     third = frame.geometry[2]
     frame.loc[2, "geometry"] = shapely.GeometryCollection([third, third.centroid])
-    frame.to_file(tmp_path / "odd.gpkg")
-    said = batch(tmp_path / "odd.gpkg", "--spacing", 20, "--workers", 1, "--out", tmp_path / "farm")
+    frame["photo"] = [b"\xff\xd8"] * 4
+    frame.to_parquet(tmp_path / "odd.parquet")
+    said = batch(
+        tmp_path / "odd.parquet", "--spacing", 20, "--workers", 1, "--out", tmp_path / "farm"
+    )
     assert "4 of 4: 3 done, 1 failed" in said
     assert "1 place has no plan" in said
     failed = pd.read_csv(tmp_path / "farm" / "failed.csv")
     assert failed["error"].to_list() == ["The row has no position."]
     assert failed["hint"].to_list() == ["Give it a shape, or a latitude and a longitude."]
+    assert failed["photo"].to_list() == ["ffd8"]
     overview = tmp_path / "farm" / "farm.gpkg"
     assert [len(gpd.read_file(overview, layer=one)) for one in ("field", "places")] == [3, 3]
 

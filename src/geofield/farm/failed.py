@@ -68,5 +68,8 @@ def _positions(places: Places, at: Any) -> dict[str, Any]:
 def _text(column: Any) -> Any:
     """What CSV has no type for, as text."""
     kind = column.type
+    if pa.types.is_binary(kind):  # a photo, say
+        told = [None if one is None else one.hex() for one in column.to_pylist()]
+        return pa.array(told, pa.string())
     plain = pa.types.is_primitive(kind) or pa.types.is_string(kind)
     return column if plain else column.cast(pa.string())
