@@ -138,6 +138,14 @@ def test_many_polygons_make_many_plans(tmp_path: Path) -> None:
     assert again.exit_code != 0
 
 
+def test_names_longer_than_those_of_files_may_be(tmp_path: Path) -> None:
+    """The first one ended the work, and those behind it had no plan."""
+    outlines(3).assign(name="ö" * 200).to_file(tmp_path / "parcels.gpkg")
+    report = run(tmp_path / "parcels.gpkg", "--spacing", "8", "--each", "-o", tmp_path / "plans")
+    assert [row["name"] for row in report["fields"]] == ["ö" * 200] * 3
+    assert len(list((tmp_path / "plans").glob("*.gpkg"))) == 3
+
+
 def test_many_polygons_make_one_file(tmp_path: Path) -> None:
     frame = outlines(3).assign(crop=["rye", "oats", "rye"], spacing_m=[None, 16.0, None])
     frame.to_file(tmp_path / "parcels.gpkg")

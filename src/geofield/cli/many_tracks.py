@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 Told = tuple[list[dict[str, Any]], dict[str, str]]
 #: Up to so many fields are planned in this process: workers take seconds to begin.
 _FEW = 100
+#: Names of files may have 255 bytes, with what comes behind them.
+_NAME_BYTES = 200
 #: Up to so many fields each has a line of its own.
 _LISTED = 50
 
@@ -191,7 +193,8 @@ def _inputs(places: Places, job: Job) -> list[Path | str]:
 
 def file_name(name: str) -> str:
     """A field's name as that of a file on a disk, which has letters of every script."""
-    return re.sub(r"[^\w.-]+", "_", name).strip("._-") or "field"
+    plain = re.sub(r"[^\w.-]+", "_", name).strip("._-")
+    return plain.encode()[:_NAME_BYTES].decode(errors="ignore") or "field"
 
 
 def figures_of(plan: Plan, target: Path, notes: Iterable[str]) -> dict[str, Any]:
