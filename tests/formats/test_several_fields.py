@@ -295,6 +295,7 @@ def test_each_field_of_a_set_of_shapefiles_has_its_own_tracks(tmp_path):
     write_datasets(FARM[:2], tmp_path, ["shapefile", "isoxml"])
     done = geofield("import", tmp_path / "shapefile", "-o", tmp_path / "all.gpkg")
     assert done.returncode == 0, done.stderr
+    assert ": 2 fields, " in done.stderr
     tracks = pyogrio.read_dataframe(tmp_path / "all.gpkg", layer="tracks")
     wanted = [len(each.table("tracks")) for each in FARM[:2]]
     assert tracks["field_id"].value_counts(sort=False).tolist() == wanted

@@ -74,8 +74,7 @@ def import_(
             }
         )
         return
-    names = {layer: layer.replace("_", " ").removesuffix("s") for layer in counts}
     found = ", ".join(
-        counted(count, names[layer], layer.replace("_", " ")) for layer, count in counts.items()
+        counted(count, layer.replace("_", " ").removesuffix("s")) for layer, count in counts.items()
     )
     say(f"{dataset.name}: {found} in {output}")
