@@ -63,6 +63,19 @@ def test_isoxml_in_an_archive(plan_file, tmp_path, name):
     assert geofield("validate", file).returncode == 0
 
 
+@pytest.mark.parametrize(("name", "said", "files"), [
+    ("gpkg", "project=no", ["field.gpkg"]), ("gpkg", "project=on", ["field.gpkg", "field.qgz"]),
+    ("isoxml", "zip=false", ["TASKDATA.XML"]), ("isoxml", "zip=TRUE", ["field_isoxml.zip"]),
+    ("gpkg", "project=maybe", []), ("isoxml", "headland=Strip", []),
+])  # fmt: skip
+def test_options_that_are_no_are_not_taken_for_yes(plan_file, tmp_path, name, said, files):
+    """`zip=false` made an archive, `project=no` a project, `headland=Strip` the line."""
+    done = geofield("export", plan_file, "-f", name, "--option", said, "--out", tmp_path / "out")
+    written = sorted(each.name for each in (tmp_path / "out").rglob("*") if each.is_file())
+    assert written == files, done.stderr
+    assert done.returncode == (0 if files else 1)
+
+
 def test_track_points_that_were_saved_in_another_crs_are_refused(plan_file, tmp_path):
     edited = tmp_path / "field.gpkg"
     edited.write_bytes(plan_file.read_bytes())

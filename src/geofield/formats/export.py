@@ -21,6 +21,10 @@ from geofield.notes import warn
 from geofield.staging import staged_folder
 from geofield.wording import nearest
 
+#: Options that are true or false, and how a person writes that.
+_TRUTHS = {"zip", "points", "project", "picture"}
+_YES, _NO = ("yes", "true", "on", "1"), ("no", "false", "off", "0", "none", "")
+
 
 def write_dataset(
     dataset: Dataset, folder: Path | str, formats: Iterable[str], **how: Any
@@ -107,6 +111,7 @@ def write_datasets(
         for each in chosen:
             own = {key: value for key, value in given.items() if key in each.options}
             own |= given.get(each.name, {})
+            own |= {key: _truth(key, own[key]) for key in _TRUTHS & own.keys()}
             if "picture" in each.options and not any(one.name == "scene" for one in chosen):
                 own.setdefault("picture", all(one.picture_lies_in(target) for one in datasets))
             for path in _written(each, datasets, staging, stem, own):
@@ -134,6 +139,16 @@ def write_datasets(
                 stacklevel=2,
             )
     return written
+
+
+def _truth(option: str, value: Any) -> Any:
+    """A truth that was said as a text, as ``--option project=no`` does."""
+    if not isinstance(value, str):
+        return value
+    for truth, texts in ((True, _YES), (False, _NO)):
+        if value.strip().lower() in texts:
+            return truth
+    raise FormatError(f"{option} is {value!r}.", hint=f"Write {option}=yes or {option}=no.")
 
 
 def _tell_bare(datasets: Sequence[Dataset]) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.crs import GEOD, ground_areas_m2, ground_scale_of
-from geofield.errors import FormatError
+from geofield.errors import FormatError, refuse_unknown
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.isoxml.codes import (
     DECIMALS,
@@ -158,7 +158,9 @@ def _headland(dataset: Dataset, polygon: Any, options: Mapping[str, Any]) -> lis
     AgOpenGPS, the one program known to read them, takes the exterior ring for the line at which
     machines turn: the headland's inner edge. As the standard's words have it, the strip itself.
     """
-    if str(options.get("headland", "line")) == "strip":
+    wanted = options.get("headland", "line")
+    refuse_unknown(FormatError, "headland", wanted, ("line", "strip"))
+    if wanted == "strip":
         return list(dataset.table("headland").explode(ignore_index=True).geometry)
     return [shapely.Polygon(part.exterior) for part in main_field(dataset, polygon)]
 

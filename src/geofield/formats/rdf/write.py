@@ -89,6 +89,4 @@ def describe(dataset: Dataset, options: Mapping[str, Any]) -> Description:
     names = Names.of(
         dataset, base=options.get("base_iri"), plan=str(options.get("plan_name") or "")
     )
-    # --option points=no arrives as a text.
-    points = str(options.get("points", kind.points_unasked)).lower()
-    return kind(dataset, names, points not in ("no", "false", "0", "none", ""))
+    return kind(dataset, names, bool(options.get("points", kind.points_unasked)))
