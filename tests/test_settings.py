@@ -330,6 +330,9 @@ def test_a_machine_says_width_turning_radius_and_clearance() -> None:
     Path("geofield.toml").write_text(MACHINES + "offset_m = 1\n")
     assert load_settings(None, line).tracks.offset_m is None
     assert load_settings(None, {"tracks": {"skip": 2}}).tracks.offset_m == 1.0
+    earlier = Settings(tracks={"through_lonlat": (33.0, 35.0)})
+    again = as_before(Settings(**line), earlier, "tracks").tracks
+    assert (again.through_lonlat, again.ab_lonlat) == (None, line["tracks"]["ab_lonlat"])
     # Of another machine nothing stays.
     settings = with_values(load_settings(), machine="sprayer", headland_passes=2)
     assert settings.tracks.headland_m == 23.0

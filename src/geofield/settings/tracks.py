@@ -21,8 +21,12 @@ DirectionName = Literal["dominant", "longest_edge", "hough", "fewest", "fewest_t
 
 #: Ways to say where the tracks lie: what is said later, and what gives way to it.
 _PLACED = (
-    ("offset_m", "through_lonlat"), ("through_lonlat", "offset_m"), ("ab_lonlat", "offset_m")
-)  # fmt: skip
+    ("offset_m", "through_lonlat"),
+    ("through_lonlat", "offset_m"),
+    # An A-B line passes through its A.
+    ("ab_lonlat", "offset_m"),
+    ("ab_lonlat", "through_lonlat"),
+)
 
 
 def _direction(value: str) -> str:
@@ -151,8 +155,8 @@ def said_over(earlier: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, 
     """Settings of the tracks with what was said later: what follows from it is left out.
 
     A spacing that was said before does not stand against a working width that is said now, nor an
-    A-B line against a direction, nor an offset against a place to pass through or an A-B line, nor
-    such a place against an offset.
+    A-B line against a direction, nor an offset or a place to pass through against each other or
+    against an A-B line.
     """
     kept = dict(earlier)
     for later, before in (("direction", "ab_lonlat"), *_PLACED):
