@@ -26,13 +26,10 @@ def test_no_width_loses_a_part_of_the_field() -> None:
 
 def test_a_hole_in_the_strip_cuts_the_pass_around_the_field() -> None:
     """The pass went along the hole's border instead, half the machine in the hole: 52 m of it."""
-    field, hole = (
-        box(500_000, 5_500_000, 500_200, 5_500_100),
-        box(500_090, 5_500_002, 500_110, 5_500_020),
-    )
-    tracks = gf.plan_tracks(
-        field.difference(hole), crs=32633, spacing_m=8, headland_m=8, direction=90
-    )
+    field = box(500_000, 5_500_000, 500_200, 5_500_100)
+    hole = box(500_090, 5_500_002, 500_110, 5_500_020)
+    holed = shapely.Polygon(field.exterior, [hole.exterior])
+    tracks = gf.plan_tracks(holed, crs=32633, spacing_m=8, headland_m=8, direction=90)
     (ring,) = tracks.headland_tracks.geometry
     assert ring.intersection(hole.buffer(0.01)).length < 0.05
     around = gf.plan_tracks(field, crs=32633, spacing_m=8, headland_m=8, direction=90)

@@ -116,11 +116,11 @@ def _write(dataset: Dataset, path: Path, scene: Scene | None, undated: Mapping[s
     figure = Figure(figsize=(11.7, 8.3), layout="constrained")
     ax = plot_dataset(dataset, scene, figure.subplots())
     ax.set_title("")
-    plain = {"parse_math": False}
-    ax.set_title("\n".join(figures_in_words(dataset)), loc="left", fontsize=9, **plain)
+    told = "\n".join(figures_in_words(dataset))
+    ax.set_title(told, loc="left", fontsize=9, parse_math=False)
     _scale_bar(ax, dataset)
-    told = [*doubts_in_words(dataset), credit_in_words(dataset)]
-    figure.supxlabel("\n".join(told), fontsize=8, **plain)
+    below = "\n".join([*doubts_in_words(dataset), credit_in_words(dataset)])
+    figure.supxlabel(below, fontsize=8, parse_math=False)
     words = figure.findobj(Text)
     families = _families("".join(each.get_text() for each in words))
     for each in words:
