@@ -137,7 +137,7 @@ def test_lines_become_tracks(tmp_path):
 def test_several_fields_are_refused_by_name(tmp_path):
     other = shapely.box(600_000, 5_500_000, 600_100, 5_500_100)
     path = write(tmp_path / "farm.gpkg", [BOX, other], name=["East", "West"])
-    with pytest.raises(FormatError, match=r"2 outlines \(East, West"):
+    with pytest.raises(FormatError, match=r"2 outlines \(East, West\);"):
         read_dataset(path)
 
 

@@ -18,7 +18,7 @@ from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
 from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
 from geofield.notes import warn
-from geofield.wording import cell_text, counted
+from geofield.wording import cell_text, counted, some_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -70,7 +70,7 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     """The one outline as layer `field`; several are refused: a dataset is one field."""
     names = column_like(frame, NAME_COLUMNS)
     if len(frame) > 1:
-        shown = "" if names is None else f" ({', '.join(map(str, names[:5]))}, ...)"
+        shown = "" if names is None else f" ({some_of([*map(cell_text, names)], 5)})"
         raise SeveralFieldsError(
             f"{path.name} holds {len(frame)} outlines{shown}; a dataset is one field.",
             hint="Save the one you want as a file of its own.",
