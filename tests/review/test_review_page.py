@@ -168,6 +168,9 @@ def test_what_is_done_is_spoken_and_done_without_a_pointer(page: Page) -> None:
     def spoken() -> str:
         return str(page.run("return document.getElementById('spoken').textContent"))
 
+    page.chord(Keys.CONTROL, "z")
+    time.sleep(0.5)
+    assert spoken() == ""  # there was nothing to undo
     page.press("j")
     page.wait(lambda: spoken().startswith("Obstacle"))
     first = int(
@@ -309,19 +312,52 @@ def test_a_key_in_the_middle_of_a_drag_moves_no_other_obstacle(page: Page) -> No
     """The verdict goes on to the next obstacle, which was moved by the hand that let go."""
     before = page.state()["obstacles"]
     page.click(*page.obstacle(8)["centre"])
-    column, line = page.pixel(*page.obstacle(8)["centre"])
-    hand = ActionChains(page.driver, duration=30)
-    pointer = hand.w3c_actions.pointer_action
-    pointer.move_to_location(column, line)
-    pointer.pointer_down()
-    pointer.move_to_location(column + 30, line + 5)
-    hand.perform()
+    _, resolution = page.view()
+    half_drag(page, page.pixel(*page.obstacle(8)["centre"]))
     page.press("c")
     page.wait(lambda: page.judged() == 1)
     ActionChains(page.driver).release().perform()
     page.wait(lambda: page.obstacle(8)["centre"] != before[7]["centre"])
     after = page.state()["obstacles"]
-    assert [one["no"] for one, old in zip(after, before, strict=True) if one != old] == [8]
+    pairs = zip(after, before, strict=True)
+    assert [one["no"] for one, old in pairs if one["rings"] != old["rings"]] == [8]
+    # The map went on to the next obstacle below the hand, and the tree with it: 109 m.
+    x, y = before[7]["centre"]
+    there = [x + 30 * resolution, y - 5 * resolution]
+    assert after[7]["centre"] == pytest.approx(there, abs=resolution)
+
+
+def half_drag(page: Page, spot: tuple[int, int]) -> None:
+    """Press at a spot of the window, and move, without letting go."""
+    hand = ActionChains(page.driver, duration=30)
+    pointer = hand.w3c_actions.pointer_action
+    pointer.move_to_location(*spot)
+    pointer.pointer_down()
+    pointer.move_to_location(spot[0] + 30, spot[1] + 5)
+    hand.perform()
+
+
+@pytest.mark.parametrize("tool", ["select", "outline", "direction"])
+def test_what_a_hand_held_goes_back_when_the_drag_is_stopped(page: Page, tool: str) -> None:
+    """The shape stayed where the hand had it, with the tracks of there: no file has them so."""
+    state = page.state()
+    place = state["obstacles"][7]["centre"]
+    page.click(*place)
+    if tool == "outline":
+        place = max(state["field"]["rings"][0])
+    drawn = (
+        "const [done] = arguments; import('/map.js').then(({sources}) =>"
+        " done(['obstacles', 'outline', 'tracks'].map(name => sources[name].getFeatures()"
+        ".map(each => JSON.stringify(each.getGeometry().getCoordinates())).sort())));"
+    )
+    before = page.driver.execute_async_script(drawn)
+    page.driver.find_element(By.CSS_SELECTOR, f"[data-tool={tool}]").click()
+    half_drag(page, page.pixel(*place))
+    page.wait(lambda: page.driver.execute_async_script(drawn) != before)
+    page.press(Keys.ESCAPE)
+    page.wait(lambda: page.driver.execute_async_script(drawn) == before, seconds=3)
+    ActionChains(page.driver).release().perform()
+    assert not page.state()["can_undo"]
 
 
 def test_edits_come_back_after_the_server_is_killed(
@@ -557,6 +593,13 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     page.run("document.getElementById('menu').close()")
     assert page.text("confirm") == "Bestätigen"
     assert page.run("return document.querySelector('[name=last_strip]').value") == "overrun"
+    cut = page.run(
+        "return [...document.querySelectorAll('#settings select')].filter(one => {"
+        " const shown = one.offsetWidth;"
+        " one.style.cssText = 'width: auto; max-width: none; flex: none';"
+        " return one.offsetWidth > shown; }).map(one => one.name);"
+    )
+    assert cut == []
     box = page.driver.find_element(By.NAME, "spacing_m")
     box.clear()
     box.send_keys("5000", Keys.ENTER)
@@ -612,14 +655,28 @@ def test_a_folder_of_plans_is_reviewed_in_one_session(
     driver: webdriver.Chrome, plan_path: Path
 ) -> None:
     folder = plan_path.parent
-    (folder / "second").mkdir()
+    second = "second" * 15
+    (folder / second).mkdir()
     for name in ("field.gpkg", "scene.tif"):
-        shutil.copy(folder / name, folder / "second" / name)
+        shutil.copy(folder / name, folder / second / name)
     (folder / "notes.gpkg").write_bytes(b"no plan")
     with served(folder) as (address, _):
         page = Page(driver, address)
         options = page.driver.find_elements(By.CSS_SELECTOR, "#plans option")
-        assert [option.text for option in options] == ["field.gpkg", "second/field.gpkg"]
+        assert [option.text for option in options] == ["field.gpkg", f"{second}/field.gpkg"]
+        size = {"width": 360, "height": 740, "deviceScaleFactor": 1, "mobile": True}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        assert page.run("return document.documentElement.scrollWidth") == 360
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        # What is typed and cannot be goes along to no other plan, and the list says so.
+        box = driver.find_element(By.NAME, "spacing_m")
+        box.send_keys("six")
+        options[1].click()
+        page.wait(lambda: "a number of metres" in page.text("message"))
+        assert options[0].is_selected()
+        box.clear()
+        box.send_keys("4")
+        page.run("document.activeElement.blur()")
         page.press("j", "r")
         page.wait(lambda: page.judged() == 1)
         page.run("document.body.dataset.ready = ''")
@@ -635,9 +692,9 @@ def test_a_folder_of_plans_is_reviewed_in_one_session(
         page.driver.find_elements(By.CSS_SELECTOR, "#plans option")[0].click()
         page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
         assert page.judged() == 1
-    second = read_plan(folder / "second" / "field.gpkg").obstacles
-    assert second is not None
-    assert (second["status"] == "rejected").sum() == 2
+    other = read_plan(folder / second / "field.gpkg").obstacles
+    assert other is not None
+    assert (other["status"] == "rejected").sum() == 2
     first = read_plan(plan_path).obstacles
     assert first is not None
     assert (first["status"] == "rejected").sum() == 0
@@ -659,8 +716,10 @@ def test_ground_is_clicked_and_another_outline_chosen(doubtful_path: Path, page:
     page.press(Keys.ESCAPE)
     others = page.driver.find_elements(By.CSS_SELECTOR, "#alternatives button")
     assert len(others) == len(before["field"]["alternatives"]) >= 2
-    others[-1].click()
+    others[-1].send_keys(Keys.ENTER)
     page.wait(lambda: page.state()["can_undo"])
+    focused = page.run("return document.activeElement.textContent")
+    assert focused.startswith(f"Outline {len(others)} ")  # the next key goes on from there
     chosen = page.state()["field"]
     assert chosen["rings"] == before["field"]["alternatives"][-1]["rings"]
     assert page.text("certainty") == "Chosen by a person"

@@ -137,6 +137,8 @@ export function obstacleAt(pixel) {
 }
 
 export function zoomTo(row) {
+  // Below a hand that drags, the map stands still: what is dragged would go with it.
+  if (map.getViewport().matches(":active")) return;
   const size = Math.max(...row.rings[0].map(([x, y]) => Math.hypot(x - row.centre[0], y - row.centre[1])));
   view.setCenter(row.centre);
   if (view.getResolution() > 0.25 || view.getResolution() < 0.02)

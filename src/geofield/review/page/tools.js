@@ -58,6 +58,9 @@ export function use(name) {
   active = name;
   for (const one of held) maps.map.removeInteraction(one);
   maps.sources.sketch.clear(true);
+  // What a hand still held goes back to where it was.
+  endPreview();
+  desk.again();
   desk.measured("");
   held = MAKERS[name]();
   for (const one of held) maps.map.addInteraction(one);
