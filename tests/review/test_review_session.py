@@ -27,6 +27,7 @@ from geofield.review.desk import Desk
 from geofield.review.plans import journal_path
 from geofield.review.session import planned
 from geofield.review.shelf import Shelf
+from geofield.review.shown import tracks_of
 from geofield.settings import with_values
 from geofield_command import run_geofield
 
@@ -164,6 +165,14 @@ def test_bad_edits_are_refused_in_words_and_change_nothing(
     with pytest.raises(GeofieldError, match=words):
         session.do(command)
     assert session.step is before
+
+
+def test_each_note_of_the_tracks_is_told_once(plan: Plan) -> None:
+    """After an edit the page and QGIS told those of the planner twice."""
+    step = Session(plan).do({"do": "tracks", "settings": {"headland_m": 6.5}})
+    assert step.plan.tracks is not None
+    notes = tracks_of(step.plan, step.notes)["notes"]
+    assert sum("leaves a strip of 2.50 m" in note for note in notes) == 1
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,7 @@ def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
     """A plan with the tracks that follow from its field, obstacles and settings."""
     with listening() as heard:
         after = run_tracks(plan, settings=plan.settings or Settings())
-    notes = dict.fromkeys(str(each) for each in heard)
+    known = () if after.tracks is None else after.tracks.notes
+    notes = [each for each in dict.fromkeys(map(str, heard)) if each not in known]
     kept = after.evidence.track_edits.in_words()
     return Step(after, command, (*notes, kept) if kept else tuple(notes))
