@@ -127,16 +127,19 @@ function showField() {
   $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
   const shown = JSON.stringify(field.rings);
   const choice = field.alternatives.some(other => JSON.stringify(other.rings) !== shown) ? field.alternatives : [];
+  const focused = [...$("alternatives").querySelectorAll("button")].indexOf(document.activeElement);
   $("alternatives").replaceChildren(...choice.map((other, i) => {
     const item = document.createElement("li");
     const press = node("button", t("outline_no", {n: i + 1, p: number(100 * other.certainty)}));
     press.setAttribute("aria-pressed", String(JSON.stringify(other.rings) === shown));
     press.onclick = () => commit({do: "choose", no: i + 1});
-    press.onmouseenter = press.onfocus = () => maps.showOther(other.rings);
+    press.onmouseenter = () => maps.showOther(other.rings);
+    press.onfocus = () => press.matches(":focus-visible") && maps.showOther(other.rings);
     press.onmouseleave = press.onblur = () => maps.showOther(null);
     item.append(press);
     return item;
   }));
+  $("alternatives").querySelectorAll("button")[focused]?.focus();
 }
 
 // The most doubtful first; those with a person's word last.
@@ -235,6 +238,8 @@ function takeBack() {
   return verdict(each.confidence < state.detected_from ? "possible" : "detected");
 }
 
+// Where there is nothing to undo, nothing was undone.
+const through = way => inTurn(() => state[`can_${way}`] && make({do: way}));
 const ifChosen = work => inTurn(() => chosen !== null && work(chosen));
 const nudge = (dx, dy) => chosen !== null && ifChosen(no => make({do: "move", no, dx_m: dx, dy_m: dy}));
 
@@ -277,7 +282,7 @@ const save = name => applied(() => act(() => api.save(name), answer => {
 const ACTIONS = {
   next: () => inTurn(() => step(true)), previous: () => inTurn(() => step(false)),
   confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
-  reset: () => inTurn(takeBack), undo: () => commit({do: "undo"}), redo: () => commit({do: "redo"}), save: () => save(),
+  reset: () => inTurn(takeBack), undo: () => through("undo"), redo: () => through("redo"), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
   remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.addHere, nudge,
   onward: () => goTo((state.plan + 1) % state.plans.length),
@@ -285,7 +290,10 @@ const ACTIONS = {
 };
 
 // Edits stay with their plan on the server: nothing is lost by going to another one.
-const goTo = plan => plan !== state.plan && applied(() => act(() => api.openPlan(plan), again));
+async function goTo(plan) {
+  if (plan === state.plan || await applied(() => act(() => api.openPlan(plan), again))) return;
+  $("plans").value = state.plan;  // refused: what is shown stays
+}
 
 // -- beginning ---------------------------------------------------------------------------
 
