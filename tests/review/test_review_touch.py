@@ -137,8 +137,24 @@ def test_what_matters_is_seen_on_a_small_screen(page: Page) -> None:
     assert page.run(first) == "outline-h"
 
 
-def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page) -> None:
-    """Its number and status lay under the buttons that stay on top of the list."""
+@pytest.mark.parametrize("size", [(390, 844), (360, 640), (640, 360), (900, 420), (768, 1024)])
+def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page, size: tuple[int, int]) -> None:
+    """Its number and status lay under the buttons that stay on top of the list.
+
+    On a telephone that lay on its side there was no list at all, and words were cut.
+    """
+    given = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": True}
+    page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", given)
+    page.run("localStorage.setItem('language', 'de')")
+    page.driver.refresh()
+    page.wait(lambda: page.run("return document.body.dataset.ready"))
+    cut = page.run(
+        "return [...document.querySelectorAll('#tools button, #panel')].filter(one =>"
+        " one.scrollWidth > one.clientWidth"
+        " || one.id !== 'panel' && one.scrollHeight > one.clientHeight)"
+        ".map(one => one.id || one.textContent);"
+    )
+    assert cut == []
     for _ in range(3):
         # Who read on below comes back by a key, or by the buttons, which stay in view.
         page.run("document.getElementById('panel').scrollTop = 1e6")
