@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -167,3 +169,18 @@ def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page, size: tuple
         )
         assert below - 1 <= top
         assert bottom <= panel + 1
+
+
+def test_what_stays_until_it_is_answered_covers_no_button(page: Page, plan_path: Path) -> None:
+    """Below the words about another program nothing could be confirmed any more."""
+    size = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
+    page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    page.button("next")
+    page.button("confirm")
+    page.wait(lambda: page.judged() == 1)
+    with closing(sqlite3.connect(plan_path)) as file, file:
+        file.execute("UPDATE gpkg_contents SET description = 'edited' WHERE table_name = 'field'")
+    page.button("save")
+    page.wait(lambda: "Another program changed" in page.text("message"))
+    page.button("confirm")
+    page.wait(lambda: page.judged() == 2)
