@@ -17,6 +17,7 @@ from qgis.core import (
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterPoint,
+    QgsProcessingParameterRasterDestination,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
     QgsProcessingParameterVectorLayer,
@@ -123,6 +124,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     def processAlgorithm(self, values: Any, context: Any, feedback: Any) -> dict[str, Any]:  # noqa: D102
         try:
             with tempfile.TemporaryDirectory(prefix="geofield_qgis_") as folder:
+                values = self._placed(values, context)
                 words, environment = self.words(values, context, feedback, folder)
                 rows = self.rows()
                 variables = parameters.without_option(
@@ -145,6 +147,16 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
                 return self.outputs(result, values, context, feedback)
         except engine.EngineError as error:
             raise QgsProcessingException(str(error)) from None
+
+    def _placed(self, values: dict[str, Any], context: Any) -> dict[str, Any]:
+        """The values with a place for each product: QGIS names another temporary one each time."""
+        found = dict(values)
+        for each in self.destinationParameterDefinitions():
+            name, is_layer = each.name(), isinstance(each, QgsProcessingParameterRasterDestination)
+            if found.get(name) is not None:
+                read = self.parameterAsOutputLayer if is_layer else self.parameterAsString
+                found[name] = read(values, name, context)
+        return found
 
     # -- what each algorithm says for itself -------------------------------------------------
 

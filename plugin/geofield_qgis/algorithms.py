@@ -270,12 +270,12 @@ class ImageryAlgorithm(GeofieldAlgorithm):
             words += self.point_words(values, context)
         else:
             raise EngineError(tr("Give a centre or an extent."))
-        output = self.parameterAsOutputLayer(values, "OUTPUT", context)
+        output = self.parameterAsString(values, "OUTPUT", context)
         return [*words, "-o", output, "--json"], environment
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""
-        return {"OUTPUT": self.parameterAsOutputLayer(values, "OUTPUT", context)}
+        return {"OUTPUT": self.parameterAsString(values, "OUTPUT", context)}
 
 
 ALGORITHMS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 from qgis.core import (
@@ -23,9 +24,10 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from . import plan_files
+from . import plan_files, sources
 from .algorithm import path_of
 from .compat import QShortcut
+from .engine import EngineError
 from .jobs import Live
 from .map_tools import CircleTool, PointTool, band
 from .preview import Preview
@@ -154,6 +156,8 @@ class ReviewDock(QDockWidget):
         self._tell()
         self.step(1)
         self.replan(preview=False)
+        if not layer.supportsEditing():
+            self._trouble(tr("The obstacles are read-only here: nothing can be decided."))
 
     def _connect(self, signal: Any, slot: Any) -> None:
         signal.connect(slot)
@@ -274,7 +278,7 @@ class ReviewDock(QDockWidget):
             return
         layer = self.review.layer
         rows = []
-        for feature in layer.getFeatures():
+        for feature in plan_files.rows_of(layer):
             row = {
                 name: found
                 for name, found in zip(layer.fields().names(), feature.attributes())
@@ -308,9 +312,11 @@ class ReviewDock(QDockWidget):
     def _write(self) -> None:
         if self.review is None or self._released is not None:
             return
-        field = plan_files.layers_of(self.path).get("field")
-        if field is not None and field.isEditable() and field.isModified():
-            self._trouble(tr("The outline has edits that are not saved: save them, too."))
+        try:  # to let go of the file ends what is edited in any of its layers
+            for layer in plan_files.all_of(self.path):
+                sources.refuse_unsaved(layer)
+        except EngineError as error:
+            self._trouble(str(error))
             return
         self._timer.stop()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
@@ -389,7 +395,8 @@ class ReviewDock(QDockWidget):
     def _trouble(self, text: str) -> None:
         if self._released is not None:
             self._take_back()
-        self.iface.messageBar().pushWarning("geofield", text)
+        # The bar reads HTML.
+        self.iface.messageBar().pushWarning("geofield", escape(text))
 
 
 def _hex(geometry: QgsGeometry) -> str:

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from qgis.core import QgsDataProvider, QgsProject, QgsVectorLayer, QgsWkbTypes
+from qgis.core import QgsDataProvider, QgsFeature, QgsProject, QgsVectorLayer, QgsWkbTypes
 
 from .algorithm import path_of
 from .results import settled
 from .sources import table_of
 
 
+def all_of(path: str) -> list[QgsVectorLayer]:
+    """All layers of the project that show a plan's GeoPackage, duplicated ones too."""
+    path = str(settled(path))
+    layers = QgsProject.instance().mapLayers().values()
+    return [each for each in layers if isinstance(each, QgsVectorLayer) and path_of(each) == path]
+
+
 def layers_of(path: str) -> dict[str, QgsVectorLayer]:
     """The project's layers of a plan's GeoPackage, by their names in it."""
-    found, path = {}, str(settled(path))
-    for layer in QgsProject.instance().mapLayers().values():
-        if isinstance(layer, QgsVectorLayer) and path_of(layer) == path:
-            found[table_of(layer)] = layer
-    return found
+    return {table_of(layer): layer for layer in all_of(path)}
+
+
+def rows_of(layer: QgsVectorLayer) -> Iterator[QgsFeature]:
+    """The rows of a layer as they are edited, and those that its filter hides."""
+    yield from layer.getFeatures()
+    if layer.subsetString():
+        edits, whole = layer.editBuffer(), layer.clone()
+        known = {*layer.allFeatureIds(), *(edits.deletedFeatureIds() if edits else ())}
+        whole.setSubsetString("")
+        yield from (each for each in whole.getFeatures() if each.id() not in known)
 
 
 class Released:
@@ -29,7 +43,7 @@ class Released:
 
     def __init__(self, path: str) -> None:
         self._held: list[tuple[QgsVectorLayer, str, bool]] = []
-        for layer in layers_of(path).values():
+        for layer in all_of(path):
             editing = layer.isEditable()
             if editing:
                 layer.rollBack()  # nothing is lost: it was asked for after saving

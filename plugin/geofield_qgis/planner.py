@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
+from contextlib import suppress
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +20,7 @@ from qgis.core import (
     QgsVectorLayer,
     QgsWkbTypes,
 )
-from qgis.PyQt.QtCore import QObject, QSettings, QStandardPaths, pyqtSignal
+from qgis.PyQt.QtCore import QObject, QStandardPaths, pyqtSignal
 from qgis.PyQt.QtWidgets import QProgressBar, QPushButton
 
 from . import description, engine, plan_files, results, sources
@@ -26,8 +29,8 @@ from .map_tools import band
 from .words import tr
 
 LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
-#: Distance between the tracks that a click plans, metres; the last one that was chosen.
-SPACING = "geofield/spacing_m"
+#: Distance between the tracks that a click plans, metres.
+SPACING_M = 4
 
 
 class Planner(QObject):
@@ -54,8 +57,10 @@ class Planner(QObject):
         #: The next command line, loading its libraries while a person looks where to click.
         self.awake = Awake()
         self._item: Any = None
+        iface.messageBar().widgetRemoved.connect(self._message_goes)
         self._bar: QProgressBar | None = None
         self._target: Path | None = None
+        # In longitude and latitude: the CRS of the map may be another one at the next click.
         self._here: QgsPointXY | None = None
         self._ground: dict[str, list[QgsPointXY]] = {"include": [], "exclude": []}
         self._begun_s = 0.0
@@ -66,22 +71,20 @@ class Planner(QObject):
 
     def click(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
         """A click on the map, in its CRS."""
-        if (shift or alt) and self._here is not None:
-            if "field.include" not in description.settings():
-                self._say(tr("This engine has no points to include or exclude."))
-                return
-            self._ground["exclude" if alt else "include"].append(point)
+        more = (shift or alt) and self._here is not None
+        try:
+            place = self._lonlat(point)
+            for layer in plan_files.all_of(str(self._target)) if more else ():
+                sources.refuse_unsaved(layer)
+        except (engine.EngineError, QgsCsException) as error:
+            self._say(str(error))
+            return
+        if more:
+            self._ground["exclude" if alt else "include"].append(place)
         else:
-            self._here, self._target = point, None
+            self._here, self._target = place, None
             self._ground = {"include": [], "exclude": []}
             self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
-        if self._target is not None:
-            try:
-                for layer in plan_files.layers_of(str(self._target)).values():
-                    sources.refuse_unsaved(layer)
-            except engine.EngineError as error:
-                self._say(str(error))
-                return
         self._points.addPoint(point)
         self.stop()
         self._begin()
@@ -100,7 +103,9 @@ class Planner(QObject):
 
     def clear(self) -> None:
         """Stop, and take the sketches off the map."""
-        self.stop()
+        if self._job is not None:
+            self.stop()
+            self._show_plan()
         for each in self._sketch.values():
             each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         self._points.reset(QgsWkbTypes.GeometryType.PointGeometry)
@@ -108,7 +113,8 @@ class Planner(QObject):
 
     def remove(self) -> None:
         """Leave nothing on the map, and no process."""
-        self.clear()
+        self.stop()
+        self.iface.messageBar().widgetRemoved.disconnect(self._message_goes)
         self.awake.sleep()
         scene = self.iface.mapCanvas().scene()
         for each in (*self._sketch.values(), self._points):
@@ -144,13 +150,11 @@ class Planner(QObject):
         self._begun_s = time.monotonic()
         self._show_progress()
         self._forget_layers()
-        lonlat = self._lonlat(self._here)
-        words = ["--lat", f"{lonlat.y():.9f}", "--lon", f"{lonlat.x():.9f}"]
+        words = ["--lat", f"{self._here.y():.9f}", "--lon", f"{self._here.x():.9f}"]
         for name, points in self._ground.items():
             for point in points:
-                lonlat = self._lonlat(point)
                 option = description.settings()[f"field.{name}"]["option"]
-                words += [option, f"{lonlat.x():.9f},{lonlat.y():.9f}"]
+                words += [option, f"{point.x():.9f},{point.y():.9f}"]
         words += ["-o", str(self._target), "--overwrite", "--json"]
         self._run("field", ["field", self._imagery, *words])
 
@@ -181,9 +185,8 @@ class Planner(QObject):
             self._run("obstacles", ["obstacles", self._imagery, target, "-o", target])
         elif stage == "obstacles":
             self._draw("obstacles")
-            spacing_m = float(QSettings().value(SPACING, 4.0))
             self._run(
-                "tracks", ["tracks", target, "-o", target, "--spacing", f"{spacing_m:g}", "--json"]
+                "tracks", ["tracks", target, "-o", target, "--spacing", str(SPACING_M), "--json"]
             )
         else:
             self._job = None
@@ -210,8 +213,13 @@ class Planner(QObject):
 
     def _forget_layers(self) -> None:
         """Layers of the same plan, planned anew now, leave the project."""
-        for layer in plan_files.layers_of(str(self._target)).values():
+        for layer in plan_files.all_of(str(self._target)):
             QgsProject.instance().removeMapLayer(layer.id())
+
+    def _show_plan(self) -> None:
+        """Show what the file holds where the plan was not made anew."""
+        if self._target is not None and self._target.is_file():
+            results.show(self._target)
 
     def _picture(self) -> QgsRasterLayer | None:
         """The picture at the place: the active layer, or the topmost one that shows it."""
@@ -219,8 +227,7 @@ class Planner(QObject):
         for layer in [self.iface.activeLayer(), *canvas.layers()]:
             if not isinstance(layer, QgsRasterLayer) or not layer.isValid():
                 continue
-            crs = canvas.mapSettings().destinationCrs()
-            turned = QgsCoordinateTransform(crs, layer.crs(), QgsProject.instance())
+            turned = QgsCoordinateTransform(LONLAT, layer.crs(), QgsProject.instance())
             try:
                 if layer.extent().contains(turned.transform(self._here)):
                     return layer
@@ -258,21 +265,30 @@ class Planner(QObject):
         if item is not None:
             self.iface.messageBar().popWidget(item)
 
+    def _message_goes(self, item: Any) -> None:
+        """A person closed it; the work goes on."""
+        if item == self._item:
+            self._item = self._bar = None
+
     def _fail(self, why: str) -> None:
         self._job = None
         self._clear_message()
+        self._show_plan()
         self._say(why)
 
     def _say(self, text: str, *, good: bool = False) -> None:
         bar = self.iface.messageBar()
-        (bar.pushSuccess if good else bar.pushWarning)("geofield", text)
+        # The bar reads HTML.
+        (bar.pushSuccess if good else bar.pushWarning)("geofield", escape(text))
 
 
 def _folder() -> Path:
     """Where clicked plans go: beside the project, or among the person's documents."""
-    home = QgsProject.instance().homePath() or QStandardPaths.writableLocation(
-        QStandardPaths.StandardLocation.DocumentsLocation
-    )
-    folder = Path(home) / "geofield"
-    folder.mkdir(parents=True, exist_ok=True)
+    documents = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+    for home in filter(None, (QgsProject.instance().homePath(), documents)):
+        folder = Path(home) / "geofield"
+        with suppress(OSError):  # a project may lie where nothing can be written
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                break
     return folder

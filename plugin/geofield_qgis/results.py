@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import (
-    QgsLayerTreeGroup,
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingLayerPostProcessorInterface,
@@ -147,9 +146,3 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
         _, _, name = entry.source.rpartition("layername=")
         shown["scene" if entry.is_raster else name] = layer
     return shown
-
-
-def group_of(project: QgsProject, layer: QgsMapLayer) -> QgsLayerTreeGroup | None:
-    """The group that a layer stands in."""
-    node = project.layerTreeRoot().findLayer(layer.id())
-    return node.parent() if node is not None else None

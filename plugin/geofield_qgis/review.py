@@ -80,7 +80,7 @@ class Review:
         """Make a round obstacle larger or smaller; its new radius, None for what is not round."""
         feature = self.layer.getFeature(feature_id)
         radius_m = value(feature, "radius_m")
-        if radius_m is None:
+        if not radius_m:  # 0 is none, as programs write it that know no empty number
             return None
         margin_m = value(feature, "buffer_m", 0.0)
         new_m = min(max(radius_m + by_m, RADII_M[0]), RADII_M[1])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from qgis.core import QgsVectorLayer
+from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from . import plan_files
@@ -26,6 +27,7 @@ class ReviewLabels(QWidget):
         self.here.setStyleSheet("font-weight: bold")
         for label in (self.title, self.doubts, self.count, self.here, self.figures):
             label.setWordWrap(True)
+            label.setTextFormat(Qt.TextFormat.PlainText)
             box.addWidget(label)
         #: What the picture did not allow when obstacles were looked for.
         self._obstacle_doubts: list[str] = []
@@ -55,7 +57,7 @@ class ReviewLabels(QWidget):
         radius_m, confidence = value(feature, "radius_m"), value(feature, "confidence")
         parts = [tr("Obstacle {0}").format(value(feature, "obstacle_no", tr("new")))]
         parts.append(str(value(feature, "status", "added")))
-        if radius_m is not None:
+        if radius_m:
             parts.append(tr("radius {0:.2f} m").format(radius_m))
         if confidence is not None:
             parts.append(tr("confidence {0:.0%}").format(confidence))

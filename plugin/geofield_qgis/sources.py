@@ -38,7 +38,9 @@ def imagery(layer: QgsRasterLayer) -> tuple[str, dict[str, str]]:
     if layer.providerType() != "wms":
         source = layer.source().split("|", 1)[0]
         decoded = QgsProviderRegistry.instance().decodeUri(layer.providerType(), source)
-        return str(decoded.get("path") or source), {}
+        # A picture in an archive is told in three parts.
+        parts = [str(decoded.get(name) or "") for name in ("vsiPrefix", "path", "vsiSuffix")]
+        return "".join(parts) or source, {}
     uri = QgsDataSourceUri()
     uri.setEncodedUri(layer.source())
     given = parse_qs(layer.source())

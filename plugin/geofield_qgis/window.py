@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any, Callable
 
 from qgis.PyQt.QtCore import Qt
@@ -91,7 +92,7 @@ class Window:
     def _offer_engine(self, why: str) -> None:
         """Say what is missing, with the way to it."""
         messages = self.iface.messageBar()
-        item = messages.createMessage("geofield", why)
+        item = messages.createMessage("geofield", escape(why))
         button = QPushButton(tr("Engine..."))
         button.clicked.connect(lambda *_: (messages.popWidget(item), self.show_engine()))
         item.layout().addWidget(button)

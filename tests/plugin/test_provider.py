@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -315,6 +316,32 @@ def test_layers_come_styled_in_their_group(qgis, sample_plan, tmp_path):
     assert names.index("Obstacles") < names.index("Tracks") < names.index("Field")
     assert {kind for name, _, kind in layers if name != "Picture"} == {"QgsRuleBasedRenderer"}
     assert answer["loose"] == []
+
+
+def test_products_in_a_temporary_place_are_shown(qgis, sample_plan):
+    """What a dialogue offers where no place is named."""
+    values = {"FILES": [str(sample_plan)], "OUTPUT": "TEMPORARY_OUTPUT"}
+    run, shown = qgis(
+        "several",
+        requests=[
+            {"do": name, "algorithm": "geofield:import", "values": values}
+            for name in ("run", "loaded")
+        ],
+    )
+    assert run["result"]["OUTPUT"] in run["log"].splitlines()[0]
+    assert run["result"]["FIELD"] == f"{run['result']['OUTPUT']}|layername=field"
+    (layers,) = shown["groups"].values()
+    assert {"Field", "Obstacles"} <= {name for name, _, _ in layers}
+
+
+def test_a_picture_in_an_archive(qgis, tmp_path):
+    with zipfile.ZipFile(tmp_path / "pictures.zip", "w") as archive:
+        archive.write(SAMPLE, "of the farm/field.tif")
+    picture = {"raster": f"/vsizip/{tmp_path}/pictures.zip/of the farm/field.tif"}
+    values = {"IMAGERY": picture, "POINT": POINT, "SIZE_M": 90, "OUTPUT": str(tmp_path / "cut.tif")}
+    answer = qgis("run", algorithm="geofield:imagery", values=values)
+    assert "error" not in answer, answer["error"]
+    assert (tmp_path / "cut.tif").is_file()
 
 
 def test_a_stopped_run_leaves_nothing(qgis, tmp_path):

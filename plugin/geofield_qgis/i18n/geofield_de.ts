@@ -220,13 +220,13 @@
     </message>
     <message>
       <location filename="dock.py" />
-      <source>This obstacle is not round: use QGIS's vertex tool.</source>
-      <translation>Dieses Hindernis ist nicht rund: nehmen Sie das Stützpunktwerkzeug von QGIS.</translation>
+      <source>The obstacles are read-only here: nothing can be decided.</source>
+      <translation>Die Hindernisse sind hier schreibgeschützt: nichts lässt sich entscheiden.</translation>
     </message>
     <message>
       <location filename="dock.py" />
-      <source>The outline has edits that are not saved: save them, too.</source>
-      <translation>Der Umriss hat Änderungen, die nicht gespeichert sind: speichern Sie auch diese.</translation>
+      <source>This obstacle is not round: use QGIS's vertex tool.</source>
+      <translation>Dieses Hindernis ist nicht rund: nehmen Sie das Stützpunktwerkzeug von QGIS.</translation>
     </message>
     <message>
       <location filename="engine.py" />
@@ -427,11 +427,6 @@
       <location filename="planner.py" />
       <source>There is no picture here: add a raster layer of the place first.</source>
       <translation>Hier ist kein Bild: laden Sie zuerst einen Rasterlayer der Gegend.</translation>
-    </message>
-    <message>
-      <location filename="planner.py" />
-      <source>This engine has no points to include or exclude.</source>
-      <translation>Dieses Rechenprogramm kennt keine Punkte, die dazugehören oder nicht.</translation>
     </message>
     <message>
       <location filename="planner.py" />

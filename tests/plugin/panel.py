@@ -1,0 +1,191 @@
+"""The panel and the clicks without QGIS's own window; run by Debian's Python, prints JSON.
+
+    /usr/bin/python3 panel.py '{"do": "saved_with_edits", "plan": "..."}'
+
+Real are the map, the message bar and the project; the window around them is a bare one.
+"""
+
+import json
+import os
+import sys
+import time
+import traceback
+
+from qgis.core import (
+    QgsApplication,
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsPointXY,
+    QgsProject,
+    QgsRasterLayer,
+)
+from qgis.gui import QgsMapCanvas, QgsMessageBar
+from qgis.PyQt.QtCore import QEvent
+from qgis.PyQt.QtWidgets import QMainWindow, QTextBrowser
+
+LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
+
+
+class Window:
+    """What the plugin asks of QGIS's window."""
+
+    def __init__(self):
+        self.main = QMainWindow()
+        self.canvas = QgsMapCanvas(self.main)
+        self.bar = QgsMessageBar(self.main)
+        self.main.show()
+
+    def mainWindow(self):
+        return self.main
+
+    def mapCanvas(self):
+        return self.canvas
+
+    def messageBar(self):
+        return self.bar
+
+    def activeLayer(self):
+        return None
+
+    def said(self):
+        """What a person reads in the messages."""
+        return [each.toPlainText() for each in self.bar.findChildren(QTextBrowser)]
+
+
+def until(ready, wait_s=60):
+    end = time.monotonic() + wait_s
+    while not ready():
+        QgsApplication.processEvents()
+        # As the loop of a window does, which these are not in.
+        QgsApplication.sendPostedEvents(None, QEvent.DeferredDelete)
+        time.sleep(0.01)
+        assert time.monotonic() < end, window.said()
+
+
+def reviewed(plan):
+    """The layers of a plan, and the panel with it; not yet opened."""
+    from geofield_qgis import results
+    from geofield_qgis.dock import ReviewDock
+
+    layers = results.show(plan)
+    window.canvas.setDestinationCrs(layers["field"].crs())
+    return layers, ReviewDock(window)
+
+
+def settled(dock):
+    until(lambda: not (dock._timer.isActive() or dock.live.busy) and dock._released is None)
+
+
+def saved_with_edits(plan):
+    """S while another layer of the plan is edited, and again when that is saved."""
+    layers, dock = reviewed(plan)
+    twice = layers["segments"].clone()
+    QgsProject.instance().addMapLayer(twice)
+    rows = twice.featureCount()
+    dock.open(plan)
+    dock.decide("rejected")
+    edited = layers["segments"]
+    edited.startEditing()
+    edited.deleteFeature(next(edited.getFeatures()).id())
+    dock.save()
+    QgsApplication.processEvents()
+    settled(dock)
+    answer = {"said": window.said(), "still_edited": edited.isModified(), "before": rows}
+    edited.rollBack()
+    dock.save()
+    QgsApplication.processEvents()
+    settled(dock)
+    shown = [len(list(each.getFeatures())) for each in (edited, twice)]
+    return {**answer, "shown": shown, "rejected": dock.labels.count.text()}
+
+
+def filtered(plan):
+    """The figures of a plan of which some obstacles are filtered away."""
+    layers, dock = reviewed(plan)
+    figures = []
+    for some in ("", "obstacle_no < 4"):
+        layers["obstacles"].setSubsetString(some)
+        dock.open(plan)
+        settled(dock)
+        figures.append(dock.labels.figures.text())
+    return {"figures": figures, "count": dock.labels.count.text()}
+
+
+def read_only(plan):
+    """A plan that cannot be edited, with what might be HTML in its name."""
+    layers, dock = reviewed(plan)
+    layers["obstacles"].setReadOnly(True)
+    dock.open(plan)
+    settled(dock)
+    dock._trouble("The layer <b>A & B</b> is edited")
+    return window.said()
+
+
+def without_radius(plan):
+    """A radius of 0, as programs write it that know no empty number."""
+    layers, dock = reviewed(plan)
+    layer = layers["obstacles"]
+    layer.startEditing()
+    first = next(layer.getFeatures())
+    layer.changeAttributeValue(first.id(), layer.fields().indexOf("radius_m"), 0.0)
+    area = first.geometry().area()
+    larger = dock_review(dock, layer).resize(first.id(), 0.25)
+    return [larger, layer.getFeature(first.id()).geometry().area() / area]
+
+
+def dock_review(dock, layer):
+    from geofield_qgis.review import Review
+
+    dock.review = Review(layer)
+    return dock.review
+
+
+def clicks(picture, lon, lat, home):
+    """A click whose message is closed, one with Shift in another CRS, one that is stopped."""
+    from geofield_qgis.planner import Planner
+
+    project, layer = QgsProject.instance(), QgsRasterLayer(picture, "picture")
+    project.addMapLayer(layer)
+    project.write(f"{home}/project.qgz")
+    window.canvas.setLayers([layer])
+    window.canvas.setDestinationCrs(layer.crs())
+    planner, plans = Planner(window), []
+    planner.finished.connect(plans.append)
+    place = QgsCoordinateTransform(LONLAT, layer.crs(), project).transform(QgsPointXY(lon, lat))
+
+    planner.click(place, False, False)
+    until(lambda: planner._bar is not None)
+    window.bar.popWidget()  # as its cross does
+    until(lambda: plans, 200)
+    first = sorted(each.name() for each in project.mapLayers().values())
+
+    window.canvas.setDestinationCrs(LONLAT)
+    planner.click(QgsPointXY(lon + 0.0003, lat + 0.0003), True, False)
+    until(lambda: len(plans) > 1, 200)
+
+    planner.click(QgsPointXY(lon - 0.0003, lat + 0.0003), True, False)
+    gone = sorted(each.name() for each in project.mapLayers().values())
+    planner.clear()
+    stopped = sorted(each.name() for each in project.mapLayers().values())
+    return {"plans": plans, "first": first, "gone": gone, "stopped": stopped}
+
+
+ACTIONS = {
+    each.__name__: each for each in (saved_with_edits, filtered, read_only, without_radius, clicks)
+}
+
+if __name__ == "__main__":
+    request = json.loads(sys.argv[1])
+    QgsApplication.setPrefixPath("/usr", True)
+    application = QgsApplication([], True)
+    application.initQgis()
+    sys.path += ["/usr/share/qgis/python/plugins", os.environ["QGIS_PLUGINPATH"]]
+    window = Window()
+    try:
+        answer = ACTIONS[request.pop("do")](**request)
+    except Exception:  # noqa: BLE001 - told to the test
+        traceback.print_exc()
+        os._exit(1)
+    print("\n@@@" + json.dumps(answer))
+    sys.stdout.flush()
+    os._exit(0)

@@ -1,0 +1,74 @@
+"""The panel and the clicks, with layers that are edited, doubled, filtered or read-only."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from plugin_place import CLIENT, SAMPLE
+
+from geofield.formats import read_dataset
+from geofield.plan import read_plan
+from real_qgis import asking
+
+
+@pytest.fixture(scope="module")
+def panel(qgis_environment):
+    with asking(CLIENT.with_name("panel.py"), qgis_environment) as ask:
+        yield ask
+
+
+@pytest.fixture(scope="module")
+def planned(geofield, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("panel") / "out"
+    place = ("--lat", 35.075373, "--lon", 33.531142)
+    geofield("run", SAMPLE, *place, "--spacing", 8, "--out", folder)
+    return folder
+
+
+@pytest.fixture
+def plan(planned, tmp_path):
+    """A copy: each test changes it."""
+    return str(shutil.copytree(planned, tmp_path / "plan") / "field.gpkg")
+
+
+def test_saving_takes_no_edits_of_another_layer(panel, plan):
+    seen = panel("saved_with_edits", plan=plan)
+    assert "Segments has edits that are not saved" in seen["said"][-1]
+    assert seen["still_edited"]
+    # Once those are gone, the plan is written, and a doubled layer shows the new one, too.
+    rows = len(read_dataset(Path(plan)).table("segments"))
+    assert seen["shown"] == [rows, rows]
+    assert rows < seen["before"]
+    assert "1 rejected" in seen["rejected"]
+
+
+def test_obstacles_that_a_filter_hides_are_driven_around(panel, plan):
+    seen = panel("filtered", plan=plan)
+    assert seen["count"] == "3 left to look at"
+    assert seen["figures"][0] == seen["figures"][1]
+
+
+def test_what_cannot_be_edited_is_told_as_it_is_written(panel, plan):
+    said = "".join(panel("read_only", plan=plan))
+    assert "read-only" in said
+    assert "The layer <b>A & B</b> is edited" in said
+
+
+def test_a_radius_of_nothing_is_none(panel, plan):
+    assert panel("without_radius", plan=plan) == [None, pytest.approx(1.0)]
+
+
+def test_clicks_go_on_whatever_becomes_of_message_and_map(panel, tmp_path):
+    # What is in the way of a folder beside the project: nothing can be written there.
+    (tmp_path / "geofield").write_text("")
+    seen = panel("clicks", picture=str(SAMPLE), lon=33.531142, lat=35.075373, home=str(tmp_path))
+    one, again = seen["plans"]
+    assert one == again
+    assert not Path(one).is_relative_to(tmp_path)
+    (place,) = read_plan(Path(one)).settings.field.include
+    assert place == pytest.approx((33.531442, 35.075673), abs=1e-7)
+    assert {"Field", "Obstacles", "Tracks"} <= set(seen["first"])
+    assert seen["gone"] == ["picture"]
+    assert "Field" in seen["stopped"]
