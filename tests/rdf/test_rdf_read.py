@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,9 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rdf_plans import plan_across_180, small_plan
 
+from geofield.crs import LONLAT, areas_anywhere_m2
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.rdf import write
 from geofield.formats.rdf.read import from_graph, load, read
+from geofield.formats.rdf.validate import check
 
 WRITERS = {
     "xml": write.write_rdfxml,
@@ -193,6 +196,60 @@ def test_another_planners_sparse_file_loads(tmp_path):
     assert (obstacle["obstacle_no"], obstacle["kind"], obstacle["status"]) == (1, "other", "added")
     # EPSG:4326 is latitude first: the obstacle must lie in the field all the same.
     assert got.table("field").geometry.iloc[0].contains(obstacle["geometry"])
+
+
+@pytest.mark.parametrize("code", [3857, 28992, 2263])
+def test_outlines_in_a_crs_whose_lengths_are_others_are_brought_to_the_zone(tmp_path, code):
+    """Web Mercator and feet, as maps and surveyors have them; a national grid in metres stays."""
+    lon, lat = {3857: (33.53, 35.07), 28992: (5.4, 52.1), 2263: (-74.0, 40.7)}[code]
+    square = gpd.GeoSeries([shapely.box(lon, lat, lon + 0.002, lat + 0.001)], crs="EPSG:4326")
+    wkt = square.to_crs(code).iloc[0].wkt
+    path = tmp_path / "other.ttl"
+    iri = f"<http://www.opengis.net/def/crs/EPSG/0/{code}>"
+    path.write_text(
+        re.sub(r'(?s)fg geo:asWKT\s+".*?"', f'fg geo:asWKT "{iri} {wkt}"', OTHER_PLANNER)
+    )
+    got = read(path)
+    assert got.crs.to_epsg() == (28992 if code == 28992 else square.estimate_utm_crs().to_epsg())
+    (area_ha,) = got.table("field")["area_ha"]
+    assert area_ha == pytest.approx(areas_anywhere_m2(square, LONLAT)[0] / 1e4, rel=1e-3)
+
+
+def test_a_mark_before_the_text_and_decimal_numbers_are_other_programs_ways(tmp_path):
+    path = tmp_path / "other.ttl"
+    number = 'gf:trackNo "2.0"^^<http://www.w3.org/2001/XMLSchema#decimal>'
+    path.write_text(OTHER_PLANNER.replace("gf:trackNo 2", number), encoding="utf-8-sig")
+    assert read(path).table("tracks")["track_no"].tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "words"),
+    [
+        (r"(?s)POLYGON \(\(33.*?\)\)", "POLYGON EMPTY", "fg>: its geometry is empty"),
+        (r"(?s)POLYGON \(\(35.*?\)\)", "POLYGON EMPTY", "tree>: its geometry is empty"),
+        ("EPSG/0/4326", "EPSG/0/999999", "is not known"),
+        ("EPSG/0/4326", "EPSG/0/5773", "is not known"),  # heights
+        ("EPSG/0/4326", "EPSG/0/4978", "is not known"),  # from the middle of the earth
+        ("trackNo 2", 'trackNo "2.5"', "'2.5', not a whole number"),
+    ],
+)
+def test_what_is_no_place_or_number_is_told(tmp_path, pattern, replacement, words):
+    path = tmp_path / "other.ttl"
+    path.write_text(re.sub(pattern, replacement, OTHER_PLANNER))
+    with pytest.raises(FormatError, match=re.escape(words)):
+        read(path)
+    assert any(finding.level == "error" for finding in check(path))
+
+
+def test_a_position_that_is_no_number_is_told(tmp_path):
+    path = tmp_path / "other.ttl"
+    path.write_text(
+        "@prefix gf: <https://w3id.org/geofield#> .\n"
+        "@prefix wgs84: <http://www.w3.org/2003/01/geo/wgs84_pos#> .\n"
+        '<urn:tree> a gf:Obstacle ; gf:radiusInMetres 3.0 ; wgs84:lat "35,07" ; wgs84:long 33.5 .'
+    )
+    with pytest.raises(FormatError, match="lat is '35,07', not a finite number"):
+        read(path)
 
 
 def test_two_planners_share_the_obstacles_and_merge(plan, tmp_path):

@@ -194,7 +194,7 @@ def findings_of_pyshacl(path):
     for result in report.subjects(rdflib.RDF.type, sh.ValidationResult):
         kind = str(report.value(result, sh.sourceConstraintComponent)).rpartition("#")[2]
         where = report.value(result, sh.resultPath)
-        named = compact(str(where)) if isinstance(where, rdflib.URIRef) else "its default geometry"
+        named = compact(str(where)) if isinstance(where, rdflib.URIRef) else "default geometry"
         kind = kind.removesuffix("ConstraintComponent")
         rule = f"{kind[0].lower()}{kind[1:]}" + ("" if where is None else f" {named}")
         found.add((str(report.value(result, sh.focusNode)), rule))
@@ -246,7 +246,9 @@ def test_each_shape_is_broken_at_least_once():
 def test_a_blank_node_is_named(sound, tmp_path):
     path = tmp_path / "blank.ttl"
     path.write_text(sound["geosparql"] + "\n_:it a gf:Track ; gf:trackNo 99 .\n")
-    assert any("no IRI" in each.message for each in check(path))
+    told = [each.message for each in check(path)]
+    assert any("no IRI" in each for each in told)
+    assert any(each.startswith("Has no default geometry (geo:hasDefault") for each in told)
 
 
 XML = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:e="http://e/">'

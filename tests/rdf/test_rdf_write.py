@@ -79,8 +79,11 @@ def test_the_base_names_every_feature(plan, tmp_path):
 
 @pytest.mark.parametrize(
     "base",
-    ["farm", "https://a b.example/", "https://a.example/#", "file:///etc/", "https://a/?q=1"],
-)
+    [
+        "farm", "https://a b.example/", "https://a.example/#", "file:///etc/", "https://a/?q=1",
+        "https://a:b:c/", "https://a.example/50%/",
+    ],
+)  # fmt: skip
 def test_a_base_that_cannot_name_features_is_refused(plan, tmp_path, base):
     with pytest.raises(FormatError, match="cannot name features"):
         write.write_turtle(plan, tmp_path, options={"base_iri": base})
@@ -108,6 +111,7 @@ def test_any_field_id_becomes_a_valid_iri(tmp_path, name):
         ("CC0 1.0", "https://creativecommons.org/publicdomain/zero/1.0/"),
         ("dl-de by 2.0", "https://www.govdata.de/dl-de/by-2-0"),
         ("https://a.example/terms", "https://a.example/terms"),
+        ("https://a.example/terms?of[]=use", None),
         ("all rights reserved", None),
     ],
 )

@@ -93,6 +93,9 @@ def _geometry(iri: str, text: str, bounds: dict[str, Bounds]) -> Iterator[Proble
         message = error.message.split(">: ", 1)[-1]
         yield Problem(f"<{iri}>", "wkt", message, error.hint or "")
         return
+    if shapely.is_empty(shape):
+        yield Problem(f"<{iri}>", "wkt", "Its geometry is empty.")
+        return
     box = _lonlat_bounds(shape, crs)
     if box is not None:
         bounds[iri] = box

@@ -24,7 +24,7 @@ from geofield.formats.rdf.features import (
 )
 from geofield.formats.rdf.graph import ontology
 from geofield.formats.rdf.layers import CANDIDATE, LayerMap, layer_map, layer_maps
-from geofield.formats.rdf.names import NOT_IN_IRI, Names
+from geofield.formats.rdf.names import Names, is_iri
 from geofield.formats.rdf.namespaces import PREFIXES, crs_iri, node
 from geofield.formats.rdf.triples import Column, Group, Nodes, Texts, date_term, single
 from geofield.model.dataset import Dataset
@@ -280,7 +280,7 @@ def keyed(layer: LayerMap, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 def licence_iri(licence: str) -> str | None:
     """The document that a licence's name means; None where it is not known."""
     text = licence.strip()
-    if text.startswith(("http://", "https://")) and not NOT_IN_IRI.search(text):
+    if text.startswith(("http://", "https://")) and is_iri(text):
         return text
     # The ontology tells their names, lower case, with hyphens for spaces.
     name = text.lower().replace(" ", "-")

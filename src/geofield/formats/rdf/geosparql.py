@@ -8,6 +8,7 @@ ellipsoid, so that they are metres on the ground wherever the field lies.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import Any
 
@@ -16,6 +17,7 @@ import pyoxigraph as ox
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
+from pyproj.exceptions import CRSError
 from shapely.errors import ShapelyError
 
 from geofield.crs import GEOD, LONLAT, northing_first, reproject, utm_crs
@@ -42,7 +44,10 @@ def known_crs(iri: str) -> CRS:
         return CRS.from_user_input("OGC:CRS84")
     code = iri.removeprefix(EPSG)
     if code != iri and code.isdecimal():
-        return CRS.from_epsg(int(code))
+        with suppress(CRSError):
+            crs = CRS.from_epsg(int(code))
+            if crs.is_geographic or crs.is_projected:  # no heights alone, no geocentric ones
+                return crs
     raise FormatError(
         f"The coordinate reference system <{iri}> is not known.",
         hint=f"Use <{CRS84}> or <{EPSG}...>.",
@@ -96,9 +101,12 @@ def geometries_of(
         # What is cut at 180 is one shape where no meridian is in the way.
         whole = shapes if target.is_geographic else joined(shapes, crs)
         result[rows] = reproject(whole, crs, target)
-    lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_empty(result)
-    for row in np.flatnonzero(lost & ~shapely.is_missing(result)).tolist():
-        raise FormatError(f"<{subjects[row]}>: its coordinates are not a place on earth.")
+    lost = ~np.isfinite(shapely.bounds(result)).all(axis=1) & ~shapely.is_missing(result)
+    for row in np.flatnonzero(lost).tolist():
+        words = (
+            "geometry is empty" if result[row].is_empty else "coordinates are not a place on earth"
+        )
+        raise FormatError(f"<{subjects[row]}>: its {words}.")
     return result
 
 

@@ -120,12 +120,17 @@ Graph = Columns[str]
 
 
 def number(text: str | None, kind: type[int] | type[float] = float) -> float | None:
-    """What a text means as a number; None for what is none, or has no end."""
+    """What a text means as a number; None for what is none, or has no end.
+
+    A whole number may be told as a decimal one, as programs do that have no others.
+    """
     try:
-        value = None if text is None else kind(text)
-        return value if value is None or math.isfinite(value) else None
-    except (ValueError, OverflowError):
+        value = math.nan if text is None else float(text)
+    except ValueError:
         return None
+    if not math.isfinite(value) or (kind is int and not value.is_integer()):
+        return None
+    return kind(value)
 
 
 @cache

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import pandas as pd
+import pyoxigraph as ox
 import shapely
 
 from geofield import schema
@@ -95,13 +96,22 @@ def check_base(base: str | None) -> str:
     """A base as given by the user, ending in ``/``; an absolute IRI that names can follow."""
     if not base:
         return DEFAULT_BASE
-    if not _BASE.fullmatch(base):
+    if not (_BASE.fullmatch(base) and is_iri(base)):
         raise FormatError(
             f"The base IRI {base!r} cannot name features.",
             hint="Use an absolute address without spaces, query or '#', for instance "
             "https://data.my-farm.example/.",
         )
     return base if base.endswith("/") else base + "/"
+
+
+def is_iri(text: str) -> bool:
+    """Whether a text can name a thing as it is."""
+    try:
+        ox.NamedNode(text)
+    except ValueError:
+        return False
+    return True
 
 
 def path_part(text: str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyoxigraph as ox
 
@@ -43,8 +45,12 @@ def parse(path: Path) -> Iterator[ox.Quad]:
     elif syntax == ox.RdfFormat.JSON_LD:
         check_json(path.read_text(encoding="utf-8", errors="replace"), path.name)
     try:
-        # A relative name in a file without a base must not become the name of a local file.
-        yield from ox.parse(path=path, format=syntax, base_iri="https://example.org/no-base/")
+        with path.open("rb") as file:
+            # As editors of Windows put it before a text.
+            has_mark = file.read(len(BOM_UTF8)) == BOM_UTF8
+            source: dict[str, Any] = {"input": file} if has_mark else {"path": path}
+            # A relative name in a file without a base must not become the name of a local file.
+            yield from ox.parse(**source, format=syntax, base_iri="https://example.org/no-base/")
     except SyntaxError as error:
         line = f", line {error.lineno}" if error.lineno else ""
         raise FormatError(

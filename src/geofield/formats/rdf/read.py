@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from geofield import schema
-from geofield.crs import LONLAT, metric_crs, transformer
+from geofield.crs import LONLAT, is_metric, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.arrow import TYPE_IDS, promoted
 from geofield.formats.rdf.complete import complete
@@ -129,17 +129,19 @@ def _metric_crs(graph: Graph) -> CRS:
         return known_crs(name)
     for wkt in graph.everywhere("gf:metricCrsWkt"):
         return CRS.from_wkt(wkt)
-    literals = list(graph.everywhere("geo:asWKT"))
-    for text in literals:
+    literals = list(graph.pairs("geo:asWKT"))
+    for _, text in literals:
         name = split_literal(text)[0]
-        if "/EPSG/" in name and known_crs(name).is_projected:
+        if "/EPSG/" in name and is_metric(known_crs(name)):
             return known_crs(name)
-    for text in literals:
-        point = shapely.get_coordinates(geometries_of([text], ["the literal"], LONLAT)[0])[0]
+    for iri, text in literals:
+        point = shapely.get_coordinates(geometries_of([text], [iri], LONLAT)[0])[0]
         return metric_crs(float(point[0]), float(point[1]))
     for lon, lat in (("wgs84:long", "wgs84:lat"), ("gml:long", "gml:lat")):
         for x, y in zip(graph.everywhere(lon), graph.everywhere(lat), strict=False):
-            return metric_crs(float(x), float(y))
+            east, north = number(x), number(y)
+            if east is not None and north is not None:
+                return metric_crs(east, north)
     return LONLAT
 
 
@@ -208,12 +210,15 @@ class _Rows:
                 values = [None if text is None else kind(text) for text in texts]
                 if all(map(math.isfinite, filter(None, values))):
                     return values
-            for text, subject in zip(texts, self.subjects, strict=True):
-                if text is not None and number(text, kind) is None:
+            numbers = [number(text, kind) for text in texts]
+            for text, value, subject in zip(texts, numbers, self.subjects, strict=True):
+                if text is not None and value is None:
+                    what = "whole" if kind is int else "finite"
                     raise FormatError(
-                        f"<{subject}>: {column.name} is {text[:40]!r}, not a finite number.",
+                        f"<{subject}>: {column.name} is {text[:40]!r}, not a {what} number.",
                         hint="`geofield validate` lists everything that is wrong.",
                     )
+            return numbers
         meaning = {expand(value_iri(value)): value for value in column.values}
         if column.values == YES_NO:
             meaning = {"true": "yes", "false": "no", "1": "yes", "0": "no"}

@@ -127,8 +127,9 @@ def _is_of(term: Any, kinds: Sequence[str]) -> bool:
 
 def _problem(subject: str, path: tuple[str, ...], name: str, value: Any, rule: str) -> Problem:
     """What is wrong, in plain words; the rule that it breaks as the hint."""
-    term = compact(path[0]) if len(path) == 1 else "its default geometry"
-    what = f"{label(term).lower()} ({term})" if label(term) else term
+    term = compact(path[0]) if len(path) == 1 else "default geometry"
+    named = label(term).lower().removeprefix("has ")
+    what = f"{named} ({term})" if named else term
     found = "" if value is None else value.value[:80]
     words = {
         "minCount": f"Has no {what}.",
