@@ -11,6 +11,7 @@ from pathlib import Path
 
 import geopandas as gpd
 import pytest
+import shapely
 
 from geofield.renewal import outdated
 from geofield.simulate import SimulatedField
@@ -60,6 +61,29 @@ def test_a_stage_says_what_is_older_and_one_command_renews_it(out: Path) -> None
     # What lies there is of the folder's own plan, not of another one beside it.
     assert "Older" not in geofield("tracks", plan, "--spacing", 9, "-o", out / "wide.gpkg").stderr
     assert json.loads(geofield("refresh", out / "wide.gpkg", "--json").stdout)["files"] == []
+
+
+def test_what_a_person_has_under_the_plans_name_stays(tmp_path: Path) -> None:
+    """The file that was imported, the `.prj` of a Shapefile, a drawing; products are renewed."""
+    parcel = gpd.GeoDataFrame(geometry=[shapely.box(33.53, 35.07, 33.532, 35.071)], crs="EPSG:4326")
+    parcel.to_file(tmp_path / "parcel.shp")
+    parcel.to_file(tmp_path / "parcel.kml", driver="KML")
+    parcel.geometry.to_file(tmp_path / "parcel.dxf", driver="DXF")
+    (tmp_path / "parcel.ttl").write_text("@prefix gf: <https://w3id.org/geofield#> .")
+    own = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    plan = tmp_path / "parcel.gpkg"
+    geofield("import", tmp_path / "parcel.kml", "-o", plan)
+    assert "Older" not in geofield("tracks", plan, "--spacing", 9, "-o", plan).stderr
+    assert json.loads(geofield("refresh", plan, "--json").stdout)["files"] == []
+    assert {file: file.read_bytes() for file in own} == own
+
+    plan = plan.rename(tmp_path / "other.gpkg")
+    kinds = ["kml", "gpx", "dxf", "turtle", "jsonld", "ntriples", "html", "fiboa"]
+    wanted = [word for kind in kinds for word in ("-f", kind)]
+    geofield("export", plan, *wanted, "--stem", "other", "--out", tmp_path)
+    made = json.loads(geofield("refresh", plan, "--json").stdout)["files"]
+    ends = {"kml", "gpx", "dxf", "prj", "ttl", "jsonld", "nt", "html", "geojson", "parquet"}
+    assert {Path(file).suffix[1:] for file in made} == ends
 
 
 def test_what_a_run_did_not_write_again_is_told(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import mmap
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,13 +18,16 @@ from geofield.staging import staged_folder, written_ns
 _NOT_RENEWED = ("gpkg", "scene")
 #: Both are written under the same names; which one lies there its first bytes tell.
 _STUDY_MARK = b"www.DLC.org/Obstacle#"
+#: Who made a product stands in it; a DXF has no place for that, but layers of its own.
+_MADE_HERE = re.compile(rb"geofield[ /]\d|\nFIELD\r?\n")
 
 
 def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     """The products of a plan that lie in its folder, by format.
 
     They carry its name, or one that all plans give alike: those are of the main job's plan where
-    it lies there, too.
+    it lies there, too. What has its name and was not written by geofield is a person's own, as the
+    file that the plan was imported from.
     """
     found = {}
     for each in FORMATS.values():
@@ -68,12 +74,28 @@ def renew(plan_file: Path) -> list[Path]:
 def _files(of: Format, plan_file: Path) -> Iterator[Path]:
     main = plan_file.with_name(PLAN_FILE)
     of_another = plan_file.name != PLAN_FILE and main.is_file()
-    for pattern in of.files:
-        if of_another and "{stem}" not in pattern:
+    for given in of.files:
+        if of_another and "{stem}" not in given:
             continue
+        pattern = given
         for placeholder, text in (("{stem}", plan_file.stem), ("<layer>", "*"), ("<name>", "*")):
-            pattern = pattern.replace(placeholder, text)  # noqa: PLW2901
-        yield from (file for file in plan_file.parent.glob(pattern) if file.is_file())
+            pattern = pattern.replace(placeholder, text)
+        named = "{stem}" in given
+        for file in plan_file.parent.glob(pattern):
+            if file.is_file() and (_is_made_here(file) or not named):
+                yield file
+
+
+def _is_made_here(file: Path) -> bool:
+    if file.suffix == ".prj":  # of the DXF beside it; without one, of a person's Shapefile
+        file = file.with_suffix(".dxf")
+    with (
+        suppress(OSError, ValueError),  # it is not there, or empty
+        file.open("rb") as opened,
+        mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as whole,
+    ):
+        return _MADE_HERE.search(whole) is not None
+    return False
 
 
 def _is_study(file: Path) -> bool:
