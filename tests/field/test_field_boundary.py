@@ -121,8 +121,30 @@ def test_an_invalid_parcel_is_repaired_and_flagged():
 def test_holes_and_parts_are_kept():
     ring: Any = A.difference(shapely.box(9.9999, 49.9999, 10.0001, 50.0001))
     table = gpd.GeoDataFrame({"name": ["x"]}, geometry=[shapely.MultiPolygon([ring, B])], crs=4326)
-    field = field_from_boundary(table, lat=50.0005, lon=10.0005)
+    with pytest.warns(FieldWarning, match="The parcel has 2 parts: only the one with the point"):
+        field = field_from_boundary(table, lat=50.0005, lon=10.0005)
     assert len(list(field.polygon.interiors)) == 1
+    # Rows of one index, as of tables that were put together, are no parts.
+    together = parcels().set_index(pd.Index([0, 0]))
+    assert field_from_boundary(together, lat=LAT, lon=LON).name == "A"
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("point", [(None, None), (-16.8005, 179.9995), (-16.8005, -179.9995)])
+def test_a_parcel_across_180_degrees_is_one(tmp_path, cut, point):
+    """Cut there, as in GeoJSON, half of it was taken; else it went round the world."""
+    from geofield.cli.parcels import parcel_and_point
+
+    sides = [shapely.box(179.999, -16.801, 180, -16.8), shapely.box(-180, -16.801, -179.999, -16.8)]
+    west, south, east, north = -179.999, -16.801, 179.999, -16.8
+    ring = shapely.Polygon([(east, south), (west, south), (west, north), (east, north)])
+    file = tmp_path / "parcel.geojson"
+    shape = shapely.MultiPolygon(sides) if cut else ring
+    gpd.GeoDataFrame(geometry=[shape], crs=4326).to_file(file)
+    field, _, lon = parcel_and_point(file, None, None, *point)
+    assert field is not None
+    assert field.area_ha == pytest.approx(2.36, abs=0.01)
+    assert abs(abs(lon) - 180) < 0.002
 
 
 @pytest.mark.parametrize(("text", "told"), [

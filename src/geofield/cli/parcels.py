@@ -47,9 +47,11 @@ def parcel_and_point(
         return None, lat, lon
     if (lat is None) != (lon is None):
         raise _missing(lat)
+    from geofield.crs import parse_crs
     from geofield.farm.place_files import CSV
     from geofield.farm.place_reader import read_table
     from geofield.field import field_from_boundary
+    from geofield.formats.antimeridian import joined
     from geofield.formats.foreign import layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
 
@@ -68,6 +70,9 @@ def parcel_and_point(
         raise FieldError(
             f"The boundary: {error.message}", hint=of_layers if in_layers else error.hint
         ) from None
+    if table.crs is not None:
+        whole = joined(table.geometry.to_numpy(), parse_crs(table.crs))
+        table = table.set_geometry(whole, crs=table.crs)
     parcel = field_from_boundary(table, lat=lat, lon=lon, name=name)
     if lat is None or lon is None:
         lon, lat = parcel.inside_lonlat

@@ -58,7 +58,8 @@ def field_from_boundary(
     FieldError
         When no parcel, or more than one of different outline, fits.
     """
-    rows = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)].explode()
+    shaped = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)]
+    rows = shaped.reset_index(drop=True).explode()
     points = int((rows.geometry.geom_type == "Point").sum())
     rows = _outlines(rows)
     if rows.empty:
@@ -91,10 +92,23 @@ def field_from_boundary(
     else:
         chosen = _only(rows)
     if lat is not None and lon is not None:
+        _tell_parts(rows, chosen)
         return _field(chosen, own, lat, lon, pointed=True)
     inside = chosen.geometry.iloc[0].representative_point()
     lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
     return _field(chosen, own, lat, lon, pointed=False)
+
+
+def _tell_parts(rows: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
+    """Tell that a parcel of several parts is taken in one alone."""
+    count = int((rows.index == chosen.index[0]).sum())
+    if count > 1:
+        warn(
+            f"The parcel has {count} parts: only the one with the point is taken. Each is a field "
+            "of its own; `geofield batch` plans them all.",
+            FieldWarning,
+            stacklevel=3,
+        )
 
 
 def _outlines(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
@@ -150,7 +164,9 @@ def _of_name(
 def _around(rows: gpd.GeoDataFrame, own: CRS, lat: float, lon: float) -> gpd.GeoDataFrame:
     """The parcel that contains a point."""
     x, y = transformer(LONLAT, own).transform(lon, lat)
-    chosen = rows[rows.geometry.intersects(shapely.Point(x, y))]
+    # Longitudes of a parcel across 180 degrees may run on beyond that.
+    at = shapely.multipoints([(x, y), (x + 360.0, y)]) if own.is_geographic else shapely.Point(x, y)
+    chosen = rows[rows.geometry.intersects(at)]
     if len(chosen):
         return _smallest(chosen)
     what = f"contains lat {lat}, lon {lon}"
