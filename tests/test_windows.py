@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,7 +125,7 @@ def test_a_parcel_with_a_gap_of_the_data_in_its_middle(tmp_path: Path) -> None:
         gap.write(pixels)
         gap.write_mask(mask)
         gap.set_band_description(4, "nir")
-    at = {"lat": lat, "lon": lon, "settings": settings()}
+    at: dict[str, Any] = {"lat": lat, "lon": lon, "settings": settings()}
     with pytest.warns(ObstacleWarning, match="does not show 2% of the field"):
         plan = plan_field(tmp_path / "gap.tif", **at, boundary=TRUTH.field)
     assert plan.obstacles is not None
