@@ -864,6 +864,30 @@ def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:
     assert shown(item(2015, 9000, 0.3), item(2023, 100, 0.6)) == (2015, "2015")
 
 
+def test_each_stac_item_has_its_own_order_of_bands(tmp_path: Path) -> None:
+    grey = {"red": 60, "green": 120, "blue": 180, "nir": 240}
+
+    def item(name: str, order: str, east: float) -> dict[str, Any]:
+        names = order.split()
+        values = np.stack([np.full((100, 100), grey[each], np.uint8) for each in names])
+        values[:, ::2] += 1
+        place = Affine(RESOLUTION, 0, east, 0, -RESOLUTION, NORTH)
+        write(tmp_path / f"{name}.tif", values, transform=place)
+        asset: dict[str, Any] = {"href": f"{name}.tif", "type": "image/tiff"}
+        asset |= {"eo:bands": [{"common_name": each} for each in names]}
+        return {"id": name, "properties": {}, "assets": {"image": asset}}
+
+    items = [item("a", "red green blue nir", EAST), item("b", "nir red green blue", EAST + 50)]
+    file = tmp_path / "items.json"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": items}))
+    scene = read_scene(file)
+    assert scene.grid.shape == (100, 200)
+    for name, value in grey.items():
+        band = scene.band(name)
+        assert band is not None
+        assert band[51, [20, 150]].tolist() == [value, value]
+
+
 @pytest.mark.parametrize("pixel", [RESOLUTION, 200.0])
 def test_a_picture_with_control_points_lies_in_a_set_as_alone(tmp_path: Path, pixel: float) -> None:
     # Beside a sheet that reaches farther to the north-west, or wider than what is looked at.

@@ -8,7 +8,7 @@ sheets in another UTM zone.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -117,11 +117,13 @@ class CollectionReader(SceneReader):
         return values, valid
 
 
-def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "") -> SceneReader:
+def open_collection(
+    paths: Sequence[str] | Mapping[str, OpenOptions], options: OpenOptions, *, name: str = ""
+) -> SceneReader:
     """A reader over several pictures, with a warning where some cannot be read.
 
     Earlier ones win where several are as fine at the point; those farther than 10 km from it are
-    left out. `name` is that of the whole, for people.
+    left out. `name` is that of the whole, for people; what is known of each may be given with it.
 
     Raises
     ------
@@ -134,7 +136,8 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
     damaged: list[str] = []
     for path in paths:
         try:
-            readers.append(_looked_at(path, options))
+            known = paths[path] if isinstance(paths, Mapping) else options
+            readers.append(_looked_at(path, known))
         except GeofieldError as error:
             damaged.append(f"{display_name(path)} was left out: {error.message}")
     notes, told = list(damaged), _told(damaged)
@@ -167,13 +170,13 @@ def open_collection(paths: Sequence[str], options: OpenOptions, *, name: str = "
             f"Joined from {len(parts)} pictures"
             + (f"; {moved} of them reprojected to {grid.crs.name}." if moved else ".")
         )
-    known = options.source or replace(reference.source, name=name or reference.source.name)
+    source = options.source or replace(reference.source, name=name or reference.source.name)
     return CollectionReader(
         path=reference.path,
         grid=grid,
         roles=reference.roles,
         dtype=reference.dtype,
-        source=known,
+        source=source,
         scaling=reference.scaling,
         notes=(*reference.notes, *notes),
         guesses=reference.guesses,

@@ -65,9 +65,10 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
             f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
             hint="Give items with assets of the role `data` or `visual`.",
         )
-    reader = open_collection([picture for picture, _ in items], items[0][1], name=path.name)
+    known = dict(items)  # of each its own: their bands may come in another order
+    reader = open_collection(known, options, name=path.name)
     # Of the one that is shown at the point: a finer one may be older.
-    return replace(reader, source=dict(items)[reader.path].source or reader.source)
+    return replace(reader, source=known[reader.path].source or reader.source)
 
 
 def _document(path: Path) -> Any:
