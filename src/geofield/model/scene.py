@@ -205,8 +205,9 @@ class Scene:
     def pixel_of(self, *, lat: float, lon: float, option: str | None = None) -> tuple[float, float]:
         """The pixel position of a point that must lie on the picture's data.
 
-        Rounded to a thousandth of a pixel: the last digits are the transformation's own, and a
-        point given on a pixel's border must not fall to either side of it by chance.
+        Rounded to a thousandth of a pixel, and so far within the picture: the last digits are the
+        transformation's own, and a point given on a pixel's border must not fall to either side of
+        it by chance.
 
         Parameters
         ----------
@@ -228,7 +229,8 @@ class Scene:
         if not self.grid.contains_px(x, y):
             raise outside(self.grid, lat, lon, option)
         rows, columns = self.grid.shape
-        x, y = min(round(float(x), 3), columns - 1e-3), min(round(float(y), 3), rows - 1e-3)
+        # On no border either: an outline does not hold the points that lie on its own.
+        x, y = np.clip(np.round([x, y], 3), 1e-3, (columns - 1e-3, rows - 1e-3)).tolist()
         if not self.valid[int(y), int(x)]:
             raise PointOutsideError(
                 f"{_point(lat, lon, option)} (pixel {x:.0f}, {y:.0f}) lies where the picture has "
