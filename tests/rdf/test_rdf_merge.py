@@ -17,6 +17,7 @@ from geofield.formats.rdf.namespaces import expand
 from geofield.formats.rdf.query import ask, open_store, queries
 from geofield.formats.rdf.read import read
 from geofield.formats.rdf.validate import check
+from geofield.model.place import position_words
 
 #: Of the field, and of things that have many: everything else is said once.
 MANY = (
@@ -131,8 +132,18 @@ def test_two_programs_first_fields_are_two():
         plan.tables["field"].loc[0, "field_id"] = "1"
     assert Names.of(here).field != Names.of(there).field
     assert Names.of(here).field.endswith("/field/35.075N33.531E/1")
-    here.tables["field"].loc[0, "field_id"] = "35.0754N33.5312E"
-    assert Names.of(here).field.endswith("/field/35.0754N33.5312E")
+
+
+@pytest.mark.parametrize("digits", [0, 3, 4, 7])
+def test_a_field_named_by_its_place_has_that_name_alone(digits):
+    """Whatever its outline is: another one's middle may be told by other digits."""
+    plan = small_plan()
+    field = plan.tables["field"]
+    field.loc[0, "field_id"] = identifier = position_words(35.0754, -33.5312, digits)
+    name = Names.of(plan).field
+    assert name.endswith(f"/field/{identifier}")
+    field.loc[[0], "geometry"] = field.geometry.translate(200.0, 200.0)
+    assert Names.of(plan).field == name
 
 
 def test_another_process_writes_the_same_bytes(tmp_path):

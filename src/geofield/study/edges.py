@@ -5,8 +5,8 @@ the border pixel repeated, one threshold on the gradient magnitude, thinning to 
 Thinning does not depend on the threshold, so a scan over hundreds of thresholds computes
 the gradients once: :class:`EdgeScan`.
 
-A pixel's centre is its integer index here, as everywhere in this package below
-:func:`geofield.obstacles.detect_obstacles`.
+A pixel's centre is its integer index here; circles that are found on an edge map are told from
+the corner of the top-left pixel on (:func:`geofield.study.phase_code.find_circles`).
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class StrategyResult:
     Attributes
     ----------
     circles : Circles
-        In pixel-index coordinates, inside the region, each once.
+        From the corner of the top-left pixel on; inside the region, each once.
     method, threshold
         The winning setting; for ``consensus`` None.
     counts : dict of method to list of (threshold, detections)

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 _BASE = re.compile(r"https?://[A-Za-z0-9._~:@\[\]-]+(?:/[A-Za-z0-9._~!$()*+,;=:@%-]*)*")
 #: Characters that no RDF syntax allows inside an IRI.
 NOT_IN_IRI = re.compile(r"[\x00-\x20<>\"{}|^`\\]")
-#: Field ids that geofield makes: a place, and so the field's own everywhere.
-_PLACE = re.compile(r"\d+\.\d{4}[NS]\d+\.\d{4}[EW]")
+#: Field ids that geofield makes: a place, as round as it is, and so the field's own everywhere.
+_PLACE = re.compile(r"\d+(\.\d+)?[NS]\d+(\.\d+)?[EW]")
 #: Layers that a plan of tracks is made of; points follow from segments and settings.
 _PLANNED = ("tracks", "segments", "gaps", "headland", "headland_tracks", "route", "turns")
 
