@@ -6,8 +6,9 @@ import geopandas as gpd
 import pandas as pd
 import pytest
 from pyproj import CRS
-from shapely import Point
+from shapely import Point, box
 
+import geofield as gf
 from geofield import schema
 from geofield.errors import FormatError
 from geofield.model.scene import ROLES
@@ -48,6 +49,19 @@ def test_every_layer_is_well_formed(layer: schema.Layer) -> None:
     table = schema.empty(layer, CRS("EPSG:32636"))
     assert list(table.columns) == [*layer.column_names, "geometry"]
     assert table.crs == "EPSG:32636"
+
+
+def test_the_heading_of_a_field_says_of_what_it_is() -> None:
+    """Of its tracks, as soon as there are any: these run askew to its longest piece."""
+    field = gf.Field(box(500_000, 3_880_000, 500_300, 3_880_200), crs="EPSG:32636")
+    tracks = gf.plan_tracks(field, spacing_m=20.0, direction=45.0)
+    alone, planned = (
+        gf.Plan(field=field, tracks=each).to_dataset().table("field")["heading_deg"].iloc[0]
+        for each in (None, tracks)
+    )
+    assert (alone, planned) == (pytest.approx(90.0, abs=0.1), pytest.approx(45.0))
+    meaning = schema.meaning(schema.FIELD, schema.FIELD.column("heading_deg"))
+    assert meaning.startswith("Direction of the tracks, without any that of the longest piece")
 
 
 def test_conform_brings_any_table_into_shape() -> None:

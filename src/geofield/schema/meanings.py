@@ -20,7 +20,8 @@ _OF_LAYER = {
         "name": "What you call the field.",
         "perimeter_m": "Length of the outer border.",
         "longest_edge_m": "The longest straight piece of the border.",
-        "heading_deg": "Direction of that piece, clockwise from true north.",
+        "heading_deg": "Direction of the tracks, without any that of the longest piece, clockwise "
+        "from true north.",
         "method": "How the outline was found, or that it is your own parcel.",
         "imagery": "Which picture it was found in.",
         "imagery_date": "When the picture was taken.",
