@@ -360,6 +360,23 @@ def test_what_a_hand_held_goes_back_when_the_drag_is_stopped(page: Page, tool: s
     assert not page.state()["can_undo"]
 
 
+def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
+    """The tool before it gave the hand to Select, and the circle in the hand was gone."""
+    x, y = page.obstacle(8)["centre"]
+    page.driver.find_element(By.CSS_SELECTOR, "[data-tool=direction]").click()
+    page.driver.execute_cdp_cmd("Network.enable", {})
+    slow = {"offline": False, "latency": 900, "downloadThroughput": -1, "uploadThroughput": -1}
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", slow)
+    page.drag((x - 60, y), (x + 60, y + 9), steps=2)
+    page.press("a")
+    half_drag(page, page.pixel(x + 20, y + 20))
+    page.wait(lambda: not page.driver.find_element(By.ID, "undo").get_property("disabled"))
+    time.sleep(0.2)
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
+    ActionChains(page.driver).release().perform()
+    page.wait(lambda: len(page.state()["obstacles"]) == 22, seconds=5)
+
+
 def test_edits_come_back_after_the_server_is_killed(
     driver: webdriver.Chrome, plan_path: Path
 ) -> None:

@@ -128,7 +128,7 @@ const MAKERS = {
     }));
     draw.on("drawend", async ({feature}) => {
       await commit(command(feature.getGeometry()));
-      use("select");
+      doneWith(draw);
     });
     return [draw];
   },
@@ -144,12 +144,17 @@ const MAKERS = {
   },
 };
 
+// A person who took another tool before the answer was there keeps it.
+function doneWith(draw) {
+  if (held.includes(draw)) use("select");
+}
+
 function shape(type, command, back = false) {
   const draw = new ol.interaction.Draw({source: maps.sources.sketch, type});
   draw.on("drawend", async ({feature}) => {
     await commit(command(feature.getGeometry()));
     maps.sources.sketch.clear();
-    if (back) use("select");
+    if (back) doneWith(draw);
   });
   return draw;
 }
