@@ -375,6 +375,7 @@ def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
     page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
     ActionChains(page.driver).release().perform()
     page.wait(lambda: len(page.state()["obstacles"]) == 22, seconds=5)
+    assert page.state()["obstacles"][-1]["status"] == "added"
 
 
 def test_edits_come_back_after_the_server_is_killed(

@@ -184,3 +184,5 @@ def test_what_stays_until_it_is_answered_covers_no_button(page: Page, plan_path:
     page.wait(lambda: "Another program changed" in page.text("message"))
     page.button("confirm")
     page.wait(lambda: page.judged() == 2)
+    confirmed = [one for one in page.state()["obstacles"] if one["status"] == "confirmed"]
+    assert len(confirmed) == 2
