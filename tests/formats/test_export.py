@@ -12,6 +12,7 @@ import shapely
 
 from geofield.errors import FormatError, FormatWarning, OutputExistsError
 from geofield.formats import FORMATS, detect, format_named, read_dataset, write_dataset
+from geofield.formats.export import dropped
 from geofield.staging import staged as staging_module
 from geofield.staging import staged_file, staged_folder
 
@@ -170,6 +171,22 @@ def test_what_is_dropped_is_said_once_and_only_if_it_is_there(dataset, tmp_path)
         provenance=type(dataset.provenance)(),
     )
     write_dataset(bare, tmp_path / "bare", ["shapefile"])
+
+
+def test_columns_of_a_persons_own_come_back_or_it_is_told(dataset, tmp_path):
+    """Linked data left them out without a word, and with them a plan that was imported from it."""
+    layers = ("field", "obstacles")
+    own = {name: dataset.tables[name].assign(note="mine") for name in layers}
+    mine = dataclasses.replace(dataset, tables={**dataset.tables, **own})
+    words = "columns of your own"
+    for name, each in FORMATS.items():
+        assert words not in dropped(dataset, each)
+        if each.reader and name != "rdf-study":
+            write_dataset(mine, tmp_path / name, [name])
+            files = sorted(p for p in (tmp_path / name).iterdir() if p.suffix != ".qgz")
+            back = read_dataset(files[0])
+            came = all("note" in back.table(layer) for layer in layers)
+            assert came != (words in dropped(mine, each)), name
 
 
 def test_mixed_geometries_are_refused(dataset, tmp_path):

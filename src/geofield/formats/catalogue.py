@@ -11,6 +11,7 @@ from geofield.formats.format import Drop, Format
 _ALL = tuple(layer.name for layer in schema.LAYERS if not layer.working)
 _MAP = ("field", "obstacles", "segments", "gaps", "headland_tracks", "turns")
 _ORIGIN = Drop("settings and evidence", "provenance")
+_OWN = Drop("columns of your own", "own")
 
 #: Endings of GeoParquet.
 PARQUET = (".parquet", ".geoparquet", ".pq")
@@ -20,6 +21,7 @@ _PASSED = Drop("obstacles that tracks run through", "passed")
 _TERMINAL_DROPS = (
     _PASSED,
     Drop("the status, radius and confidence of obstacles", "obstacles"),
+    _OWN,
     _ORIGIN,
 )
 
@@ -36,6 +38,7 @@ _RDFXML = Format(
     "geofield.formats.rdf.read:read",
     validator="geofield.formats.rdf.validate:check",
     suffixes=(".rdf", ".owl"),
+    drops=(_OWN,),
     precision_m=0.0,
     options=("rdf_profile", "base_iri", "plan_name", "points"),
     fields="many",
@@ -159,6 +162,7 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(
             _PASSED,
             Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
+            _OWN,
             _ORIGIN,
         ),
         validator="geofield.formats.checks.gdal:check",
@@ -170,7 +174,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("csv/track_points.csv", "csv/obstacles.csv"),
         ("track_points", "obstacles"),
         "geofield.formats.tables_csv:write",
-        drops=(Drop("the outlines of obstacles that are not round", "polygons"), _ORIGIN),
+        drops=(Drop("the outlines of obstacles that are not round", "polygons"), _OWN, _ORIGIN),
     ),
     Format(
         "fiboa",
@@ -191,6 +195,7 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(
             _PASSED,
             Drop("names, numbers and statuses", "field"),
+            _OWN,
             _ORIGIN,
         ),
         crs="metric",
@@ -248,6 +253,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("obstacles", "track_points"),
         "geofield.formats.study_xml:write_study_xml",
         drops=(
+            _OWN,
             _ORIGIN,
             Drop("the outlines of obstacles that are not round", "polygons"),
             Drop("the confidence of obstacles", "obstacles.confidence"),

@@ -215,12 +215,16 @@ def dropped(dataset: Dataset, into: Format, *, together: bool = False) -> list[s
         layers = [title for title in layers if title != "segments"]
     if together and into.fields == "joined" and dataset.has(schema.TRACK_POINTS.name):
         layers.append(schema.TRACK_POINTS.title.lower())
-    return layers + [drop.words for drop in into.drops if _present(dataset, drop.when)]
+    return layers + [drop.words for drop in into.drops if _present(dataset, drop.when, into)]
 
 
-def _present(dataset: Dataset, when: str) -> bool:
+def _present(dataset: Dataset, when: str, into: Format) -> bool:
     if when == "provenance":
         return bool(dataset.provenance.settings or dataset.provenance.evidence)
+    if when == "own":
+        layers = (schema.FIELD, schema.OBSTACLES, schema.TRACKS, schema.SEGMENTS)
+        own = {name for one in layers for name in schema.own_columns(one, dataset.table(one.name))}
+        return not {str(name).lower() for name in own} <= {"customer", "farm"} & set(into.options)
     obstacles = dataset.table(schema.OBSTACLES.name)
     if when == "polygons":
         return bool(obstacles["radius_m"].isna().any())

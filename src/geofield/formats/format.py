@@ -31,8 +31,8 @@ class Drop:
     when : str
         Which datasets have it: a layer (``gaps``), a column with values
         (``obstacles.confidence``), ``provenance``, ``polygons`` (obstacles that are not
-        circles), ``passed`` (obstacles that are not driven around) or ``parts`` (a headland that
-        leaves the field in several).
+        circles), ``passed`` (obstacles that are not driven around), ``own`` (columns that are not
+        geofield's) or ``parts`` (a headland that leaves the field in several).
     """
 
     words: str
