@@ -6,7 +6,6 @@ from html import escape
 from typing import Any
 
 from qgis.core import (
-    NULL,
     QgsCoordinateTransform,
     QgsGeometry,
     QgsPointXY,
@@ -276,20 +275,8 @@ class ReviewDock(QDockWidget):
         """Ask for the tracks of the layers as they are now, saved or not."""
         if self.review is None:
             return
-        layer = self.review.layer
-        rows = []
-        for feature in plan_files.rows_of(layer):
-            row = {
-                name: found
-                for name, found in zip(layer.fields().names(), feature.attributes())
-                if isinstance(found, (int, float, str)) and found != NULL
-            }
-            rows.append({**row, "wkb": _hex(feature.geometry())})
-        question = {"do": "plan", "file": self.path, "obstacles": rows}
-        field = plan_files.layers_of(self.path).get("field")
-        outline = None if field is None else next(field.getFeatures(), None)
-        if outline is not None:
-            question["outline"] = _hex(outline.geometry())
+        edited = plan_files.as_edited(self.path, self.review.layer)
+        question = {"do": "plan", "file": self.path, **edited}
         self.live.ask(question, self._show_tracks if preview else self._show_figures)
 
     def _show_tracks(self, answer: dict[str, Any]) -> None:
@@ -397,8 +384,3 @@ class ReviewDock(QDockWidget):
             self._take_back()
         # The bar reads HTML.
         self.iface.messageBar().pushWarning("geofield", escape(text))
-
-
-def _hex(geometry: QgsGeometry) -> str:
-    """Well-known binary, for the engine; curves and measures are none of its business."""
-    return bytes(geometry.asWkb()).hex()

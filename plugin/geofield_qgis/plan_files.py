@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from qgis.core import QgsDataProvider, QgsFeature, QgsProject, QgsVectorLayer, QgsWkbTypes
+from qgis.core import (
+    NULL,
+    QgsDataProvider,
+    QgsFeature,
+    QgsGeometry,
+    QgsProject,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
 
 from .algorithm import path_of
 from .results import settled
@@ -24,7 +32,25 @@ def layers_of(path: str) -> dict[str, QgsVectorLayer]:
     return {table_of(layer): layer for layer in all_of(path)}
 
 
-def rows_of(layer: QgsVectorLayer) -> Iterator[QgsFeature]:
+def as_edited(path: str, obstacles: QgsVectorLayer) -> dict[str, Any]:
+    """Obstacles and outline of a plan as they are now, saved or not, for the engine."""
+    names, rows = obstacles.fields().names(), []
+    for feature in _rows_of(obstacles):
+        values = dict(zip(names, feature.attributes()))
+        row = {k: v for k, v in values.items() if isinstance(v, (int, float, str)) and v != NULL}
+        rows.append({**row, "wkb": _hex(feature.geometry())})
+    field = layers_of(path).get("field")
+    outline = None if field is None else next(field.getFeatures(), None)
+    told = {} if outline is None else {"outline": _hex(outline.geometry())}
+    return {"obstacles": rows, **told}
+
+
+def _hex(geometry: QgsGeometry) -> str:
+    """Well-known binary, for the engine; curves and measures are none of its business."""
+    return bytes(geometry.asWkb()).hex()
+
+
+def _rows_of(layer: QgsVectorLayer) -> Iterator[QgsFeature]:
     """The rows of a layer as they are edited, and those that its filter hides."""
     yield from layer.getFeatures()
     if layer.subsetString():
