@@ -816,6 +816,36 @@ def test_shapes_of_one_part_among_several_are_no_edit(folder: Path) -> None:
     assert "as edited" not in _batch(folder)
 
 
+@pytest.mark.parametrize("how", ["reprojected", "begun elsewhere"])
+def test_layers_that_were_saved_anew_are_no_edit(folder: Path, how: str) -> None:
+    """All fields counted as edited and reviewed, and a plan taken out could not be put back."""
+    mine = folder / "b.gpkg"
+    geofield("farm", "get", folder / "farm", "b", "-o", mine)
+
+    def turned(shape: Any) -> Any:
+        ring = shape.exterior.coords[:-1]
+        return shapely.Polygon([*ring[3:], *ring[:3]])
+
+    def saved(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        if how == "reprojected":
+            return table.to_crs(3857).to_crs(table.crs)
+        return table.set_geometry([*map(turned, table.geometry)], crs=table.crs)
+
+    layers = ["field", "obstacles"] + ["tracks", "segments"] * (how == "reprojected")
+    for layer in layers:
+        _edit(folder, layer, saved)
+    geofield("farm", "put", mine, folder / "farm")
+    assert "as edited" not in _batch(folder)
+    reviewed = gf.read_farm(folder / "farm").status.set_index("field_id")["reviewed"]
+    assert reviewed.to_dict() == {"a": False, "b": True, "c": False, "d": False}
+    # What was edited besides is.
+    for layer in layers:
+        _edit(folder, layer, saved)
+    _edit(folder, "obstacles", _tree_grown)
+    said = _batch(folder)
+    assert [one for one in "abcd" if f"{one} as edited" in said] == ["b", "c"]
+
+
 @pytest.mark.parametrize("door", ["batch", "tracks"])
 def test_a_refused_run_leaves_an_overview_of_what_it_took_in(folder: Path, door: str) -> None:
     """An edit that was taken back there was passed over without a word."""

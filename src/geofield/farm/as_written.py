@@ -4,34 +4,77 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import shapely
+from pyproj import CRS
 
 from geofield import schema
 from geofield.farm.layers import EPSG, FIELD_ID
+from geofield.model.written import SAME_M, same_shapes
 from geofield.plan import Plan
 
 #: What a person may change, besides shapes.
-_FIELD_WORDS = ("name",)
-_OBSTACLE_WORDS = ("obstacle_no", "kind", "status", "radius_m", "buffer_m")
+_WORDS = {
+    schema.FIELD: ("name",),
+    schema.OBSTACLES: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
+}
+
+_DEGREE_M = 111_320.0
 
 
 def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[str, str]:
     """A digest per field of what a person may change of it."""
     parts: dict[str, list[bytes]] = {str(one): [] for one in fields[FIELD_ID]}
-    for table, words in ((fields, _FIELD_WORDS), (obstacles, _OBSTACLE_WORDS)):
+    for table, words in zip((fields, obstacles), _WORDS.values(), strict=True):
         flat = shapely.orient_polygons(shapely.force_2d(table.geometry.to_numpy()))
         shapes = shapely.to_wkb(flat, byte_order=1)
-        told = zip(*(table[name].tolist() for name in words), strict=True)
-        for one, shape, row in zip(table[FIELD_ID], shapes, told, strict=True):
-            plain = ["" if pd.isna(value) else str(value) for value in row]
-            parts.setdefault(str(one), []).append(json.dumps(plain).encode() + (shape or b""))
+        for one, shape, row in zip(table[FIELD_ID], shapes, _told(table, words), strict=True):
+            parts.setdefault(str(one), []).append(json.dumps(row).encode() + (shape or b""))
     return hashed(parts)
+
+
+def _told(table: gpd.GeoDataFrame, words: Sequence[str]) -> Iterator[list[str]]:
+    """What stands in some columns of each row, as text."""
+    for row in zip(*(table[name].tolist() for name in words), strict=True):
+        yield ["" if pd.isna(value) else str(value) for value in row]
+
+
+def unlike(
+    now: Mapping[schema.Layer, gpd.GeoDataFrame], then: Mapping[schema.Layer, gpd.GeoDataFrame]
+) -> set[str]:
+    """Fields of which rows in layers of one CRS say something else or have other shapes.
+
+    Digests tell more apart: how an editor arranges rings, and the last digits of coordinates.
+    """
+    found: set[str] = set()
+    for of, words in _WORDS.items():
+        mine, theirs = _shapes(now[of], words), _shapes(then[of], words)
+        found.update(one for one, _ in mine.keys() ^ theirs.keys())
+        both = list(mine.keys() & theirs.keys())
+        one_m = 1 / _DEGREE_M if CRS(now[of].crs).is_geographic else 1.0
+        same = same_shapes(
+            np.array([mine[key] for key in both], dtype=object),
+            np.array([theirs[key] for key in both], dtype=object),
+            SAME_M * one_m,
+        )
+        found.update(one for (one, _), is_same in zip(both, same, strict=True) if not is_same)
+    return found
+
+
+def _shapes(table: gpd.GeoDataFrame, words: Sequence[str]) -> dict[tuple[str, str], Any]:
+    """The shapes of rows by their fields and what they say; alike ones are told apart."""
+    shapes: dict[tuple[str, str], Any] = {}
+    rows = zip(table[FIELD_ID], table.geometry, _told(table, words), strict=True)
+    for at, (one, shape, row) in enumerate(rows):
+        key = str(one), json.dumps(row)
+        shapes[key if key not in shapes else (key[0], f"{key[1]} {at}")] = shape
+    return shapes
 
 
 def own_digests(tables: Mapping[schema.Layer, gpd.GeoDataFrame]) -> dict[str, str]:

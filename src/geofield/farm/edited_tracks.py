@@ -84,18 +84,18 @@ def with_tracks(plan: Plan, tables: Tables, names: Names) -> Plan:
     return replace(plan, tracks=replace(plan.tracks, lines=lines, segments=segments))
 
 
-def only_lost_numbers(farm: Farm, ids: Collection[str], tables: Tables, names: Names) -> set[str]:
-    """Of fields whose digests differ those where another program lost numbers, and no more."""
-    lost: set[str] = set()
-    for of, keys in EDITED.items():
-        without = tables[of][list(keys)].isna().any(axis=1)
-        lost.update(tables[of][FIELD_ID][without].astype(str))
-    plans = (farm[one] for one in lost & set(ids) if one in farm)
-    return {
-        plan.field.field_id
-        for plan in plans
-        if with_tracks(plan, tables, names).track_edits == plan.track_edits
-    }
+def saying_nothing_new(farm: Farm, ids: Collection[str], tables: Tables, names: Names) -> set[str]:
+    """Of fields whose digests differ those whose tracks are as they were.
+
+    Digests tell more apart: the last digits of coordinates, numbers that another program lost.
+    """
+    found: set[str] = set()
+    for plan in (farm[one] for one in ids if one in farm):
+        if plan.tracks is None or plan.tracks.written is None:
+            continue
+        if with_tracks(plan, tables, names).track_edits == plan.track_edits:
+            found.add(plan.field.field_id)
+    return found
 
 
 def layers_in(overview: Path) -> set[schema.Layer]:

@@ -32,7 +32,7 @@ from geofield.farm.as_left import (
     table_in,
     tell,
 )
-from geofield.farm.as_written import digests_of, own_digests, own_names, with_rest
+from geofield.farm.as_written import digests_of, own_digests, own_names, unlike, with_rest
 from geofield.farm.dissolved import TOLD, undissolved
 from geofield.farm.doubles import changed_elsewhere, refuse_double, tell_double
 from geofield.farm.edited_in_place import BEGUN
@@ -118,7 +118,7 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str]) -> Edits:
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)
     tracks, driven = _tracks(farm, overview, fields, record, names)
-    for one in edited_tracks.only_lost_numbers(farm, driven, tracks, names) if driven else ():
+    for one in edited_tracks.saying_nothing_new(farm, driven, tracks, names):
         del driven[one]
     marks = {
         one: f"{written[one]} {told[one]} {own.get(one)} {driven.get(one, '')}".rstrip()
@@ -148,12 +148,18 @@ def _obstacles(
     obstacles = obstacles_with_owners(left, fields, written)
     now = digests_of(fields, obstacles)
     edited = [one for one in fields[FIELD_ID] if now[one] != written[one]]
-    if not edited or not record[DETAILS]:
+    if not edited:
         return obstacles, now, now
-    were = edited_tracks.layers_of(farm, [of], edited, fields.crs, names)[of]
-    left, merged = undissolved(of, left, were, fields)
+    were = edited_tracks.layers_of(farm, [schema.FIELD, of], edited, fields.crs, names)
+    there = {schema.FIELD: fields, of: obstacles if record[DETAILS] else were[of]}
+    some = {each: table[table[FIELD_ID].isin(edited)] for each, table in there.items()}
+    as_before = {one: written[one] for one in set(edited) - unlike(some, were)}
+    now |= as_before
+    if len(as_before) == len(edited) or not record[DETAILS]:
+        return obstacles, now, now
+    left, merged = undissolved(of, left, were[of], fields)
     obstacles = obstacles_with_owners(parts_apart(left), fields, written)
-    return obstacles, digests_of(fields, obstacles), with_rest(now, merged)
+    return obstacles, digests_of(fields, obstacles) | as_before, with_rest(now, merged)
 
 
 def _tracks(
