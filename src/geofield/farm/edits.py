@@ -154,9 +154,8 @@ def _obstacles(
     there = {schema.FIELD: fields, of: obstacles if record[DETAILS] else were[of]}
     some = {each: table[table[FIELD_ID].isin(edited)] for each, table in there.items()}
     as_before = {one: written[one] for one in set(edited) - unlike(some, were)}
-    now |= as_before
     if len(as_before) == len(edited) or not record[DETAILS]:
-        return obstacles, now, now
+        return obstacles, now | as_before, now
     left, merged = undissolved(of, left, were[of], fields)
     obstacles = obstacles_with_owners(parts_apart(left), fields, written)
     return obstacles, digests_of(fields, obstacles) | as_before, with_rest(now, merged)
