@@ -458,7 +458,7 @@ def test_notes_of_tracks_are_in_german(page: Page) -> None:
         ([ring], {"spacing_m": 5}),
         ([], {"spacing_m": 6, "width_m": 4}),
         ([], {"spacing_m": 6, "headland_m": 9}),
-        ([], {"spacing_m": 90, "offset_m": 59, "last_strip": "leave"}),
+        ([], {"spacing_m": 90, "last_strip": "leave"}),
         ([square.buffer(1)], {"spacing_m": 5}),
     ]
     with listening() as heard:

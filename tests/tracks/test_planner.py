@@ -28,6 +28,7 @@ from geofield.errors import (
 from geofield.grid import Grid
 from geofield.model import Field
 from geofield.model.obstacles import circle_polygons
+from geofield.notes import listening
 from geofield.tracks import longest_edge, plan_tracks
 
 #: One unit is one metre on the ground here: a zone of scale 1 along its middle.
@@ -324,6 +325,19 @@ def test_a_track_passes_a_place_near_either_border(last_strip: Any, y: float) ->
     for how in ({"through": place, "direction": 90}, {"direction": a_b}):
         tracks = plan_tracks(field, crs=CRS, spacing_m=4.0, last_strip=last_strip, **how)
         assert tracks.segments.distance(place).min() < 1e-6
+
+
+@pytest.mark.parametrize("last_strip", ["leave", "shift"])
+def test_no_strip_reaches_beyond_a_narrow_field_unasked(last_strip: Any) -> None:
+    """Of strips wider than the field none fits; only what was asked for lies there anyway."""
+    narrow: Any = {"crs": CRS, "spacing_m": 30.0, "direction": 90, "last_strip": last_strip}
+    with listening() as heard:
+        tracks = plan_tracks(box(0, 0, 100, 19), **narrow)
+    place = 9.5 if last_strip == "leave" else 15.0
+    assert len(heard) == (last_strip == "leave")
+    assert tracks.lines.bounds["miny"].tolist() == pytest.approx([Y + place], abs=0.02)
+    asked = plan_tracks(box(0, 0, 100, 19), **narrow, offset_m=16.0)
+    assert asked.lines.bounds["miny"].tolist() == pytest.approx([Y + 3.0], abs=0.02)
 
 
 @pytest.mark.filterwarnings("ignore::geofield.errors.TrackWarning")

@@ -24,7 +24,7 @@ _WORDS = {
     schema.FIELD: ("name",),
     schema.OBSTACLES: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
 }
-
+#: Of a degree on the equator: others are shorter.
 _DEGREE_M = 111_320.0
 
 

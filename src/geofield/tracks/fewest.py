@@ -55,7 +55,7 @@ def fewest_direction(
         along = math.sin(turn), math.cos(turn)
         turned = _turned(edges, along)
         first = None if place is None else float(place[0] * along[1] + place[1] * along[0])
-        positions = strips.across(turned, first)
+        positions = strips.across(turned, first, asked=True)
         if not len(positions):
             positions = np.array([(turned.va.min() + turned.va.max()) / 2.0])
         # Short ones, too: a heading is not better for what it leaves undriven.

@@ -65,11 +65,16 @@ class Strips:
         """From the border to the first track."""
         return self.half_m if self.offset_m is None else float(self.offset_m)
 
-    def across(self, edges: Edges, first_m: float | None = None) -> FloatArray:
-        """Places of the tracks across an area, one of them at `first_m` if that is given."""
+    def across(
+        self, edges: Edges, first_m: float | None = None, *, asked: bool = False
+    ) -> FloatArray:
+        """Places of the tracks across an area, counted from `first_m` if that is given.
+
+        With `asked` one of them is there, and so is one at an offset, whatever its strip reaches.
+        """
         near, far = float(edges.va.min()), float(edges.va.max())
         first_m = near + self.first_m if first_m is None else first_m
-        return on_the_border(self._positions(near, far, first_m), edges)
+        return on_the_border(self._positions(near, far, first_m, asked=asked), edges)
 
     def refuse_beyond(self, across_m: float) -> None:
         """Refuse an offset that lies beyond a field so wide across the tracks."""
@@ -84,10 +89,17 @@ class Strips:
         """How many tracks an area needs that is so wide across them; one if none fits."""
         return max(1, len(self._positions(0.0, width_m, self.first_m)))
 
-    def _positions(self, near_m: float, far_m: float, first_m: float) -> FloatArray:
-        strip, width_m = self.last_strip, self.width_m
+    def _positions(
+        self, near_m: float, far_m: float, first_m: float, *, asked: bool = False
+    ) -> FloatArray:
         return track_positions(
-            near_m, far_m, self.spacing_m, first_m=first_m, last_strip=strip, width_m=width_m
+            near_m,
+            far_m,
+            self.spacing_m,
+            first_m=first_m,
+            asked=asked or self.offset_m is not None,
+            last_strip=self.last_strip,
+            width_m=self.width_m,
         )
 
 
@@ -115,20 +127,22 @@ def track_positions(
     spacing_m: float,
     *,
     first_m: float,
+    asked: bool = False,
     last_strip: LastStrip = "overrun",
     width_m: float | None = None,
 ) -> FloatArray:
     """Places of the tracks across the field, increasing; the n-th is track n + 1, if any fits.
 
     The field reaches from `near_m` to `far_m` across them. Each works a strip of `width_m`, or of a
-    spacing where none is given; one track is at `first_m`, all others whole spacings away from it.
+    spacing where none is given; all are whole spacings away from `first_m`, where one is if that
+    was `asked`.
 
     `last_strip` is what becomes of the rest at the far side. ``overrun``: tracks as far as the
     field goes (the study's rule), so that the last strip may reach beyond the border by up to half
     a spacing, or a rest narrower than that stays unworked; ``leave``: only strips that lie wholly
-    inside, but for one at `first_m`; ``shift``: one more track, moved back until its strip ends at
-    the far side; ``spread``: the spacing shrinks evenly until strips fill the field exactly, those
-    of a given width from border to border.
+    inside, but for one that was asked; ``shift``: one more track, moved back until its strip ends
+    at the far side; ``spread``: the spacing shrinks evenly until strips fill the field exactly,
+    those of a given width from border to border.
     """
     refuse_unknown(TrackError, "last_strip", last_strip, LAST_STRIPS)
     half = (width_m or spacing_m) / 2.0
@@ -138,9 +152,11 @@ def track_positions(
     low, high = near_m + idle, far_m - idle
     if last_strip == "leave":
         low = near_m + half - SNAP_M
-    limit = high if last_strip == "overrun" else far_m - half + SNAP_M
+    limit = far_m - half + SNAP_M
     if near_m - SNAP_M <= first_m <= far_m + SNAP_M:
-        low, limit = min(low, first_m), max(limit, first_m)
+        low, high = min(low, first_m), max(high, first_m)
+        limit = max(limit, first_m) if asked else limit
+    limit = high if last_strip == "overrun" else limit
     index = np.ceil((low - first_m) / spacing_m)
     start = first_m + index * spacing_m
     if last_strip == "spread":

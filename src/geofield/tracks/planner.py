@@ -340,7 +340,7 @@ def _positions(
     elif run is not None:
         edge = float(np.mean(frame.to_frame([run.x0, run.x1], [run.y0, run.y1])[1]))
         first = edge + inset_m + strips.first_m
-    positions = strips.across(edges, first)
+    positions = strips.across(edges, first, asked=baseline.through is not None)
     if not len(positions):
         note = (
             f"{strips.wide_words} leaves no track in a field {far - near:.2f} m wide across the "
