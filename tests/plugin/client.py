@@ -333,18 +333,23 @@ def begin():
     return plugin
 
 
-if __name__ == "__main__":
+def answer(actions):
+    """Do what was asked for, and tell what came of it."""
     request = json.loads(sys.argv[1])
+    try:
+        told = actions[request.pop("do")](**request)
+    except Exception:  # noqa: BLE001 - told to the test
+        traceback.print_exc()
+        os._exit(1)
+    print("\n@@@" + json.dumps(told))
+    sys.stdout.flush()
+    # Leaving QGIS tidily crashes now and then in headless processes; the answer is out.
+    os._exit(0)
+
+
+if __name__ == "__main__":
     QgsApplication.setPrefixPath("/usr", True)
     application = QgsApplication([], False)
     application.initQgis()
     plugin = begin()
-    try:
-        answer = ACTIONS[request.pop("do")](**request)
-    except Exception:  # noqa: BLE001 - told to the test
-        traceback.print_exc()
-        os._exit(1)
-    print("\n@@@" + json.dumps(answer))
-    sys.stdout.flush()
-    # Leaving QGIS tidily crashes now and then in headless processes; the answer is out.
-    os._exit(0)
+    answer(ACTIONS)

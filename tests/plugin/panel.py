@@ -5,12 +5,11 @@
 Real are the map, the message bar and the project; the window around them is a bare one.
 """
 
-import json
 import os
 import sys
 import time
-import traceback
 
+from client import answer
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
@@ -175,17 +174,9 @@ ACTIONS = {
 }
 
 if __name__ == "__main__":
-    request = json.loads(sys.argv[1])
     QgsApplication.setPrefixPath("/usr", True)
     application = QgsApplication([], True)
     application.initQgis()
     sys.path += ["/usr/share/qgis/python/plugins", os.environ["QGIS_PLUGINPATH"]]
     window = Window()
-    try:
-        answer = ACTIONS[request.pop("do")](**request)
-    except Exception:  # noqa: BLE001 - told to the test
-        traceback.print_exc()
-        os._exit(1)
-    print("\n@@@" + json.dumps(answer))
-    sys.stdout.flush()
-    os._exit(0)
+    answer(ACTIONS)

@@ -33,10 +33,18 @@ from geofield.formats.foreign_tables import (
     obstacle_table,
 )
 from geofield.formats.gpkg_read import is_own
-from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, next_number
+from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
 from geofield.model.resized import strips
 from geofield.model.review import reconcile
-from geofield.model.written import listed, matches, plain, same_shapes, shapes_of_plain, unlisted
+from geofield.model.written import (
+    free_number,
+    listed,
+    matches,
+    plain,
+    same_shapes,
+    shapes_of_plain,
+    unlisted,
+)
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
 
@@ -270,7 +278,7 @@ def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
     table, written = schema.empty(schema.OBSTACLES, plan.field.crs), plan.evidence.written
     if plan.obstacles is not None:
         table, written = reconcile(plan.obstacles, written, plan.grid)
-    first = max(next_number(table), written.last_no + 1 if written else 1)
+    first = free_number(table, written)
     rows = rows.assign(obstacle_no=np.arange(first, first + len(rows)))
     parts = [part for part in (table, rows) if len(part)]
     joined = schema.conform(schema.OBSTACLES, pd.concat(parts, ignore_index=True), extras=True)

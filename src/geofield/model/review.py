@@ -28,7 +28,6 @@ from geofield.model.obstacles import (
     FloatArray,
     floats,
     from_polygons,
-    next_number,
     still_round,
 )
 from geofield.model.resized import as_areas, circles, differ, grown, shape_now, widened
@@ -39,6 +38,7 @@ from geofield.model.written import (
     Record,
     Written,
     WrittenRow,
+    free_number,
     from_earlier_version,
     matches,
     same_shapes,
@@ -123,9 +123,7 @@ def reconcile(
     if drawn.any():
         said = table[drawn].assign(kind=rows.at["kind"][drawn], status=status[drawn])
         said = said.set_geometry(rows.shapes[drawn], crs=table.crs)
-        # The number of what was taken away is no other's: it would not be missed.
-        first_no = max(next_number(result), earlier.last_no + 1)
-        added = _added(said, record, first_no, grid)
+        added = _added(said, record, free_number(result, earlier), grid)
         parts = [part for part in (result, added) if len(part)]
         result = schema.conform(schema.OBSTACLES, pd.concat(parts) if parts else added, extras=True)
         kept = np.append(kept, np.ones(len(added), bool))

@@ -20,6 +20,7 @@ from geofield.model.obstacles import (
     circle_polygons,
     floats,
     last_number,
+    next_number,
     plain_circles,
     still_round,
 )
@@ -133,6 +134,12 @@ class Written:
         # Earlier versions wrote no last number.
         last_no = value.get("last_no") or last_number([row.obstacle_no for row in rows])
         return cls(rows, tuple(unlisted(shape) for shape in value["removed"]), last_no)
+
+
+def free_number(obstacles: gpd.GeoDataFrame | None, written: Written | None) -> int:
+    """The number of the next obstacle, which none has or had: it would not be missed."""
+    next_no = 1 if obstacles is None else next_number(obstacles)
+    return next_no if written is None else max(next_no, written.last_no + 1)
 
 
 def from_earlier_version(obstacles: gpd.GeoDataFrame) -> Written:

@@ -20,7 +20,8 @@ from geofield import schema
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import GeofieldError
 from geofield.model.evidence import outline_digest
-from geofield.model.obstacles import circle_polygons, from_polygons, next_number
+from geofield.model.obstacles import circle_polygons, from_polygons
+from geofield.model.written import free_number
 from geofield.settings import Settings, TrackSettings
 from geofield.settings.explain import in_words
 from geofield.settings.tracks import said_over
@@ -225,16 +226,13 @@ def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: floa
     settings = plan.settings or Settings()
     buffer_m = 0.0 if radius_m is None else settings.obstacles.buffer_m
     crs, before = plan.field.crs, plan.obstacles
-    number = 1 if before is None else next_number(before)
-    if (written := plan.evidence.written) is not None:
-        number = max(number, written.last_no + 1)
     row = from_polygons(
         np.array([footprint], dtype=object),
         crs,
         buffer_m=buffer_m,
         grid=plan.grid,
         status="added",
-        first_no=number,
+        first_no=free_number(before, plan.evidence.written),
     )
     if radius_m is not None:
         row["kind"], row["radius_m"] = "tree", radius_m

@@ -43,6 +43,7 @@ from geofield.tracks.outline import (
     refuse_no_length,
     refuse_no_shape,
 )
+from geofield.tracks.places import places_across
 from geofield.tracks.shapes import FIELD, Discs, Edges, join_edges, polygon_edges
 from geofield.tracks.tables import (
     BY_HAND,
@@ -55,8 +56,6 @@ from geofield.tracks.tables import (
 
 MOST_PIECES = 10_000_000
 MOST_POINTS = 10_000_000
-#: A track so near to a place passes it.
-_BESIDE_M = 0.01
 
 
 def plan_tracks(
@@ -188,7 +187,7 @@ def plan_tracks(
         baseline = replace(baseline, through=place)
     frame = TrackFrame.of((centre.x, centre.y), baseline.along, left=baseline.left, scale=scale)
     edges = polygon_edges(inner, frame, FIELD)
-    positions, spacing_m, more = _positions(edges, frame, baseline, strips, inset_m=headland_m)
+    positions, spacing_m, more = places_across(edges, frame, baseline, strips, inset_m=headland_m)
     said = on_layout(
         edits or TrackEdits(),
         positions,
@@ -320,52 +319,6 @@ def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, s
             hint="Widen the spacing, or set the points' distance (step) to at least "
             f"{1.1 * outline.area / (spacing * MOST_POINTS):.2g} m.",
         )
-
-
-def _positions(
-    edges: Edges, frame: TrackFrame, baseline: Baseline, strips: Strips, *, inset_m: float
-) -> tuple[FloatArray, float, tuple[str, ...]]:
-    """Places of the tracks, and the spacing that they have."""
-    near, far = float(edges.va.min()), float(edges.va.max())
-    strips.refuse_beyond(far - near)
-    spacing_m, run, first = strips.spacing_m, baseline.edge, None
-    if baseline.through is not None and strips.offset_m is not None:
-        raise TrackError(
-            "An offset and a place to pass through (an A-B line passes through its A) were both "
-            "given.",
-            hint="Give one of the two.",
-        )
-    if baseline.through is not None:
-        first = float(frame.to_frame(*baseline.through)[1])
-    elif run is not None:
-        edge = float(np.mean(frame.to_frame([run.x0, run.x1], [run.y0, run.y1])[1]))
-        first = edge + inset_m + strips.first_m
-    positions = strips.across(edges, first, asked=baseline.through is not None)
-    if not len(positions):
-        note = (
-            f"{strips.wide_words} leaves no track in a field {far - near:.2f} m wide across the "
-            "tracks; one was laid through its middle."
-        )
-        warn(note, TrackWarning, stacklevel=3)
-        return np.array([(near + far) / 2.0]), spacing_m, (note,)
-    if strips.last_strip == "spread" and len(positions) > 1:
-        spacing_m = float(positions[1] - positions[0])
-    if strips.last_strip != "spread" or baseline.through is None or first is None:
-        return positions, spacing_m, ()
-    apart_m = positions[0] - first
-    return positions, spacing_m, _beside_note(abs(apart_m - round(apart_m / spacing_m) * spacing_m))
-
-
-def _beside_note(beside_m: float) -> tuple[str, ...]:
-    """That tracks which are spread evenly pass beside a place, where they do."""
-    if beside_m < _BESIDE_M:
-        return ()
-    note = (
-        "Tracks that are spread evenly do not pass the place asked for (of an A-B line its A): "
-        f"they lie {beside_m:.2f} m beside it."
-    )
-    warn(note, TrackWarning, stacklevel=4)
-    return (note,)
 
 
 def _tracks(
