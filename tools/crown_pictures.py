@@ -1,12 +1,12 @@
 """The labelled pictures that the crown network is trained on, gathered into one file.
 
-    python tools/crown_pictures.py pictures.npz
+    python tools/crown_pictures.py pictures.npz --fine deepforest-2.1.0-py3-none-any.whl
 
 826 chips beside the project (aerial imagery of the US National Agriculture Imagery Program,
-cut and labelled by J. Ventura et al., "Urban Tree Detection Data", CC BY 4.0) and simulated
-fields. Labels are points; radii are the simulated ones, or fitted to the picture around each
-label. A fixed sixth of the sites, all years of a site together, is marked as left out: nothing
-is fitted on it.
+cut and labelled by J. Ventura et al., "Urban Tree Detection Data", CC BY 4.0), simulated fields
+and, where they are at hand, the pictures of `fine_pictures`. Labels are points; radii are the
+simulated ones, or fitted to the picture around each label. A fixed sixth of the sites, all years
+of a site together, is marked as left out: nothing is fitted on it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 import rasterio
 from crown_radii import fit_circles
+from fine_pictures import lessons
 
 from geofield.simulate import CLIMATES, SimulatedField, SimulationSettings, simulate_field
 
@@ -92,6 +93,7 @@ def trees_of(field: SimulatedField) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
+    parser.add_argument("--fine", type=Path, help="the package with pictures of 0.1 m")
     given = parser.parse_args()
     beside = Path(__file__).resolve().parent.parent.parent / "shared"
     folder = Path(os.environ.get("GEOFIELD_SHARED", beside)) / "data" / "trees_train"
@@ -104,11 +106,15 @@ def main() -> None:
         bands.append(field.scene.bands)
         trees.append(trees_of(field))
         regions.append(field.field.mask(field.scene.grid))
+    if given.fine:
+        more_names, more_bands, shown, more_trees = lessons(given.fine)
+        names, bands, trees = names + more_names, bands + more_bands, trees + more_trees
+        regions += shown
     number = np.repeat(np.arange(len(names)), [len(t) for t in trees])
     np.savez_compressed(
         given.file,
         names=np.array(names),
-        left_out=np.concatenate([judges, np.zeros(SIMULATED, bool)]),
+        left_out=np.pad(judges, (0, len(names) - len(judges))),
         bands=np.stack(bands).astype(np.uint8),
         regions=np.packbits(np.stack(regions), axis=-1),
         trees=np.column_stack([number, np.concatenate(trees)]),

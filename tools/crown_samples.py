@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from crown_pictures import site_of
 from crown_targets import targets
+from fine_pictures import RESOLUTION_M
 from lossy import through_jpeg
 from scipy.spatial.distance import cdist
 from standing_things import place_things
@@ -30,6 +31,8 @@ CALM, HARD, ROOF_PX = 7.0, 14.0, 9000
 """Grey differs by less on calm ground, by more at hard edges; so many pixels may be a roof."""
 SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
+FINE_SHARE = 0.12
+"""Share of the samples that are of fine pictures."""
 BORDER_PX = 2.0
 """Crowns on the picture's border may be cut off, their centres outside."""
 UNMEASURED_PX, SHADED = 8.0, 0.72
@@ -65,6 +68,10 @@ class Pictures:
     def simulated(self) -> np.ndarray:
         return np.char.startswith(self.names, "simulated")
 
+    @property
+    def fine(self) -> np.ndarray:
+        return np.char.startswith(self.names, "fine")
+
     def weights(self) -> np.ndarray:
         """Return how often each picture is drawn: open and green land more often."""
         count = np.array([len(t) for t in self.trees])
@@ -73,6 +80,9 @@ class Pictures:
         weight += 2 * np.array([green_ground(bands, trees) for bands, trees in green])
         weight[self.simulated] = 2.0
         weight[self.left_out] = 0
+        if self.fine.any():
+            others = weight[~self.fine].sum()
+            weight[self.fine] = others * FINE_SHARE / (1 - FINE_SHARE) / self.fine.sum()
         return weight / weight.sum()
 
 
@@ -85,7 +95,7 @@ def labelled_elsewhen(names: np.ndarray, trees: list[np.ndarray]) -> list[np.nda
     places = [site_of(str(name)) for name in names]
     out = []
     for number, place in enumerate(places):
-        years = [] if place.startswith("simulated") else places
+        years = [] if place.startswith(("simulated", "fine")) else places
         others = [trees[i][:, :2] for i, one in enumerate(years) if one == place and i != number]
         xy = np.concatenate([np.empty((0, 2)), *others])
         here = trees[number][:, :2]
@@ -175,6 +185,7 @@ class Sampler:
         self.rng = np.random.default_rng(seed)
         self.p = pictures.weights()
         self.simulated = pictures.simulated
+        self.fine = pictures.fine
         self.painted = painted
 
     def batch(self, size: int) -> dict[str, np.ndarray]:
@@ -203,7 +214,7 @@ class Sampler:
         low += rng.normal(0, 0.06) * spread
         high += rng.normal(0, 0.12) * spread
         x = np.zeros((5, CROP_PX, CROP_PX), np.float32)
-        kind = rng.random()
+        kind = rng.uniform(0.4, 1) if self.fine[number] else rng.random()
         if kind < 0.4:
             x[:4] = normalised(image, low, high).transpose(2, 0, 1)
             x[4] = 1
@@ -225,7 +236,7 @@ class Sampler:
         zoom = float(np.exp(rng.uniform(np.log(0.85), np.log(1.18))))
         if rng.random() < 0.3:
             zoom = float(np.exp(rng.uniform(np.log(0.55), np.log(1.9))))
-        zoom *= ENLARGED
+        zoom *= ENLARGED * (RESOLUTION_M / CHIP_RESOLUTION_M if self.fine[number] else 1)
         angle = int(rng.integers(4)) * np.pi / 2
         if rng.random() < 0.4:
             angle = rng.uniform(0, 2 * np.pi)
