@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 
 import geopandas as gpd
+import numpy as np
 import pytest
 import shapely
+from formats_plan import make_dataset
 
-from geofield.formats import read_dataset
+from geofield.formats import read_dataset, write_dataset
 from geofield_command import run_geofield as geofield
 
 BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
@@ -107,6 +110,49 @@ def test_what_is_left_out_is_said(tmp_path):
     assert "headland: 1 polygon left out" in said
     assert "turns: 2 lines left out" in said
     assert found["taken"] == [line for line in said.splitlines() if ": " in line]
+
+
+def test_own_columns_of_guidance_come_back(tmp_path):
+    """They were gone where the tracks are made of it: a Shapefile has no layer of whole ones."""
+    dataset = make_dataset()
+    segments = dataset.table("segments")
+    numbers = [f"driver {no}" for no in range(len(segments))]
+    tables = {**dataset.tables, "segments": segments.assign(driver=numbers)}
+    write_dataset(replace(dataset, tables=tables), tmp_path, ["shapefile"], tell_drops=False)
+    _, _, plan = imported(tmp_path, tmp_path / "shapefile")
+    assert plan.table("segments")["driver"].tolist() == numbers
+
+
+def test_tracks_of_a_file_without_segments_are_driven(tmp_path):
+    """A plan that came as KML steered a machine along nothing: its guidance was empty."""
+    dataset = make_dataset()
+    write_dataset(dataset, tmp_path, ["kml"], tell_drops=False)
+    told, _, _ = imported(tmp_path, tmp_path / "field.kml")
+    assert told["rows"]["segments"] == len(dataset.table("segments"))
+    done = geofield("export", tmp_path / "plan.gpkg", "-f", "shapefile", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    driven = gpd.read_file(tmp_path / "shapefile/guidance.shp").to_crs(dataset.crs)
+    lost = dataset.table("tracks").union_all().difference(driven.union_all().buffer(0.01))
+    assert lost.length < 0.01
+
+
+def test_a_shape_that_is_drawn_anew_after_an_import_is_no_circle(tmp_path):
+    """Nobody had recorded the imported one: the radius of the tree stayed with a shed."""
+    write_dataset(make_dataset(), tmp_path, ["geojson"], tell_drops=False)
+    _, _, plan = imported(tmp_path, tmp_path / "geojson")
+    table = plan.table("obstacles").set_index("obstacle_no")
+    assert (table["status"][2], table["radius_m"][2]) == ("confirmed", pytest.approx(3.125))
+    middle = table.geometry[2].centroid
+    shed = shapely.box(middle.x - 1, middle.y - 5, middle.x + 1, middle.y + 5)
+    edited = plan.table("obstacles").copy()
+    edited.loc[edited["obstacle_no"] == 2, "geometry"] = shed
+    edited.to_file(tmp_path / "plan.gpkg", layer="obstacles", geometry_name="geom")
+    done = geofield("tracks", tmp_path / "plan.gpkg", "--spacing", 5, "-o", tmp_path / "plan.gpkg")
+    assert done.returncode == 0, done.stderr
+    assert "obstacles: 1 changed" in done.stderr
+    now = read_dataset(tmp_path / "plan.gpkg").table("obstacles").set_index("obstacle_no")
+    assert np.isnan(now["radius_m"][2])
+    assert now.geometry[2].equals_exact(shed, 1e-6)
 
 
 def test_nothing_found_is_an_error(tmp_path):

@@ -51,13 +51,13 @@ def import_(
     is said on stderr.
     """
     from geofield.formats import read_dataset, write_dataset
-    from geofield.formats.importing import merged
+    from geofield.formats.importing import merged, recorded
     from geofield.plan_files import staged_plan
 
     if output.suffix.lower() != ".gpkg":
         raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
     claim_file(output)
-    dataset = merged([read_dataset(file, crs=crs) for file in files], name=name)
+    dataset = recorded(merged([read_dataset(file, crs=crs) for file in files], name=name))
     with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
         shown = {"picture": dataset.picture_lies_in(output.parent)}
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem, options=shown)

@@ -163,8 +163,10 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     return schema.conform(schema.OBSTACLES, table)
 
 
-def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
-    """Lines as layers `tracks` and `segments`.
+def line_tables(
+    frame: gpd.GeoDataFrame, crs: CRS, *, extras: bool = False
+) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+    """Lines as layers `tracks` and `segments`, these with their further columns where `extras`.
 
     Lines with the same track number are segments of one track; without numbers each line is
     a track. Where rows say of which of several fields they are, each field has its own tracks.
@@ -172,7 +174,7 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
     owners = column_like(frame, ("field_id",))
     if owners is not None and owners.notna().all() and owners.nunique() > 1:
         rows = frame.groupby(owners.to_numpy(), sort=False)
-        parts = [(one, line_tables(own, crs)) for one, own in rows]
+        parts = [(one, line_tables(own, crs, extras=extras)) for one, own in rows]
         tracks, segments = (
             pd.concat([part[at].assign(field_id=one) for one, part in parts], ignore_index=True)
             for at in (0, 1)
@@ -186,8 +188,9 @@ def line_tables(frame: gpd.GeoDataFrame, crs: CRS) -> tuple[gpd.GeoDataFrame, gp
         "segment_no": segment,
         "length_m": ground_lengths_m(geometry, crs),
     }
-    table = schema.table(schema.SEGMENTS, values, geometry, crs)
-    segments = schema.conform(schema.SEGMENTS, table)
+    own = {name: frame[name].array for name in schema.own_columns(schema.SEGMENTS, frame)}
+    table = schema.table(schema.SEGMENTS, values, geometry, crs, own)
+    segments = schema.conform(schema.SEGMENTS, table, extras=extras)
     each: list[Any] = [part for _, part in segments.groupby("track_no", sort=True)]
     wholes = [shapely.multilinestrings(list(part.geometry)) for part in each]
     data = {

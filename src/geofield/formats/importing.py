@@ -18,6 +18,7 @@ from geofield.formats.foreign_tables import obstacle_table
 from geofield.formats.registry import detect, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
+from geofield.model.review import reconcile
 
 
 def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
@@ -102,6 +103,20 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
         points=first.points,
         notes=tuple(notes),
     )
+
+
+def recorded(dataset: Dataset) -> Dataset:
+    """A dataset with a record of its obstacles, by which it is known what is edited of them later.
+
+    Of several fields, and where there is one already, it is handed back as it is.
+    """
+    evidence, table = dataset.provenance.evidence, dataset.table(schema.OBSTACLES.name)
+    if "written" in evidence or not len(table) or not dataset.tracks_stand:
+        return dataset
+    obstacles, written = reconcile(table, None, dataset.grid)
+    known = replace(dataset.provenance, evidence={**evidence, "written": written.to_json()})
+    tables = {**dataset.tables, schema.OBSTACLES.name: obstacles}
+    return replace(dataset, tables=tables, provenance=known)
 
 
 def _with_inner_fields_as_obstacles(

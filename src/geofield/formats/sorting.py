@@ -23,6 +23,7 @@ from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
+from geofield.model.obstacles import numbered
 from geofield.notes import warn
 from geofield.wording import counted
 
@@ -131,7 +132,11 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
         drawn = _joined([part.frame for part in lines])
         tables["tracks"], tables["segments"] = line_tables(drawn, metric)
     elif "segments" in tables and "tracks" not in tables:
-        tables["tracks"], tables["segments"] = line_tables(tables["segments"], metric)
+        own = tables["segments"]
+        tables["tracks"], tables["segments"] = line_tables(own, metric, extras=True)
+    if "tracks" in tables and "segments" not in tables:
+        tables["tracks"] = numbered(tables["tracks"], "track_no")
+        tables["segments"] = line_tables(tables["tracks"].explode(ignore_index=True), metric)[1]
     return notes
 
 

@@ -10,7 +10,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import LONLAT, ground_areas_m2, ground_lengths_m, transformer
-from geofield.formats.foreign_tables import heading_deg
+from geofield.formats.foreign_tables import heading_deg, line_tables
 from geofield.grid import Grid
 from geofield.model.obstacles import numbered
 
@@ -35,7 +35,7 @@ def complete(tables: dict[str, gpd.GeoDataFrame], crs: CRS, grid: Grid | None) -
         _fill(obstacles, column, value)
     _positions(obstacles, crs)
     if len(tables["tracks"]) and not len(tables["segments"]):
-        tables["segments"] = _segments(tables["tracks"], crs)
+        tables["segments"] = line_tables(tables["tracks"].explode(ignore_index=True), crs)[1]
     _tracks(tables)
     for name in ("tracks", "segments", "gaps"):
         _fill(tables[name], "length_m", ground_lengths_m(tables[name].geometry.to_numpy(), crs))
@@ -61,14 +61,6 @@ def _positions(frame: gpd.GeoDataFrame, crs: CRS) -> None:
     # To 0.1 mm: a place that was written with fewer decimals is that place again.
     _fill(frame, "lon", np.round(lon, 9))
     _fill(frame, "lat", np.round(lat, 9))
-
-
-def _segments(tracks: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
-    """Each part of a track as a segment."""
-    parts, owner = shapely.get_parts(tracks.geometry.to_numpy(), return_index=True)
-    numbers = tracks["track_no"].iloc[owner]
-    numbering = {"track_no": numbers, "segment_no": numbers.groupby(owner).cumcount() + 1}
-    return schema.table(schema.SEGMENTS, numbering, parts, crs)
 
 
 def _tracks(tables: dict[str, gpd.GeoDataFrame]) -> None:
