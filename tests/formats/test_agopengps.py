@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from pyproj import Geod
 
 from geofield.errors import FormatError
-from geofield.formats import read_dataset, validate_file, write_dataset
+from geofield.formats import format_named, read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane, densified, ring_headings
 from geofield.formats.arrow import to_lonlat
+from geofield.formats.export import dropped
 from geofield.model.obstacles import circle_polygons
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
@@ -229,6 +230,8 @@ def test_a_hole_stays_one_and_so_does_each_part_of_an_obstacle_at_it(tmp_path, b
     there = [] if box is None else [shapely.transform(shapely.box(*box), lambda c: c + ORIGIN)]
     table = dataset.table("obstacles").iloc[: len(there)]
     dataset.tables["obstacles"] = table.set_geometry(there, crs=UTM)
+    told = " ".join(dropped(dataset, format_named("agopengps")))
+    assert ("obstacles that stand in holes" in told) == (len(there) > parts)
     write_dataset(dataset, tmp_path, ["agopengps"])
     back = read_dataset(tmp_path / "agopengps")
     assert len(back.table("obstacles")) == parts

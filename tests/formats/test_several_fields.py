@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from datetime import date
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -227,6 +228,15 @@ def test_others_have_a_file_or_folder_of_their_own(out):
             assert (out / f"{name}{suffix}").is_file()
         dataset = read_dataset(out / "agopengps" / "Fields" / name)
         assert len(dataset.table("field")) == 1
+
+
+def test_times_stay_times_beside_days(tmp_path):
+    """Arrow makes days of a column of both: what time it was, was gone."""
+    day, time = date(2024, 3, 1), pd.Timestamp("2024-05-01 10:11:12")
+    fields = [moved(0, "North", 36, seen=day), moved(1, "West", 36, seen=time)]
+    write_datasets(fields, tmp_path, ["gpkg"], tell_drops=False)
+    seen = gpd.read_file(tmp_path / "field.gpkg", layer="field")["seen"]
+    assert seen.astype(str).tolist() == ["2024-03-01", "2024-05-01 10:11:12"]
 
 
 def test_the_same_field_twice_is_refused(tmp_path):

@@ -10,6 +10,7 @@ import shutil
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -201,7 +202,13 @@ def _rounded(geometry: NDArray[np.object_], decimals: int) -> NDArray[np.object_
 def _own_values(series: Any) -> pa.Array:
     try:
         values = pa.array(series, from_pandas=True)
+        # Of days and times in one column Arrow makes days.
+        mixed = pa.types.is_date(values.type) and any(
+            isinstance(v, datetime) for v in series.dropna()
+        )
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):
+        mixed = True
+    if mixed:
         values = pa.array([None if pd.isna(v) else str(v) for v in series], pa.string())
     as_text = pa.types.is_null(values.type) or pa.types.is_large_string(values.type)
     return values.cast(pa.string()) if as_text else values

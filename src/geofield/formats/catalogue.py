@@ -20,6 +20,7 @@ _PASSED = Drop("obstacles that tracks run through", "passed")
 
 _TERMINAL_DROPS = (
     _PASSED,
+    Drop("obstacles that stand in holes of the field or outside it", "outside"),
     Drop("the status, radius and confidence of obstacles", "obstacles"),
     _OWN,
     _ORIGIN,
@@ -110,7 +111,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.shapefile:write",
         "geofield.formats.shapefile:read",
         suffixes=(".shp",),
-        drops=(_ORIGIN,),
+        drops=(Drop("columns of your own in tracks", "tracks.own"), _ORIGIN),
         precision_m=1e-6,
         options=("profile", "customer", "farm", "zip"),
         asks_crs=True,
@@ -148,7 +149,7 @@ CATALOGUE: tuple[Format, ...] = (
         "geofield.formats.kml:write",
         "geofield.formats.kml:read",
         suffixes=(".kml", ".kmz"),
-        drops=(_ORIGIN,),
+        drops=(Drop("columns of your own in segments", "segments.own"), _ORIGIN),
         precision_m=0.0002,
         fields="many",
     ),

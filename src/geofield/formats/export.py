@@ -232,7 +232,12 @@ def _present(dataset: Dataset, when: str, into: Format) -> bool:
         return len(main_field(dataset, dataset.table(schema.FIELD.name).geometry.iloc[0])) > 1
     if when == "passed":
         return len(active(obstacles)) < len(obstacles)
+    if when == "outside":
+        outline = dataset.table(schema.FIELD.name).geometry.iloc[0]
+        return not active(obstacles).intersects(outline).all()
     layer, _, column = when.partition(".")
+    if column == "own":
+        return bool(schema.own_columns(schema.layer(layer), dataset.table(layer)))
     if not column:
         return dataset.has(layer)
     return bool(dataset.table(layer)[column].notna().any())

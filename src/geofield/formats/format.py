@@ -31,8 +31,9 @@ class Drop:
     when : str
         Which datasets have it: a layer (``gaps``), a column with values
         (``obstacles.confidence``), ``provenance``, ``polygons`` (obstacles that are not
-        circles), ``passed`` (obstacles that are not driven around), ``own`` (columns that are not
-        geofield's) or ``parts`` (a headland that leaves the field in several).
+        circles), ``passed`` (obstacles that are not driven around), ``outside`` (those of
+        which no part lies in the field), ``own`` (columns that are not geofield's;
+        ``tracks.own`` those of a layer) or ``parts`` (a headland that leaves the field in several).
     """
 
     words: str
