@@ -32,15 +32,19 @@ def archived(
     below : Path, optional
         Entries keep their folders below this one; without it they lie flat.
     """
-    date = max(tuple(map(int, day.split("-"))), _ZERO) if day else _ZERO
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w") as archive:
         for file in files:
             name = file.name if below is None else file.relative_to(below).as_posix()
-            info = zipfile.ZipInfo(name, (date[0], date[1], date[2], 0, 0, 0))
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, file.read_bytes())
+            add(archive, name, file.read_bytes(), day)
             file.unlink()
     return path
+
+
+def add(archive: zipfile.ZipFile, name: str, content: bytes, day: str | None) -> None:
+    """Write an entry into an archive, stamped with a day (ISO 8601)."""
+    date = max(tuple(map(int, day.split("-"))), _ZERO) if day else _ZERO
+    info = zipfile.ZipInfo(name, (date[0], date[1], date[2], 0, 0, 0))
+    archive.writestr(info, content, zipfile.ZIP_DEFLATED)
 
 
 @contextmanager

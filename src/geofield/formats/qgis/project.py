@@ -17,6 +17,7 @@ from geofield.formats.qgis.layer_style import style_of
 from geofield.formats.qgis.looks import LOOKS
 from geofield.formats.qgis.symbols import QGIS_VERSION, document
 from geofield.formats.xml import node
+from geofield.formats.zipped import add
 from geofield.model import Dataset
 
 #: White space around the field in the first view, as a share of its size.
@@ -82,12 +83,9 @@ def project_xml(dataset: Dataset, gpkg_name: str) -> str:
 
 def qgz_bytes(xml: str, stem: str, timestamp: str) -> bytes:
     """A project as ``.qgz``: a ZIP archive with one ``.qgs``, stamped with a fixed time."""
-    year, month, day = (int(part) for part in timestamp[:10].split("-"))
-    info = zipfile.ZipInfo(f"{stem}.qgs", (max(year, 1980), month, day, 0, 0, 0))
-    info.compress_type = zipfile.ZIP_DEFLATED
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr(info, xml.encode())
+        add(archive, f"{stem}.qgs", xml.encode(), timestamp[:10])
     return buffer.getvalue()
 
 
