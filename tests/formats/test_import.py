@@ -155,6 +155,16 @@ def test_a_shape_that_is_drawn_anew_after_an_import_is_no_circle(tmp_path):
     assert now.geometry[2].equals_exact(shed, 1e-6)
 
 
+def test_a_route_of_another_file_name_is_no_guidance(tmp_path):
+    """It has all columns of a segment: what was driven between tracks was a track."""
+    write_dataset(make_dataset(optional=True), tmp_path, ["geojson"], tell_drops=False)
+    (tmp_path / "one").mkdir()
+    for name, copy in (("field", "field"), ("route", "route (1)")):
+        shutil.copy(tmp_path / f"geojson/{name}.geojson", tmp_path / f"one/{copy}.geojson")
+    told, _, _ = imported(tmp_path, tmp_path / "one")
+    assert told["rows"] == {"field": 1, "route": 1}
+
+
 def test_nothing_found_is_an_error(tmp_path):
     empty = tmp_path / "empty.geojson"
     empty.write_text('{"type": "FeatureCollection", "features": []}')

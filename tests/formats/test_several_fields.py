@@ -158,6 +158,20 @@ def test_one_kml_with_a_folder_per_field(out):
     assert values == ["wheat", "barley"]
 
 
+def test_fields_of_one_kml_are_apart_again(out, tmp_path):
+    """Nothing said of which field a track was: the import of it could not be exported."""
+    done = geofield("import", out / "farm.kml", "-o", tmp_path / "farm.gpkg")
+    assert done.returncode == 0, done.stderr
+    done = geofield("export", tmp_path / "farm.gpkg", "-f", "isoxml", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    fields, wanted = (
+        ET.parse(folder / "isoxml/TASKDATA/TASKDATA.XML").getroot().findall("PFD")
+        for folder in (tmp_path, out)
+    )
+    assert [len(each.findall("GGP")) for each in fields] == [24, 24, 24]
+    assert [each.get("D") for each in fields] == [each.get("D") for each in wanted]
+
+
 def test_one_fiboa_collection(out):
     table = gpd.read_parquet(out / "fiboa" / "farm.parquet")
     assert table["id"].tolist() == ["f0", "f1", "f2"]

@@ -277,7 +277,9 @@ def _own_layer(layer: RawLayer) -> schema.Layer | None:
         shared = len(columns & set(each.column_names))
         if layer.name == each.name and set(each.key) <= columns and 2 * shared >= len(each.columns):
             return each
-    return next((each for each in schema.LAYERS if columns >= set(each.column_names)), None)
+    fitting = [each for each in schema.LAYERS if columns >= set(each.column_names)]
+    # A step of a route has all columns of a segment, and more.
+    return max(fitting, key=lambda each: len(each.columns), default=None)
 
 
 def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:

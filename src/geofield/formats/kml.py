@@ -14,6 +14,7 @@ import shapely
 from geofield import schema, theme
 from geofield.formats.arrow import cut_lonlat, exact_geometry
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
+from geofield.formats.many import told_apart
 from geofield.formats.origin import lineage
 from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
@@ -56,8 +57,9 @@ _DRIVER_COLUMNS = [
 def write(
     datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
 ) -> list[Path]:
-    """Write ``{stem}.kml``; of several fields each has a folder of its own."""
+    """Write ``{stem}.kml``; of several fields each has a folder, and its id in every row."""
     alone = len(datasets) == 1
+    datasets = datasets if alone else told_apart(datasets)
     told = list(dict.fromkeys(map(lineage, datasets)))
     document = node(
         "Document",

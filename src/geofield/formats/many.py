@@ -88,6 +88,20 @@ def field_ids(datasets: Sequence[Dataset]) -> list[str]:
     return found
 
 
+def told_apart(datasets: Sequence[Dataset]) -> list[Dataset]:
+    """Datasets with the id of its field in every row."""
+    return [
+        replace(
+            each,
+            tables={
+                name: table if FIELD_ID in table.columns else table.assign(**{FIELD_ID: one})
+                for name, table in each.tables.items()
+            },
+        )
+        for each, one in zip(datasets, field_ids(datasets), strict=True)
+    ]
+
+
 def joined(datasets: Sequence[Dataset]) -> Joined:
     """The tables of several fields as one dataset, ``field_id`` in every row.
 
@@ -95,7 +109,7 @@ def joined(datasets: Sequence[Dataset]) -> Joined:
     columns and are true either way. Rows keep their field's order; track points are left to each
     field.
     """
-    ids = field_ids(datasets)
+    datasets = told_apart(datasets)
     crs = datasets[0].crs
     if any(each.crs != crs for each in datasets):
         outlines = [
@@ -106,8 +120,8 @@ def joined(datasets: Sequence[Dataset]) -> Joined:
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in schema.LAYERS:
         parts = [
-            _named(each.tables[layer.name], one).to_crs(crs)
-            for each, one in zip(datasets, ids, strict=True)
+            each.tables[layer.name].to_crs(crs)
+            for each in datasets
             if each.has(layer.name) and layer.name in each.tables and not layer.working
         ]
         if parts:
@@ -162,10 +176,6 @@ def _one_of(dataset: Dataset, tables: Mapping[str, Any], row: Mapping[str, Any])
     label = row["name"] if isinstance(row["name"], str) else str(field_id)
     source = dataset.provenance.source
     return Dataset(found, crs, label, Provenance(dataset.provenance.software, source))
-
-
-def _named(table: gpd.GeoDataFrame, field_id: str) -> gpd.GeoDataFrame:
-    return table if FIELD_ID in table.columns else table.assign(**{FIELD_ID: field_id})
 
 
 def owner_of(dataset: Dataset, options: Mapping[str, Any]) -> tuple[str, str]:
