@@ -160,10 +160,13 @@ def test_no_plan_is_shown_on_the_picture_of_another_year(
     place = ["--lat", made.lat, "--lon", made.lon, "--out", out, "--format", "gpkg"]
     geofield("run", of_year(folder, 2020), *place, "--overwrite")
     assert b"scene.tif" in _project(out)
+    geofield("export", file, "--format", "turtle", "--out", out)
     geofield("run", of_year(folder, 2022), *place, "--overwrite")
     geofield("undo", file)
-    told = geofield("refresh", file)
-    assert "scene.tif beside field.gpkg is of 2022 (2022), the plan of 2020 (2020)" in told
+    words = "is of 2022 (2022), the plan of 2020 (2020)"
+    assert f"scene.tif beside field.gpkg {words}" in geofield("refresh", file)
+    linked = ("export", out / "field.ttl", "--format", "dxf", "--out", folder / "linked")
+    assert f"scene.tif beside field.ttl {words}" in geofield(*linked)
 
 
 def test_a_plan_is_read_where_its_picture_may_not_be(

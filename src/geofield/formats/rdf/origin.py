@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from affine import Affine
@@ -45,14 +44,9 @@ def read_grid(graph: Graph, scope: Scope) -> Grid | None:
         raise FormatError(f"<{picture}>: its grid cannot be understood ({error}).") from error
 
 
-def read_scene_path(graph: Graph, scope: Scope, folder: Path) -> Path | None:
-    """The picture's file beside the data, where it is there."""
-    name = graph.value(_picture(graph, scope), "gf:fileName")
-    # Only a name: a path in somebody else's file must not lead anywhere.
-    if name is None or Path(name).name != name:
-        return None
-    path = folder / name
-    return path if path.is_file() else None
+def read_scene_name(graph: Graph, scope: Scope) -> str | None:
+    """The name of the picture's file, None where the file does not tell it."""
+    return graph.value(_picture(graph, scope), "gf:fileName")
 
 
 def _picture(graph: Graph, scope: Scope) -> str | None:

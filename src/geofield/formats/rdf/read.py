@@ -16,6 +16,7 @@ from geofield import schema
 from geofield.crs import LONLAT, is_metric, metric_crs, transformer
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats.arrow import TYPE_IDS, promoted
+from geofield.formats.picture_beside import picture_beside
 from geofield.formats.rdf.complete import complete
 from geofield.formats.rdf.describe import PRODUCTS
 from geofield.formats.rdf.geosparql import geometries_of, known_crs, split_literal
@@ -28,7 +29,7 @@ from geofield.formats.rdf.layers import (
     value_iri,
 )
 from geofield.formats.rdf.namespaces import expand
-from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_path
+from geofield.formats.rdf.origin import read_grid, read_provenance, read_scene_name
 from geofield.formats.rdf.parse import SYNTAXES, parse
 from geofield.formats.rdf.repeated import repeated
 from geofield.formats.rdf.scope import Scope, choose, fields_of, tracks_of
@@ -65,7 +66,7 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
         path = path / "field.rdf"
     graph = load(path)
     _add_siblings(graph, path)
-    dataset = from_graph(graph, plan=plan, folder=path.parent)
+    dataset = from_graph(graph, plan=plan, path=path)
     if not any(dataset.has(layer.name) for layer in schema.LAYERS):
         raise FormatError(
             f"{path.name} holds no field, obstacle or track.",
@@ -81,10 +82,10 @@ def load(path: Path) -> Graph:
     return Graph.of(parse(path)) if graph is None else graph
 
 
-def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = None) -> Dataset:
-    """A dataset from triples, for instance of several files merged."""
+def from_graph(graph: Graph, *, plan: str | None = None, path: Path | None = None) -> Dataset:
+    """A dataset from triples, as of several files merged; its picture lies beside `path`."""
     scope, crs = choose(graph, plan), _metric_crs(graph)
-    grid = read_grid(graph, scope)
+    grid, provenance = read_grid(graph, scope), read_provenance(graph, scope)
     tables: dict[str, gpd.GeoDataFrame] = {}
     for layer in layer_maps():
         subjects = scope.rows(graph, layer, graph.of_type(*layer.known_as))
@@ -97,9 +98,9 @@ def from_graph(graph: Graph, *, plan: str | None = None, folder: Path | None = N
         tables,
         crs,
         str(names[0]) if names else "field",
-        read_provenance(graph, scope),
+        provenance,
         grid,
-        None if folder is None else read_scene_path(graph, scope, folder),
+        path and picture_beside(path, read_scene_name(graph, scope), provenance.source),
     )
 
 
