@@ -225,7 +225,7 @@ def test_text_where_numbers_belong(dataset, tmp_path):
 
 @pytest.mark.parametrize(("name", "column"), [
     ("gpkg", "Name"), ("gpkg", "geom"), ("geojson", "Name"), ("flatgeobuf", "Name"),
-    ("geoparquet", "bbox"),
+    ("geoparquet", "bbox"), ("shapefile", "geom"),
 ])  # fmt: skip
 def test_a_persons_column_beside_one_of_ours_like_it(dataset, tmp_path, name, column):
     field = dataset.tables["field"].assign(**{column: "theirs"})

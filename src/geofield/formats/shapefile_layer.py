@@ -81,7 +81,8 @@ def schema_layer(
     columns: dict[str, Column] = {**(before or {})}
     columns |= {column.shapefile: (column.type, list(table[column.name])) for column in of.columns}
     for name in schema.own_columns(of, table):
-        columns[_short(str(name), columns)] = _own(table[name])
+        # The shapes are written as a column of the name `geom`.
+        columns[_short(str(name), [*columns, "geom"])] = _own(table[name])
     return ShapefileLayer(path, of.geometry, columns, cut_lonlat(shapes, dataset.crs))
 
 
