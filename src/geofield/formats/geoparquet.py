@@ -17,7 +17,6 @@ import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
 
-from geofield.errors import FormatError
 from geofield.formats import origin
 from geofield.formats.arrow import layer_batches
 from geofield.formats.catalogue import PARQUET
@@ -116,12 +115,8 @@ def read(path: Path) -> Dataset:
 
     layers, record = [], None
     for file in files_in(path, *PARQUET):
-        try:
-            text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
-            if text is not None:
-                record = origin.from_json(text.decode())
-        except (pa.ArrowInvalid, ValueError, OSError) as error:
-            reason = f"{error}"[:200]
-            raise FormatError(f"{file} cannot be read: {reason}.", hint="Is it whole?") from error
         layers.append(RawLayer(file.stem, read_parquet(file)))
+        text = (pq.read_metadata(file).metadata or {}).get(_ORIGIN_KEY.encode())
+        if text is not None:
+            record = origin.from_json(text.decode(errors="replace"))
     return origin.restored(read_foreign(layers, path), record)
