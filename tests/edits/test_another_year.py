@@ -164,9 +164,9 @@ def test_no_plan_is_shown_on_the_picture_of_another_year(
     geofield("run", of_year(folder, 2022), *place, "--overwrite")
     geofield("undo", file)
     words = "is of 2022 (2022), the plan of 2020 (2020)"
-    assert f"scene.tif beside field.gpkg {words}" in geofield("refresh", file)
     linked = ("export", out / "field.ttl", "--format", "dxf", "--out", folder / "linked")
     assert f"scene.tif beside field.ttl {words}" in geofield(*linked)
+    assert f"scene.tif beside field.gpkg {words}" in geofield("refresh", file)
 
 
 def test_a_plan_is_read_where_its_picture_may_not_be(
