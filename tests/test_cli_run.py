@@ -342,6 +342,7 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
         (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", ""], "it is empty"),
         (["run", PICTURE, "--lat", "35.07", "--lon", "33.5", "--out", "-"], "give a name"),
         (["tracks", PLAN, "--spacing", "4", "-o", "-"], "standard input and output are not used"),
+        (["tracks", PLAN, "-o", "--overwrite"], "--overwrite is an option: give a name"),
     ],
 )
 def test_wrong_words_are_told_with_the_right_ones(

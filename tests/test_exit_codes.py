@@ -316,3 +316,15 @@ def test_a_name_that_the_system_or_libraries_refuse(name: str, code: int, told: 
     assert done.returncode == code
     assert told in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no folder is removed there while in use")
+def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    words = 'rmdir ../gone && exec "$@"'
+    line = [sys.executable, "-P", "-m", "geofield", "info", "field.gpkg"]
+    done = subprocess.run(["sh", "-c", words, "sh", *line], cwd=tmp_path / "gone",
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 1
+    assert "The folder that this was started in is gone." in done.stderr
+    assert "Traceback" not in done.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.server
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,10 +22,12 @@ import pytest
 import shapely
 
 import geofield as gf
-from geofield.farm import read_farm
+from geofield.farm import Farm, read_farm
 from geofield_command import run_geofield
 
 GEOFIELD = str(Path(sys.executable).with_name("geofield"))
+#: What a farm's overview is called that was replaced.
+KEPT = "farm.gpkg.bak"
 RECTANGLE = ((0, 0), (80, 0), (80, 60), (0, 60))
 
 
@@ -199,7 +202,7 @@ def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> No
     said = batch(places, "--obstacles", tmp_path / "away.gpkg", "--buffer", 5, "--strategy",
                  "single", "--spacing", 4, "--out", tmp_path / "farm")  # fmt: skip
     said = " ".join(said.split())
-    assert "--buffer changes nothing without IMAGERY" in said
+    assert "--buffer changes nothing without IMAGERY: polygons of --obstacles are avoided" in said
     assert "--strategy changes nothing without IMAGERY" in said
     assert "none of the 2 obstacles in it stands at a field that was planned" in said
     assert "2 points have no radius_m; they are circles of 2 m" in said
@@ -207,6 +210,21 @@ def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> No
     said = batch(places, "--obstacles", tmp_path / "text.gpkg", "--out", tmp_path / "no", code=1)
     assert "text.gpkg, row 1: radius_m '6.5 m' is no length" in said
     assert not (tmp_path / "no").exists()
+
+
+def test_nothing_of_a_farm_stays_beside_one_that_is_written_over_it(
+    farm: Path, tmp_path: Path
+) -> None:
+    """Its catalogue, its failed places and its overview were those of the other fields."""
+    there, one = shutil.copytree(farm, tmp_path / "farm"), Farm([next(iter(read_farm(farm)))])
+    (there / "failed.csv").touch()
+    one.write(there, overwrite=True)
+    one.write(tmp_path / "new")
+    names = {path.name for path in there.iterdir() if not path.name.startswith(".")}
+    assert names == {path.name for path in (tmp_path / "new").iterdir()} | {"farm.qgz", KEPT}
+    assert (there / KEPT).read_bytes() == (farm / "farm.gpkg").read_bytes()
+    for command in ("info", "validate"):
+        assert "is a farm without its overview" in told_by(run_geofield(command, there), 1)
 
 
 def test_ctrl_c_finishes_what_is_begun_and_the_rest_comes_later(farm: Path, tmp_path: Path) -> None:

@@ -659,6 +659,18 @@ def test_more_tracks_to_skip_than_there_are_is_told(tmp_path: Path) -> None:
         assert any(f"Of 10 tracks {skip} cannot be left out" in note for note in notes) == told
 
 
+def test_an_offset_on_a_plan_with_a_line_is_told_the_way_out(tmp_path: Path) -> None:
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    plan, middle = tmp_path / "plan.gpkg", outlines(1).to_crs(4326).geometry[0].centroid
+    line = (middle.x, middle.y, middle.x + 0.0005, middle.y)
+    run(tmp_path / "parcel.gpkg", "--spacing", "8", "--ab-lonlat", *map(str, line), "-o", plan)
+    again = ["tracks", str(plan), "--offset", "3", "--spacing", "8", "-o", str(plan)]
+    error = CliRunner().invoke(cli, again).exception
+    assert isinstance(error, TrackError)
+    assert "--defaults" in str(error.hint)
+    run(*again[1:], "--defaults")
+
+
 @pytest.mark.parametrize(
     "place",
     [

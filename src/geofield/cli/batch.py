@@ -201,7 +201,8 @@ def _tell_unused(settings: Settings, places: Places, *, pictures: bool) -> None:
     if not pictures:
         unused["imagery"] = "without IMAGERY"
         unused["obstacles"] = (
-            "without IMAGERY: what --obstacles names keeps the margin of its column buffer_m"
+            "without IMAGERY: polygons of --obstacles are avoided as drawn, points and lines with "
+            "the margin of their column buffer_m; --clearance keeps more from all"
         )
     if not places.settings.num_columns:  # a column could choose another way for its field
         tell_idle(settings, unused=unused)
@@ -251,7 +252,7 @@ def take_in(store: Store, job: Job, only: list[str] | None = None) -> list[str]:
     from geofield.farm.edited_in_place import edited_in_place
     from geofield.farm.edited_plan import said_of
     from geofield.farm.edits import put_edits
-    from geofield.farm.overview import OVERVIEW
+    from geofield.farm.folder import OVERVIEW
     from geofield.farm.put_back import take_in_place
     from geofield.farm.reviewed import file_of
 

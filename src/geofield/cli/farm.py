@@ -55,7 +55,7 @@ def say_waiting(folder: str | Path) -> None:
     """Tell of edits beside a farm that it does not hold yet: they are not in what is made of it."""
     from geofield.farm.edited_in_place import edited_in_place
     from geofield.farm.edits import is_edited
-    from geofield.farm.overview import OVERVIEW
+    from geofield.farm.folder import OVERVIEW
     from geofield.farm.reviewed import file_of
     from geofield.farm.store import Store
 
@@ -95,7 +95,7 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
     """
     from geofield.farm.edits import is_overview, put_edits
     from geofield.farm.finish import renew
-    from geofield.farm.overview import OVERVIEW
+    from geofield.farm.folder import OVERVIEW
     from geofield.farm.put_back import put_back
     from geofield.farm.store import Store
     from geofield.plan import read_plan
@@ -131,7 +131,7 @@ def put(plan_file: Path, folder: str, anyway: bool) -> None:
 def _refuse_other_edits(folder: Path, overview: Path) -> None:
     """Refuse the overview of another place while the farm's own has edits: it is written anew."""
     from geofield.farm.edits import is_edited
-    from geofield.farm.overview import OVERVIEW
+    from geofield.farm.folder import OVERVIEW
 
     own = folder / OVERVIEW
     if own.is_file() and not own.samefile(overview) and is_edited(folder, own):

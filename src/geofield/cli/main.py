@@ -141,6 +141,9 @@ def _end_if_known(error: Exception) -> None:
     if isinstance(error, GeofieldError):
         say_error(error.message, error.hint)
         sys.exit(error.exit_code)
+    if isinstance(error, FileNotFoundError) and error.filename is None:
+        say_error("The folder that this was started in is gone.", "Change to another: cd FOLDER")
+        sys.exit(1)
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         place = error.filename or "what was printed has no room"
         say_error(f"The disk is full: {place}.", "Free some space, then repeat.")

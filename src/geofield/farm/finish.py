@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from geofield.farm.edits import TAKEN, is_edited
 from geofield.farm.failed import write_failed
+from geofield.farm.folder import OVERVIEW, PROJECT
 from geofield.farm.marks import CHANGED, WORK
-from geofield.farm.overview import OVERVIEW, PROJECT, write_overview
+from geofield.farm.overview import write_overview
 from geofield.farm.places import Places
 from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store

@@ -34,6 +34,8 @@ VERSION = 1
 RECORD = "farm.json"
 STATUS = "status"
 REVIEWED = "reviewed"
+#: All fields for QGIS, made from the whole farm.
+OVERVIEW, PROJECT = "farm.gpkg", "farm.qgz"
 #: What may become of a place.
 STATUSES = ("done", "doubtful", "failed", "lost")
 _CHUNK = re.compile(r"chunk=(\d+)")

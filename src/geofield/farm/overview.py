@@ -16,6 +16,7 @@ from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS
 from geofield.farm.as_written import digests_of
 from geofield.farm.edited_tracks import EDITED, track_digests
 from geofield.farm.edits import remember_own
+from geofield.farm.folder import OVERVIEW
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.value import Farm
 from geofield.formats.gpkg import write as write_gpkg
@@ -23,10 +24,6 @@ from geofield.formats.many import Joined
 from geofield.model import ImagerySource, Provenance
 from geofield.staging import staged_folder
 
-#: Name of the files, without suffix.
-STEM = "farm"
-OVERVIEW = f"{STEM}.gpkg"
-PROJECT = f"{STEM}.qgz"
 #: Fields up to which the overview holds obstacles and tracks; beyond, outlines and places.
 MOST_FIELDS = 20_000
 
@@ -42,7 +39,7 @@ def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path
     """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project."""
     with staged_folder(folder, overwrite=True) as staging:
         dataset = dataset_of(farm, name)
-        written = write_gpkg(dataset, staging, stem=STEM, options={})
+        written = write_gpkg(dataset, staging, stem=Path(OVERVIEW).stem, options={})
         remember_own(staging / OVERVIEW, dataset.tables)
     return [folder / path.name for path in written]
 

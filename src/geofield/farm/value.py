@@ -16,6 +16,7 @@ import shapely
 from geofield import schema
 from geofield.errors import FormatError, OutputExistsError
 from geofield.farm import folder as place
+from geofield.farm.failed import FAILED
 from geofield.farm.layers import (
     FIELD_ID,
     KEPT,
@@ -28,10 +29,13 @@ from geofield.farm.layers import (
     stacked,
     tables_of,
 )
+from geofield.farm.stac import COLLECTION, ITEMS
 from geofield.farm.status import Outcome, outcome_words, status_table
 from geofield.farm.store import Store
 from geofield.model.card import card, field_drawn, words
 from geofield.plan import Plan
+from geofield.staging import refuse_locked
+from geofield.staging.generations import earlier_of
 from geofield.wording import counted
 
 #: Fields per chunk of a farm that is written from memory.
@@ -228,7 +232,7 @@ class Farm:
         # Read before it is cleared: it may be this very farm.
         parts = [(self._part(one), self._table(place.STATUS, one)) for one in self._chunks]
         if there:
-            clear(store)
+            _clear_all(store)
         store.put(place.RECORD, place.Record(chunks=len(parts)).to_json())
         for number, (tables, status) in enumerate(parts):
             place.write_chunk(store, number, tables, status)
@@ -297,6 +301,17 @@ def _runs(table: pa.Table) -> dict[str, tuple[int, int]]:
 def clear(store: Store) -> None:
     """Take away a farm's chunks, the marks that they count first; what a person made stays."""
     for name in (place.STATUS, *KEPT):
+        store.remove(name)
+
+
+def _clear_all(store: Store) -> None:
+    """Take away what was made of a farm as well; an overview, perhaps edited, stays as ``.bak``."""
+    overview = Path(store.place, place.OVERVIEW)
+    if store.folder is not None and overview.is_file():
+        refuse_locked(overview)
+        overview.replace(earlier_of(overview))
+    clear(store)
+    for name in (COLLECTION, ITEMS, FAILED):
         store.remove(name)
 
 

@@ -103,6 +103,11 @@ def _detect_folder(folder: Path) -> Format:
     deeper = (place for depth in ("*", "*/*") for place in folder.glob(f"{depth}/Field.txt"))
     if {"FIELD.TXT", "BOUNDARY.TXT"} & names or any(deeper):
         return format_named("agopengps")
+    if "FARM.JSON" in names and "FARM.GPKG" not in names:
+        raise FormatError(
+            f"{folder} is a farm without its overview, farm.gpkg.",
+            hint="The same `geofield batch` writes one; `geofield export` takes the farm as it is.",
+        )
     suffixes = {Path(name).suffix.lower() for name in names}
     for each in FORMATS.values():
         if each.reader is not None and suffixes & set(each.suffixes):

@@ -15,8 +15,8 @@ from typing import Any
 from geofield.errors import ChangedError, FormatError, GeofieldError
 from geofield.farm import read_farm
 from geofield.farm.finish import renew_unless_edited
+from geofield.farm.folder import OVERVIEW
 from geofield.farm.marks import CHANGED
-from geofield.farm.overview import OVERVIEW
 from geofield.farm.pictures import pictures_of
 from geofield.farm.put_back import put_back
 from geofield.farm.reviewed import name_of

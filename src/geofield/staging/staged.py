@@ -17,7 +17,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
-from geofield.errors import FormatError, OutputExistsError
+from geofield.errors import FormatError, FormatWarning, OutputExistsError
+from geofield.notes import warn
 from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.staging.folders import cannot_write, made_folder
 from geofield.staging.leftovers import MOVING, alone, sweep, unstopped, working_folder
@@ -118,7 +119,11 @@ def _publish(
     for path in files:
         # What came into place together has one time: none of it is older than the rest.
         os.utime(path, ns=(now_ns, now_ns))
+    links = {place: place.resolve() for place in places if place.is_symlink()}
     _move(pairs, target, staging)
+    for place, led_to in links.items():
+        words = f"{place} was a link to {led_to}, which stays as it was; it is a file now."
+        warn(words, FormatWarning, stacklevel=4)
     before |= seen(target, places)  # a claim may write more than once
 
 

@@ -26,7 +26,7 @@ def places_across(
         raise TrackError(
             "An offset and a place to pass through (an A-B line passes through its A) were both "
             "given.",
-            hint="Give one of the two.",
+            hint="Give one of the two: `geofield tracks --defaults` forgets that of the plan.",
         )
     if baseline.through is not None:
         first = float(frame.to_frame(*baseline.through)[1])
