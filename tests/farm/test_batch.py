@@ -7,12 +7,13 @@ import json
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import geopandas as gpd
@@ -192,6 +193,21 @@ def test_another_file_of_obstacles_is_other_work(tmp_path: Path) -> None:
         gpd.GeoDataFrame(geometry=middle.buffer(radius_m), crs=32632).to_file(trees)
         told = batch(*asked, code=code)
     assert "the pictures or obstacles differ" in told
+
+
+def test_a_file_of_obstacles_is_what_stands_in_it(tmp_path: Path) -> None:
+    """One that QGIS had open to edit was another work; one that was edited there was none."""
+    places, trees = parcels(tmp_path / "p.gpkg", 10), tmp_path / "trees.gpkg"
+    asked = (places, "--obstacles", trees, "--spacing", 8, "--out", tmp_path / "farm")
+    middle = gpd.read_file(places).to_crs(32632).centroid
+    sized = gpd.GeoDataFrame(geometry=middle, crs=32632).assign(radius_m=6.0)
+    sized.to_file(trees, SPATIAL_INDEX="NO")  # whose triggers SQLite alone does not know
+    batch(*asked)
+    with closing(sqlite3.connect(trees, isolation_level=None)) as opened:
+        opened.execute("PRAGMA journal_mode = WAL")
+        assert "Pace" not in batch(*asked)
+        opened.execute("UPDATE trees SET radius_m = 7.0 WHERE fid = 3")
+        assert "the pictures or obstacles differ" in batch(*asked, code=1)
 
 
 def test_what_of_obstacles_and_options_is_not_used_is_told(tmp_path: Path) -> None:

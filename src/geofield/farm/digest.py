@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import json
 from collections.abc import Mapping
@@ -35,14 +34,13 @@ def record_of(places: Places, job: Job, imagery: Mapping[str, Any], chunk_fields
 
 
 def _obstacles(job: Job) -> dict[str, Any]:
-    if job.obstacles is None:
+    standing = job.standing
+    if job.obstacles is None or standing is None:
         return {}
-    digest = hashlib.sha256()
-    # A Shapefile is several files.
-    for part in sorted(job.obstacles.parent.glob(glob.escape(job.obstacles.stem) + ".*")):
-        if part == job.obstacles or part.suffix.lower() in (".dbf", ".shx", ".prj"):
-            digest.update(part.read_bytes())
-    return {"obstacles": job.obstacles.name, "obstacles_digest": digest.hexdigest()}
+    # Of its rows: QGIS toggled to editing changes bytes, and an edit may lie in a log beside it.
+    rows = f"{standing.crs.srs}{standing.to_wkb(hex=True).to_csv()}".encode()
+    digest = hashlib.sha256(rows).hexdigest()
+    return {"obstacles": job.obstacles.name, "obstacles_digest": digest}
 
 
 def _digest(record: Record) -> str:
