@@ -205,6 +205,10 @@ def test_a_farm_shows_itself(plans: list[gf.Plan]) -> None:
     assert "Farm of 3 fields" in repr(farm)
     assert "3 done" in repr(farm)
     assert "<svg" in farm._repr_html_()
+    # One that was just begun, or of which every place failed.
+    empty = Farm()
+    assert "no place is done" in repr(empty)
+    assert "no place is done" in empty._repr_html_()
 
 
 def test_what_is_no_farm_is_refused(tmp_path: Path) -> None:

@@ -227,6 +227,8 @@ def test_a_table_is_as_good_as_its_file(tmp_path: Path) -> None:
     ):
         with pytest.raises(gf.GeofieldError, match=message):
             list(gf.plan_fields(bad))
+    with pytest.raises(gf.GeofieldError, match=r"there_is_none\.gpkg cannot be read"):
+        next(gf.plan_fields(frame, obstacles="there_is_none.gpkg"))
 
 
 def test_a_table_of_shapes_alone_and_names_in_the_index() -> None:

@@ -86,6 +86,7 @@ def plan_fields(
         None if imagery is None else Imagery(str(imagery)),
         None if obstacles is None else Path(obstacles),
     )
+    _ = job.standing  # one that cannot be read is told at once, not for each place
     waiting = iter(found.take(found.order()))
     here = (_one(place, job) for place in waiting)
     for plan, why in here if client is None else _there(waiting, job, client):

@@ -257,8 +257,9 @@ class Farm:
         area_ha, length_m = total(schema.FIELD, "area_ha"), total(schema.TRACKS, "length_m")
         figures = {"area": f"{area_ha:.2f} ha", "tracks": f"{length_m / 1000:.2f} km"}
         counts = self.status["status"].value_counts()
-        figures["status"] = ", ".join(
-            f"{counts[name]} {name}" for name in place.STATUSES if name in counts
+        figures["status"] = (
+            ", ".join(f"{counts[name]} {name}" for name in place.STATUSES if name in counts)
+            or "no place is done"
         )
         return figures
 

@@ -56,7 +56,7 @@ def card(title: str, facts: Mapping[str, str], drawn: Sequence[Drawn]) -> str:
 
 def small_map(drawn: Sequence[Drawn]) -> str:
     """Shapes as an SVG picture, north up."""
-    every = np.concatenate([np.asarray(each.shapes, dtype=object) for each in drawn])
+    every = np.array([shape for each in drawn for shape in each.shapes], dtype=object)
     if not len(every):
         return ""
     left, bottom, right, top = (float(v) for v in shapely.total_bounds(every))
