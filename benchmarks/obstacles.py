@@ -23,13 +23,14 @@ import cv2
 import numpy as np
 import pandas as pd
 import rasterio
+from matplotlib.figure import Figure
 from matplotlib.path import Path as Ring
 from skimage.feature import canny
 from skimage.transform import hough_circle, hough_circle_peaks
 
 import geofield as gf
 from common import DATA, RESULTS, machine, write_page
-from geofield.evaluation import draw_reliability, match_points
+from geofield.evaluation import match_points, reliability
 from geofield.model.obstacles import active
 from geofield.model.scene import Scene
 from geofield.obstacles.crowns import answers
@@ -177,7 +178,16 @@ def reliability_row() -> tuple[float, int]:
         confidence.extend(found["confidence"].to_numpy()[keep])
         hit.extend(good[keep])
     RESULTS.mkdir(exist_ok=True)
-    return draw_reliability(confidence, hit, RESULTS / "reliability.png"), len(hit)
+    mean, share, count, error = reliability(confidence, hit)
+    figure = Figure((5, 5))
+    axes = figure.subplots()
+    axes.axline((0, 0), slope=1, color="gray")
+    # Bars: how many detections there are at this confidence.
+    axes.bar(np.arange(0.05, 1, 0.1), 0.2 * count / count.max(), 0.08, color="lightgray")
+    axes.plot(mean[count > 0], share[count > 0], "o-")
+    axes.set(xlabel="confidence", ylabel="share of hits", title=f"calibration error {error:.3f}")
+    figure.savefig(RESULTS / "reliability.png")
+    return error, len(hit)
 
 
 def seconds_of(function: Callable[[], object], repeat: int = 3) -> float:

@@ -13,7 +13,7 @@ from shapely import Point, box
 
 import geofield as gf
 from geofield.errors import CRSError, ObstacleError, ObstacleWarning
-from geofield.evaluation import draw_matches, draw_reliability, match_points, reliability
+from geofield.evaluation import draw_matches, match_points, reliability
 from geofield.evaluation.picture import FALSE, HIT
 
 UTM = "EPSG:32636"
@@ -120,16 +120,12 @@ def test_bad_input_is_refused():
         gf.evaluate(table([]), "truth.gpkg")
 
 
-def test_reliability_of_honest_and_boastful_confidences(tmp_path):
+def test_reliability_of_honest_and_boastful_confidences():
     rng = np.random.default_rng(3)
     p = rng.random(20_000)
     hit = rng.random(p.size) < p
     assert reliability(p, hit)[3] < 0.02
     assert reliability(np.sqrt(p), hit)[3] > 0.1
-    error = draw_reliability(p, hit, tmp_path / "reliability.png")
-    assert error < 0.02
-    with Image.open(tmp_path / "reliability.png") as picture:
-        assert picture.size == (580, 580)
 
 
 def test_false_ones_that_are_no_trees_are_told(tmp_path, capsys):

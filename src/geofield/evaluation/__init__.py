@@ -3,7 +3,7 @@
 from geofield.evaluation.compare import Evaluation, evaluate
 from geofield.evaluation.driving import Driving, driving, unseen
 from geofield.evaluation.matching import Matches, match_points
-from geofield.evaluation.picture import draw_matches, draw_reliability, read_obstacles
+from geofield.evaluation.picture import draw_matches, read_obstacles
 from geofield.evaluation.scores import Score, reliability
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "Matches",
     "Score",
     "draw_matches",
-    "draw_reliability",
     "driving",
     "evaluate",
     "match_points",

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.crs import is_utm, utm_crs
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
-from geofield.evaluation.scores import reliability
 from geofield.finite import refuse_nowhere
 from geofield.model.scene import Scene
 from geofield.staging import cannot_write
@@ -21,7 +20,6 @@ from geofield.strangers import check_vector, unreadable
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    from PIL.Image import Image
 
 HIT, MISSED, FALSE = (40, 200, 90), (60, 150, 255), (235, 60, 50)
 _SIDE_PX = 1200
@@ -144,57 +142,7 @@ def draw_matches(
     centres = place(shapely.get_coordinates(shapely.centroid(truth.geometry.to_numpy())))
     for (x, y), good in zip(centres, met, strict=True):
         pen.rectangle([x - 3, y - 3, x + 3, y + 3], fill=HIT if good else MISSED)
-    _save(canvas, path)
-
-
-def _save(canvas: Image, path: Path) -> None:
-    """Write a PNG, whatever the file is called."""
-    try:
+    try:  # a PNG, whatever the file is called
         canvas.save(path, "PNG")
     except OSError as error:
         raise cannot_write(path, error) from None
-
-
-def draw_reliability(confidence: ArrayLike, hit: ArrayLike, path: Path) -> float:
-    """Write a PNG of how far confidences keep their word; return the calibration error.
-
-    Parameters
-    ----------
-    confidence : array (n,)
-        0 to 1.
-    hit : bool array (n,)
-    path : path
-        PNG to write.
-
-    Returns
-    -------
-    float
-        Expected calibration error over ten bins.
-    """
-    from PIL import Image, ImageDraw
-
-    mean, share, count, error = reliability(confidence, hit)
-    side, edge = 480, 50
-    canvas = Image.new("RGB", (side + 2 * edge, side + 2 * edge), "white")
-    pen = ImageDraw.Draw(canvas)
-
-    def at(p: float, s: float) -> tuple[float, float]:
-        return edge + p * side, edge + (1 - s) * side
-
-    pen.rectangle([*at(0, 1), *at(1, 0)], outline="black")
-    pen.line([at(0, 0), at(1, 1)], fill=(170, 170, 170), width=2)
-    most = max(int(count.max()), 1)
-    points = []
-    for k, (m, s, n) in enumerate(zip(mean, share, count, strict=True)):
-        if not n:
-            continue
-        # Grey bars: how many detections there are at this confidence.
-        pen.rectangle([*at(k / 10 + 0.01, 0.2 * n / most), *at(k / 10 + 0.09, 0)], fill="lightgray")
-        points.append(at(float(m), float(s)))
-    pen.line(points, fill=(30, 90, 200), width=3)
-    for x, y in points:
-        pen.ellipse([x - 5, y - 5, x + 5, y + 5], fill=(30, 90, 200))
-    pen.text((edge, side + edge + 12), "confidence, 0 to 1", fill="black")
-    pen.text((edge, 14), f"share of hits, 0 to 1; calibration error {error:.3f}", fill="black")
-    _save(canvas, path)
-    return error
