@@ -40,6 +40,7 @@ def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     from geofield.farm.taken_out import taken_out
     from geofield.plan_files import save_plan
 
+    say_waiting(folder)
     whole = read_farm(folder)
     if field_id not in whole:
         some = ", ".join(whole.ids[:10]) + ", ..." * (len(whole) > 10)
