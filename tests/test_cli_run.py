@@ -55,6 +55,8 @@ def test_the_main_job(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     ran = tmp_path / "out"
+    ran.mkdir()
+    (ran / ".DS_Store").touch()  # of a file manager that looked into it
     assert geofield("run", simulated_tif, *point(simulated), "--spacing", 6, "--out", ran) == 0
     output = capsys.readouterr()
     assert output.out == ""

@@ -21,7 +21,6 @@ from geofield.cli.options import (
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
 from geofield.errors import OutputExistsError
-from geofield.staging import PREFIX
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -103,7 +102,8 @@ def run(
     for each in settings.export.formats:
         format_named(each).refuse_undrawn()
     claim_folder(out)
-    if not overwrite and any(not each.name.startswith(PREFIX) for each in out.iterdir()):
+    # What file managers leave in a folder is hidden, as our own is.
+    if not overwrite and any(not each.name.startswith(".") for each in out.iterdir()):
         raise OutputExistsError(
             f"{out} is not empty.",
             hint="Choose another --out, or --overwrite: reviewed obstacles are then kept.",

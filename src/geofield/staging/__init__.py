@@ -9,11 +9,10 @@ made, why it cannot be written, and what belongs to a file in it.
 
 from geofield.staging.claims import claimed
 from geofield.staging.folders import cannot_write, log_of, written_ns
-from geofield.staging.leftovers import PREFIX, unstopped
+from geofield.staging.leftovers import unstopped
 from geofield.staging.staged import refuse_locked, staged_file, staged_folder
 
 __all__ = [
-    "PREFIX",
     "cannot_write",
     "claimed",
     "log_of",
