@@ -9,6 +9,7 @@ import click
 from geofield.cli.console import say, say_note
 from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
 from geofield.errors import FormatError
+from geofield.staging import written_ns
 from geofield.wording import command, nearest
 
 
@@ -56,7 +57,7 @@ def say_waiting(folder: str | Path) -> None:
     """Tell of edits beside a farm that it does not hold yet: they are not in what is made of it."""
     from geofield.farm.edited_in_place import edited_in_place
     from geofield.farm.edits import is_edited
-    from geofield.farm.folder import OVERVIEW
+    from geofield.farm.folder import OVERVIEW, PROJECT
     from geofield.farm.reviewed import file_of
     from geofield.farm.store import Store
 
@@ -64,7 +65,11 @@ def say_waiting(folder: str | Path) -> None:
     if store.folder is None:
         return
     edited = [file_of(one) for one in edited_in_place(store)]
-    if is_edited(store.folder, store.folder / OVERVIEW):
+    overview, project = store.folder / OVERVIEW, store.folder / PROJECT
+    # Both come into place with one time: read is what was written to since, 0.4 ms a field.
+    there = overview.is_file() and project.is_file()
+    as_written = there and written_ns(overview) == written_ns(project)
+    if not as_written and is_edited(store.folder, overview):
         edited.append(OVERVIEW)
     for name in edited:
         say_note(
