@@ -526,6 +526,12 @@ def test_parcels_that_overlap_are_told(tmp_path: Path) -> None:
     assert notes["p3"] == ""
 
 
+def test_an_overview_of_one_field_is_geofields_own(tmp_path: Path) -> None:
+    gpd.read_file(parcels(tmp_path / "p.gpkg", 2)).iloc[:1].to_file(tmp_path / "one.gpkg")
+    batch(tmp_path / "one.gpkg", "--spacing", 8, "--out", tmp_path / "farm")
+    assert "no fault found" in told_by(run_geofield("validate", tmp_path / "farm"), 0)
+
+
 def test_two_runs_do_not_write_into_one_farm(tmp_path: Path) -> None:
     from geofield.staging import claimed
 

@@ -69,12 +69,11 @@ def read(path: Path) -> Dataset:
             tables[schema.OBSTACLES.name], None if written is None else written.by_number
         )
     field = tables.get(schema.FIELD.name)
-    several = field is not None and len(field) > 1
     alone = field if field is not None and len(field) == 1 else None
     if alone is not None:
         _refuse_far(tables, alone, path)
     for name in layers:
-        if name not in known and not (several and name == schema.PLACES.name):
+        if name not in own:
             warn(
                 f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",
                 FormatWarning,
