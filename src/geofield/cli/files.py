@@ -27,7 +27,7 @@ class NamedPath(click.Path):
             self.fail("it is empty: give a name.", param, ctx)
         if value == "-" and not self.exists:
             self.fail("standard input and output are not used here: give a name.", param, ctx)
-        if str(value).startswith("-") and not self.exists:  # a name was forgotten
+        if isinstance(param, click.Option) and str(value).startswith("-") and not self.exists:
             self.fail(f"{value} is an option: give a name, or ./{value} if it is one.", param, ctx)
         path = super().convert(value, param, ctx)
         if isinstance(path, Path) and path.suffix.lower() == ".gpkg" and path.is_symlink():
