@@ -97,6 +97,22 @@ def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture
     assert max(33.52 - west, east - 33.53, 35.07 - south, north - 35.08) < 2e-4
 
 
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32760"])
+def test_an_area_across_180_degrees_is_no_wider_than_it_is(crs: str) -> None:
+    import geopandas as gpd
+
+    sides = [box(179.996, -16.804, 180, -16.8), box(-180, -16.804, -179.998, -16.8)]
+    gpd.GeoDataFrame(geometry=sides, crs=4326).to_crs(crs).to_file("farm.gpkg")
+    with serving() as server:
+        said = ["--area", "farm.gpkg", "--zoom", 17]
+        assert run("tiles", server.template, *said, "-o", "a.tif") == 0
+        assert {tile[1] for tile in server.asked} == {0, 131070, 131071}
+    grid = read_scene("a.tif").grid
+    assert grid.width_px == pytest.approx(0.006 / 360 * 256 * 2**17, abs=2)
+    for lon in (179.9961, -179.9981):
+        assert grid.contains_px(*grid.from_lonlat(lon, -16.802))
+
+
 @pytest.mark.parametrize(("right_px", "width_px"), [(118, 108), (250, 118)])
 def test_the_middle_of_an_area_need_not_be_seen(right_px: int, width_px: int) -> None:
     import geopandas as gpd
@@ -151,6 +167,26 @@ def test_options_of_tiles_with_a_picture_are_told(capsys: pytest.CaptureFixture[
     assert "--resolution changes nothing here" in capsys.readouterr().err
     assert run("tiles", picture, *POINT, "--size", 20, "-o", "b.tif") == 0
     assert "changes nothing" not in capsys.readouterr().err
+
+
+def test_what_a_picture_does_not_say_is_said_to_tiles(capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(Path("drone.tif"), ground(bands=4), crs=None)
+    known: dict[str, Any] = {"bands": ("blue", "green", "red", "other"), "crs": "EPSG:32636"}
+    lon, lat = read_scene(path, **known).grid.centre_lonlat
+    place = ["--lat", lat, "--lon", lon]
+    assert run("tiles", path, *place, "-o", "a.tif") == 1
+    assert "--crs EPSG:32633" in capsys.readouterr().err
+    said = ["--crs", known["crs"], "--bands", ",".join(known["bands"])]
+    assert run("tiles", path, *place, *said, "-o", "a.tif") == 0
+    assert "changes nothing" not in capsys.readouterr().err
+    assert read_scene("a.tif").roles == ("blue", "green", "red")
+    Path("geofield.toml").write_text('[imagery]\ncrs = "EPSG:32636"\nbands = ["grey"]\n')
+    assert run("tiles", path, *place, "-o", "b.tif") == 0
+    assert read_scene("b.tif").roles == ("grey",)
+    with serving() as server:
+        tiles = ["tiles", server.template, *POINT, "--size", 9]
+        assert run(*tiles, "--crs", "EPSG:32636", "-o", "c.tif") == 0
+    assert "--crs changes nothing here" in capsys.readouterr().err
 
 
 def test_what_is_guessed_about_a_picture_is_told(

@@ -224,6 +224,7 @@ def area_of(path: Path) -> Where:
 
     from geofield.crs import LONLAT, refuse_outside
     from geofield.finite import refuse_nowhere
+    from geofield.formats.antimeridian import extent
     from geofield.formats.foreign import read_vector
     from geofield.imagery import Where
 
@@ -235,7 +236,7 @@ def area_of(path: Path) -> Where:
     lon, lat = shapely.get_coordinates(shapes).T
     lat[np.abs(lat) > 90.0] = np.inf  # metres that are called degrees are not brought anywhere
     refuse_outside(CRS(table.crs), lon, lat, what=f"Coordinates in {path.name}")
-    shape = shapely.union_all(shapes)
-    if shape.is_empty:
+    if not len(lon):
         raise ImageryError(f"The file {path} holds no area.")
-    return Where(area=shape)
+    west, south, east, north = extent(shapes)
+    return Where(area=shapely.box(west, south, east + 360.0 * (east < west), north))

@@ -16,12 +16,13 @@ from geofield.cli.options import Number, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
     from geofield.imagery import Where
-    from geofield.imagery.sources import Source
     from geofield.settings import Settings
 
 
 #: What only sources of tiles take.
 _OF_TILES = ("zoom", "resolution_m", "whole_tiles", "missing", "layer")
+#: And what only pictures take.
+_OF_PICTURES = ("imagery__crs", "imagery__bands")
 
 
 class ZoomType(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
@@ -92,6 +93,14 @@ Examples (the first one on the project's own sample):
 @click.option("--offline", is_flag=True, help="Work from the tile cache alone.")
 @click.option("--no-cache", is_flag=True, help="Neither read nor keep tiles.")
 @click.option("--cache-dir", type=FOLDER, help="Folder of the tile caches.")
+@click.option(
+    "--crs", "imagery__crs", help="CRS of a picture that does not say its own, e.g. EPSG:32633."
+)
+@click.option(
+    "--bands",
+    "imagery__bands",
+    help="What the picture's bands show, in order: red, green, blue, nir, grey, other.",
+)
 @acknowledge_option
 @output_option("The GeoTIFF (COG) to write.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
@@ -132,6 +141,7 @@ def tiles(
         where_json,
     )
     from geofield.imagery import acquire
+    from geofield.imagery.sources import PictureSource
 
     if output.suffix.lower() not in ("", ".tif", ".tiff"):
         raise click.BadParameter(
@@ -156,7 +166,9 @@ def tiles(
         offline=offline,
         options=options,
     )
-    _tell_idle(found, place["zoom"])
+    if is_picture := isinstance(found, PictureSource):
+        found = replace(found, bands=settings.imagery.bands, crs=settings.imagery.crs)
+    _tell_idle(is_picture, place["zoom"])
     with progress_bar(quiet=as_json) as progress:
         done = acquire(
             found, where, output, options=options, overwrite=overwrite, progress=progress
@@ -167,10 +179,8 @@ def tiles(
         describe(done)
 
 
-def _tell_idle(source: Source, zoom: int | str | None) -> None:
-    """Tell which options that were given change nothing with a source."""
-    from geofield.imagery.sources import PictureSource
-
+def _tell_idle(is_picture: bool, zoom: int | str | None) -> None:
+    """Tell which options that were given change nothing with a picture, or with tiles."""
     context = click.get_current_context()
     given = [
         each
@@ -178,8 +188,10 @@ def _tell_idle(source: Source, zoom: int | str | None) -> None:
         if context.get_parameter_source(each.name or "") is ParameterSource.COMMANDLINE
     ]
     for option in given:
-        if isinstance(source, PictureSource) and option.name in _OF_TILES:
+        if is_picture and option.name in _OF_TILES:
             say_note(f"{option.opts[0]} changes nothing here: a picture is cut on its own pixels.")
+        elif not is_picture and option.name in _OF_PICTURES:
+            say_note(f"{option.opts[0]} changes nothing here: tiles say it themselves.")
         elif option.name == "resolution_m" and zoom is not None:
             say_note("--resolution changes nothing beside --zoom, which stands instead of it.")
 

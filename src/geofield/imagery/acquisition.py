@@ -46,7 +46,8 @@ class Where:
     size_px, size_m : optional
         Side of the square, pixels (640 by default) or ground metres.
     area : shapely geometry, optional
-        In lon/lat degrees; instead of the square, or with a point to look around in it.
+        In lon/lat degrees, across 180 running on beyond; instead of the square, or with a point to
+        look around in it.
     zoom : int, "max", "fit" or None
         The source's zoom; its finest; the largest at which the area (or `size_m`) still fits
         a frame of `frame_px`; None takes `resolution_m`.
@@ -81,7 +82,8 @@ class Where:
             return self.lat, self.lon
         assert self.area is not None  # noqa: S101  (made sure above)
         west, south, east, north = self.area.bounds
-        return (south + north) / 2, (west + east) / 2
+        lon = (west + east) / 2
+        return (south + north) / 2, lon - 360.0 * (lon > 180.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,26 +183,30 @@ class TilePyramid:
 
     # -- inside ----------------------------------------------------------------------------
 
-    def _position(self, lat: float, lon: float) -> tuple[float, float]:
+    def _position(self, lat: float, lon: float, near_x: float = 0.0) -> tuple[float, float]:
+        """A place in the CRS: of the two that it has across the antimeridian the one near x."""
         if self.crs == WEB_MERCATOR and not abs(lat) <= WEB_MERCATOR_MAX_LAT:
             raise ImageryError(
                 f"Latitude {lat} lies outside Web Mercator.",
                 hint=f"It ends at {WEB_MERCATOR_MAX_LAT:.4f} degrees; use a source in another CRS.",
             )
-        unit = Grid(1, 1, Affine.identity(), self.crs)
+        unit = Grid(1, 1, Affine.translation(near_x, 0.0), self.crs)
         x, y = unit.from_lonlat(lon, lat)
         if not (math.isfinite(x) and math.isfinite(y)):
             raise ImageryError(
                 f"The point lat {lat}, lon {lon} lies outside the source's map ({self.crs.name})."
             )
-        return float(x), float(y)
+        return float(x) + near_x, float(y)
 
     def _bounds_px(self, level: TileLevel, area: BaseGeometry) -> tuple[float, float, float, float]:
         if area.is_empty:
             raise ImageryError("The area asked for is empty.")
         west, south, east, north = area.bounds
         lats, lons = np.linspace(south, north, 17), np.linspace(west, east, 17)
-        px = np.array([level.to_px(*self._position(lat, lon)) for lat in lats for lon in lons])
+        middle_x, _ = self._position(lats[8], lons[8])
+        px = np.array([
+            level.to_px(*self._position(lat, lon, middle_x)) for lat in lats for lon in lons
+        ])  # fmt: skip
         return *px.min(axis=0), *px.max(axis=0)
 
     def _block(
