@@ -838,6 +838,14 @@ def test_stac_items(tmp_path: Path) -> None:
     scene = read_scene(file, lat=lat, lon=lon)
     assert scene.roles == ("red", "green", "blue")
     assert np.array_equal(scene.bands, values[:3])
+    # A band of other pixels over the same ground is one of it, one of the ground beside is none.
+    coarse = Affine(2 * RESOLUTION, 0, EAST, 0, -2 * RESOLUTION, NORTH)
+    write(tmp_path / "blue.tif", values[2:3, ::2, ::2], transform=coarse)
+    assert read_scene(file, lat=lat, lon=lon).roles == ("red", "green", "blue")
+    for place, crs in ((coarse @ Affine.translation(3, 0), UTM), (coarse, "EPSG:32635")):
+        write(tmp_path / "blue.tif", values[2:3, ::2, ::2], transform=place, crs=crs)
+        with pytest.raises(ImageryError, match=r"^red\.tif and blue\.tif do not show the same"):
+            read_scene(file, lat=lat, lon=lon)
 
 
 def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:

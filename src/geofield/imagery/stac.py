@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urljoin
 from xml.sax.saxutils import escape
 
+import numpy as np
 import rasterio
 import shapely
 from shapely.geometry import Point, shape
@@ -17,7 +18,7 @@ from shapely.geometry import Point, shape
 from geofield.errors import ImageryError, PointOutsideError
 from geofield.imagery.bands import find_roles
 from geofield.imagery.collection import open_collection
-from geofield.imagery.gdal import gdal_env, is_remote, open_picture
+from geofield.imagery.gdal import display_name, gdal_env, is_remote, open_picture
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
@@ -178,6 +179,7 @@ def stacked(paths: Sequence[str], roles: Sequence[str], reach: Reach) -> str:
     with gdal_env(paths[0]), open_picture(paths[0], reach) as first:
         width, height, dtype = first.width, first.height, first.dtypes[0]
         crs, transform, nodata = first.crs, first.transform, first.nodata
+        bounds, pixel = first.bounds, max(first.res)
     gdal_type = rasterio.dtypes._gdal_typename(dtype)
     lines = [f'<VRTDataset rasterXSize="{width}" rasterYSize="{height}">']
     if crs:
@@ -186,6 +188,13 @@ def stacked(paths: Sequence[str], roles: Sequence[str], reach: Reach) -> str:
     for n, (path, role) in enumerate(zip(paths, roles, strict=True), 1):
         with gdal_env(path), open_picture(path, reach) as each:
             size = each.width, each.height
+            apart = np.abs(np.subtract(each.bounds, bounds)).max()
+            if each.crs != crs or apart > max(pixel, *each.res):
+                raise ImageryError(
+                    f"{display_name(paths[0])} and {display_name(path)} do not show the same "
+                    "ground: they are no bands of one picture.",
+                    hint="Bring them onto the same ground, as with gdalwarp -t_srs and -te.",
+                )
         source = f"/vsicurl/{path}" if path.startswith("http") else str(Path(path).resolve())
         lines.append(
             f'<VRTRasterBand dataType="{gdal_type}" band="{n}">'
