@@ -46,6 +46,16 @@ def test_a_field_of_few_pixels_is_found_as_exactly_as_one_of_many(seed, least):
             extract_field(picture, lat=lat, lon=truth.lon, search=kept)
 
 
+def test_a_search_is_of_a_picture_smoothed_or_not(simulated):
+    place = {"lat": simulated.lat, "lon": simulated.lon}
+    smooth = extract_field(simulated.scene, **place, smooth="diffusion")
+    kept = prepare_field(simulated.scene, **place, smooth="diffusion")
+    again = extract_field(simulated.scene, **place, smooth="diffusion", search=kept)
+    assert again.polygon == smooth.polygon != extract_field(simulated.scene, **place).polygon
+    with pytest.raises(FieldError, match="smoothed otherwise"):
+        extract_field(simulated.scene, **place, search=kept)
+
+
 @pytest.mark.parametrize(
     ("rows", "columns", "times"),
     [(256, 256, 1), (171, 100, 1), (170, 20, 2), (64, 100, 3), (9, 12, 8)],

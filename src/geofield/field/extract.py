@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import shapely
@@ -95,8 +95,8 @@ def extract_field(
         surfaces.
     name : str
     search : FieldSearch, optional
-        What `prepare_field` made of the same scene and point, and of no other: further points
-        then cost only what they change.
+        What `prepare_field` made of the same scene, point and smoothing, and of no other: further
+        points then cost only what they change.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def extract_field(
     chosen: dict[str, Any] = {"regions": tuple(regions)} if regions else {}
     if method == "auto":
         search = search or FieldSearch((lon, lat))
-        search.refuse_another(scene, (lon, lat))
+        search.refuse_another(picture, (lon, lat))
         view = search.view(picture, *(tuple((x, y) for x, y in one) for one in (include, exclude)))
         part, chosen = view.part, {"search": view.search}
     scene, picture = part.of(scene), part.of(picture)
@@ -193,7 +193,9 @@ def extract_field(
     return field
 
 
-def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
+def prepare_field(
+    scene: Scene, *, lat: float, lon: float, smooth: Smoothing = "none"
+) -> FieldSearch:
     """What `extract_field` can keep between points; it can be pickled.
 
     >>> scene = gf.read_scene("sample_data/field_1.tif")
@@ -206,9 +208,13 @@ def prepare_field(scene: Scene, *, lat: float, lon: float) -> FieldSearch:
     scene : Scene
     lat, lon : float
         The point in the field, degrees, WGS 84.
+    smooth : {"none", "diffusion"}
+        As `extract_field` is to be asked.
     """
     refuse_other(scene, Scene, "scene", OPEN_IT, ImageryError)
+    refuse_unknown(SettingsError, "smoothing", smooth, get_args(Smoothing))
     search, shown = FieldSearch((lon, lat)), _with_data(upright(scene))
+    shown = diffused(shown) if smooth == "diffusion" else shown
     search.refuse_another(shown, (lon, lat))
     search.view(shown)
     return search
@@ -230,8 +236,8 @@ def _check(
             f"Further points belong to method auto, not {method}.", hint="Use method auto."
         )
     if holes is not None:
-        refuse_unknown(SettingsError, "choice for holes", holes, ("fill", "keep"))
-    refuse_unknown(SettingsError, "smoothing", smooth, ("none", "diffusion"))
+        refuse_unknown(SettingsError, "choice for holes", holes, get_args(Holes))
+    refuse_unknown(SettingsError, "smoothing", smooth, get_args(Smoothing))
 
 
 def _check_places(

@@ -91,7 +91,8 @@ class FieldSearch:
         picture = scene.grid, zlib.crc32(scene.bands[:, ::_SAMPLE_PX, ::_SAMPLE_PX].tobytes())
         if self.picture not in (None, picture) or self.lonlat != lonlat:
             raise FieldError(
-                "The search that is given was prepared for another picture or point.",
+                "The search that is given was prepared for another picture or point, or "
+                "smoothed otherwise.",
                 hint="Prepare one for each: gf.prepare_field(scene, lat=lat, lon=lon).",
             )
         self.picture = picture
