@@ -101,23 +101,21 @@ def gaps_filled(image: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[Any]:
     return whole
 
 
-def block_mean(image: Image, factor: int) -> Image:
+def block_mean(image: NDArray[Any], factor: int) -> Image:
     """Return the means of square blocks, the last row and column repeated to fill the last."""
     if factor == 1:
-        return image
-    if factor % 2 == 0 and factor > 2:
-        return block_mean(block_mean(image, 2), factor // 2)
+        return image.astype(np.float32)
     rows, cols = image.shape
     pad = ((0, -rows % factor), (0, -cols % factor))
     padded = np.pad(image, pad, mode="edge") if any(p[1] for p in pad) else image
     # Strided sums are several times faster than a mean over reshaped blocks.
-    tall = padded[::factor].copy()
+    tall = padded[::factor].astype(np.float32)
     for i in range(1, factor):
         tall += padded[i::factor]
     total = tall[:, ::factor].copy()
     for i in range(1, factor):
         total += tall[:, i::factor]
-    return total * np.float32(1 / factor**2)
+    return total / np.float32(factor**2)
 
 
 def resample(image: Image, factor: float) -> Image:

@@ -11,12 +11,12 @@ from affine import Affine
 from geofield.crs import parse_crs
 from geofield.errors import FieldWarning, GeofieldError
 from geofield.field import extract_field
-from geofield.field.evidence import block_mean
 from geofield.field.plausible import look
 from geofield.field.quality import judge
 from geofield.grid import Grid
 from geofield.model import Scene
 from geofield.model.segmentation import Segmentation
+from geofield.raster import block_mean
 from geofield.simulate import SimulationSettings, simulate_field
 
 ROLES = ("red", "green", "blue", "nir")

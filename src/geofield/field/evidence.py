@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtr, chdtri
 
 from geofield.model import Scene
-from geofield.raster import smoothed
+from geofield.raster import block_mean, smoothed
 
 FloatArray = NDArray[np.float32]
 
@@ -43,24 +43,6 @@ def channels(scene: Scene, factor: int = 1) -> FloatArray:
         nir = block_mean(scene.nir, factor)
         layers.append(100.0 * (nir - red) / (nir + red + 20.0))
     return np.stack(layers).astype(np.float32)
-
-
-def block_mean(band: NDArray[np.bool_ | np.uint8 | np.float32], factor: int) -> FloatArray:
-    """Means of blocks of ``factor x factor`` pixels; the last ones may be smaller."""
-    if factor == 1:
-        return band.astype(np.float32)
-    rows, columns = band.shape
-    more = ((-rows) % factor, (-columns) % factor)
-    if any(more):
-        band = np.pad(band, ((0, more[0]), (0, more[1])), mode="edge")
-    # Strided sums are several times faster than a mean over reshaped blocks.
-    tall = band[::factor].astype(np.float32)
-    for start in range(1, factor):
-        tall += band[start::factor]
-    total = tall[:, ::factor].copy()
-    for start in range(1, factor):
-        total += tall[:, start::factor]
-    return total / np.float32(factor**2)
 
 
 def whiten(

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.field.evidence import block_mean
 from geofield.model import Scene
+from geofield.raster import block_mean
 
 #: Pixels a side of the picture in which the look is judged.
 _LOOK_PX = 400
