@@ -432,6 +432,13 @@ def test_only_whole_strips_are_left_on_either_side_of_a_place(direction: Any) ->
         assert len(across) == 1 + (y - 3.0) // 6.0 + (97.0 - y) // 6.0
 
 
+def test_wide_strips_beside_a_first_track_on_the_border_lie_inside() -> None:
+    how: Any = {"crs": CRS, "spacing_m": 4.0, "width_m": 10.0, "last_strip": "leave"}
+    planned = plan_tracks(box(0, 0, 200, 30), offset_m=0.0, direction="longest_edge", **how)
+    from_edge = 30.0 - (planned.segments.geometry.bounds["miny"].to_numpy() - Y)
+    assert from_edge == pytest.approx([0, 8, 12, 16, 20, 24], abs=1e-6)
+
+
 def test_a_pass_of_a_headland_narrower_than_half_the_machine_stays_within_the_border() -> None:
     for width_m, headland_m, offset_m in ((None, 2.0, 3.0), (13.0, 6.0, 6.5)):
         how: Any = {"crs": CRS, "spacing_m": 6.0, "width_m": width_m}

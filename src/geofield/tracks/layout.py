@@ -150,8 +150,6 @@ def track_positions(
     # machine would drive outside for nothing. What was asked for stays.
     idle = half - spacing_m + SNAP_M if half > spacing_m else -SNAP_M
     low, high = near_m + idle, far_m - idle
-    if last_strip == "leave":
-        low = near_m + half - SNAP_M
     limit = far_m - half + SNAP_M
     if near_m - SNAP_M <= first_m <= far_m + SNAP_M:
         low, high = min(low, first_m), max(high, first_m)
@@ -173,6 +171,9 @@ def track_positions(
     count = max(0, int(np.floor((limit - first_m) / spacing_m) - index) + 1)
     # Multiples of the spacing from the one place, so that numbers far away do not drift.
     positions = first_m + (index + np.arange(count)) * spacing_m
+    if last_strip == "leave":
+        inside = positions >= near_m + half - SNAP_M
+        positions = positions[inside | (np.abs(positions - first_m) <= SNAP_M)]
     if last_strip == "shift":
         worked = positions[-1] + half if count else near_m
         if far_m - worked > SNAP_M and far_m - half > near_m:
