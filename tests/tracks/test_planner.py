@@ -834,3 +834,12 @@ def test_a_point_of_no_possible_size_is_refused_as_a_polygon_is(name: str, value
 def test_a_machine_wider_than_the_field_is_told_by_its_width() -> None:
     with pytest.warns(TrackWarning, match="The machine's width of 500 m leaves no track"):
         plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=4.0, width_m=500.0)
+
+
+def test_an_obstacle_of_the_number_0_is_named_as_the_cause_of_its_gaps() -> None:
+    trees = gpd.GeoDataFrame(
+        {"obstacle_no": [0, 1]}, geometry=[box(50, 9, 58, 17), box(150, 9, 158, 17)], crs=CRS
+    )
+    planned = plan_tracks(box(0, 0, 200, 25), trees, crs=CRS, spacing_m=4.0, direction=90.0)
+    assert planned.gaps["obstacle_no"].tolist() == [0, 1] * 2
+    assert set(planned.gaps["cause"]) == {"obstacle 0", "obstacle 1"}

@@ -26,7 +26,7 @@ from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import among, as_text
 from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
 from geofield.tracks.shapes import Edges
-from geofield.tracks.tables import BY_HAND, cause_in_words, line_columns
+from geofield.tracks.tables import BORDER, BY_HAND, cause_in_words, line_columns
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -241,8 +241,8 @@ def with_drawn(
             way = shapely.LineString([before.coords[-1], after.coords[0]])
             inside = tracks.outline is None or tracks.outline.covers(way)
             met = [int(numbers[at]) for at in np.flatnonzero(shapely.intersects(shapes, way))]
-            met += [] if met or not inside else [BY_HAND]
-            gaps.append((one.track_no, no, way, *cause_in_words(met, border=not inside)))
+            met += [] if inside else [BORDER]
+            gaps.append((one.track_no, no, way, *cause_in_words(met or [BY_HAND])))
     return _joined(tracks, rows, gaps)
 
 

@@ -16,10 +16,10 @@ from geofield.model.tracks import points_per_segment
 from geofield.tracks.clip import Crossings, Pieces
 from geofield.tracks.frame import FloatArray, TrackFrame
 from geofield.tracks.losses import gap_causes
-from geofield.tracks.shapes import FIELD, IntArray
+from geofield.tracks.shapes import IntArray
 
-BY_HAND = 0
-"""Among obstacle numbers: what a person took out of a track."""
+BORDER, BY_HAND = -(1 << 62), 1 - (1 << 62)
+"""Among obstacle numbers, and none of a table's: the field's border, what a person took out."""
 
 
 def segment_ends(pieces: Pieces, positions: FloatArray, frame: TrackFrame) -> FloatArray:
@@ -111,23 +111,20 @@ def gap_table(
 def _in_words(
     gap: IntArray, owner: IntArray, obstacle_no: IntArray, count: int
 ) -> tuple[list[str], list[int | None]]:
-    border: list[bool] = [False] * count
     numbers: list[list[int]] = [[] for _ in range(count)]
-    number = np.append(obstacle_no, 0)[owner].tolist()
-    for at, who, no in zip(gap.tolist(), owner.tolist(), number, strict=True):
-        if who == FIELD:
-            border[at] = True
-        else:
-            numbers[at].append(no)
-    told = [cause_in_words(mine, border=at) for mine, at in zip(numbers, border, strict=True)]
+    # The owner of the border comes last, too: counted from behind.
+    number = np.append(obstacle_no, BORDER)[owner]
+    for at, no in zip(gap.tolist(), number.tolist(), strict=True):
+        numbers[at].append(no)
+    told = [cause_in_words(each) for each in numbers]
     return [words for words, _ in told], [lowest for _, lowest in told]
 
 
-def cause_in_words(numbers: Collection[int], *, border: bool) -> tuple[str, int | None]:
+def cause_in_words(numbers: Collection[int]) -> tuple[str, int | None]:
     """The causes of a gap, and the lowest number among them; the border's where there is none."""
     # Parts of one obstacle share its number.
-    each = sorted(set(numbers) - {BY_HAND})
-    words = ["border"] if border else []
+    each = sorted(set(numbers) - {BORDER, BY_HAND})
+    words = ["border"] if BORDER in numbers else []
     if each:
         words.append(f"obstacle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}")
     if BY_HAND in numbers:
