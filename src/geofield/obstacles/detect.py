@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.errors import (
@@ -20,7 +20,7 @@ from geofield.errors import (
 )
 from geofield.grid import Grid
 from geofield.methods import STUDY_STRATEGIES, Strategy, method
-from geofield.model.circles import Circles, checked_range
+from geofield.model.circles import checked_range
 from geofield.model.field import MAKE_ONE, Field
 from geofield.model.obstacles import from_circles_px, from_polygons
 from geofield.model.scene import OPEN_IT, Scene
@@ -31,7 +31,6 @@ from geofield.obstacles.picture import Picture, search_region
 
 if TYPE_CHECKING:
     import geopandas as gpd
-    from pyproj import CRS
 
     from geofield.study.detectors import GreyCheck
     from geofield.study.edges import EdgeMethod
@@ -151,6 +150,7 @@ def detect_obstacles(
     if high_m > FARTHEST_M:
         raise ObstacleError(f"The largest radius, {high_m:g} m, is above {FARTHEST_M:g} m.")
     crs = scene.grid.metric_crs if field is None else field.crs
+    table_of = partial(from_circles_px, grid=scene.grid, buffer_m=buffer_m, crs=crs)
     detection: dict[str, Any] = {"strategy": strategy, "radius_m": [low_m, high_m], "notes": []}
     if strategy == "auto":
         limits = thresholds(cost_missed) if min_confidence is None else _limits(min_confidence)
@@ -164,7 +164,9 @@ def detect_obstacles(
             others=others,
             progress=progress,
         )
-        table = _of_default(found, scene.grid, crs, buffer_m, detected)
+        trees = found.trees
+        table = table_of(trees.x_px, trees.y_px, trees.radius_px, confidence=trees.strength)
+        table = _with_others(table, found, scene.grid, buffer_m, detected)
         detection |= {"threshold": detected, "possible_from": min(limits)} | found.detection
     else:
         whole = scene if isinstance(scene, Scene) else scene.read()
@@ -188,7 +190,7 @@ def detect_obstacles(
         order = np.lexsort((circles.x_px, circles.y_px))
         share = None if share is None else share[order]
         circles = turn.circles_back(circles.take(order))
-        table = _of_circles(circles, share, scene.grid, crs, buffer_m)
+        table = table_of(circles.x_px, circles.y_px, circles.radius_px, confidence=share)
         detection |= told
     table.attrs["detection"] = detection
     return table
@@ -201,54 +203,25 @@ def _limits(min_confidence: float) -> tuple[float, float]:
     return min_confidence, min_confidence
 
 
-def _of_circles(
-    circles: Circles,
-    confidence: NDArray[np.float64] | None,
-    grid: Grid,
-    crs: CRS,
-    buffer_m: float,
+def _with_others(
+    table: gpd.GeoDataFrame, found: Found, grid: Grid, buffer_m: float, detected: float
 ) -> gpd.GeoDataFrame:
-    """Return circles as obstacles, in their order."""
-    return from_circles_px(
-        circles.x_px,
-        circles.y_px,
-        circles.radius_px,
-        grid,
-        buffer_m=buffer_m,
-        confidence=confidence,
-        crs=crs,
-    )
-
-
-def _of_default(
-    found: Found, grid: Grid, crs: CRS, buffer_m: float, detected: float
-) -> gpd.GeoDataFrame:
-    """Return trees and other things as obstacles, detected or merely possible."""
-    table = _of_circles(found.trees, found.trees.strength, grid, crs, buffer_m)
-    if found.shapes:
-        table = _with_shapes(table, found.shapes, found.shape_confidence, grid, buffer_m)
-    unsure = table["confidence"].to_numpy(dtype="float64") < detected
-    return table.assign(status=table["status"].mask(unsure, "possible"))
-
-
-def _with_shapes(
-    table: gpd.GeoDataFrame,
-    shapes: list[shapely.Polygon],
-    confidence: NDArray[np.float64],
-    grid: Grid,
-    buffer_m: float,
-) -> gpd.GeoDataFrame:
-    """Append polygons of kind `other`, numbered on."""
+    """Trees, and what is none as polygons of kind `other`, numbered on; detected or possible."""
     import pandas as pd
 
     crs = table.crs
-    rows = from_polygons(
-        shapely.transform(shapes, lambda px: np.column_stack(grid.to_crs(px[:, 0], px[:, 1], crs))),
-        crs,
-        buffer_m=buffer_m,
-        grid=grid,
-        confidence=confidence,
-        first_no=len(table) + 1,
-    )
-    joined = pd.concat([table, rows]) if len(table) else rows
-    return schema.conform(schema.OBSTACLES, joined)
+    if found.shapes:
+        rows = from_polygons(
+            shapely.transform(
+                found.shapes, lambda px: np.column_stack(grid.to_crs(px[:, 0], px[:, 1], crs))
+            ),
+            crs,
+            buffer_m=buffer_m,
+            grid=grid,
+            confidence=found.shape_confidence,
+            first_no=len(table) + 1,
+        )
+        joined = pd.concat([table, rows]) if len(table) else rows
+        table = schema.conform(schema.OBSTACLES, joined)
+    unsure = table["confidence"].to_numpy(dtype="float64") < detected
+    return table.assign(status=table["status"].mask(unsure, "possible"))

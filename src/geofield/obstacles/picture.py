@@ -73,16 +73,14 @@ class _Turned:
         window: tuple[int, int, int, int] | None = None,
         *,
         shape_px: tuple[int, int] | None = None,
-        scaling: tuple[float, float] | None = None,
-        nir_scaling: tuple[float, float] | None = None,
+        **scalings: tuple[float, float] | None,
     ) -> Scene:
         """Read a window (column, row, width, height) of the turned picture."""
         if window is not None:
             window = self.turn.window_back(window)
         if shape_px is not None and self.turn.exchanged:
             shape_px = shape_px[1], shape_px[0]
-        part = self.reader.read(window, shape_px=shape_px, scaling=scaling, nir_scaling=nir_scaling)
-        return self.turn.scene(part)
+        return self.turn.scene(self.reader.read(window, shape_px=shape_px, **scalings))
 
 
 @dataclass(frozen=True, slots=True)
