@@ -7,7 +7,6 @@ from every message.
 
 from __future__ import annotations
 
-import email.utils
 import logging
 import random
 import threading
@@ -18,7 +17,8 @@ from typing import Any, TypeVar
 from urllib.parse import urljoin, urlsplit
 
 import urllib3
-from urllib3.exceptions import HTTPError, LocationParseError, NewConnectionError
+from urllib3.exceptions import HTTPError, InvalidHeader, LocationParseError, NewConnectionError
+from urllib3.util import Retry
 
 from geofield.errors import ImageryError, NetworkError
 from geofield.imagery.gdal import USER_AGENT
@@ -259,15 +259,10 @@ class Client:
 
 def _retry_after(value: str | None) -> float | None:
     """Seconds to wait: a number, or a date."""
-    if not value:
-        return None
-    if value.strip().isdecimal():
-        return float(value)
     try:
-        moment = email.utils.parsedate_to_datetime(value)
-    except (TypeError, ValueError):
+        return float(Retry().parse_retry_after(value or ""))
+    except (InvalidHeader, ValueError, OverflowError):
         return None
-    return max(0.0, moment.timestamp() - time.time())
 
 
 def _kind_of(error: Exception) -> str:

@@ -25,7 +25,6 @@ from geofield.imagery.vrt import check_beside, check_vrt
 USER_AGENT = f"geofield/{__version__} (farm field mapping; python-urllib3)"
 
 _OPTIONS: dict[str, Any] = {
-    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",  # no guessing of side files over HTTP
     "GDAL_HTTP_USERAGENT": USER_AGENT,
     "GDAL_HTTP_MAX_RETRY": "5",
     "GDAL_HTTP_RETRY_DELAY": "0.5",
@@ -63,13 +62,8 @@ def display_name(path: str | Path) -> str:
 @contextmanager
 def gdal_env(path: str = "", **options: Any) -> Iterator[None]:
     """GDAL options for reading and writing here; side files are listed for local paths only."""
-    remote = is_remote(path)
-    chosen = {
-        name: value
-        for name, value in _OPTIONS.items()
-        if remote or name != "GDAL_DISABLE_READDIR_ON_OPEN"
-    }
-    with rasterio.Env(**(chosen | options)):
+    beside = {"GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR"} if is_remote(path) else {}
+    with rasterio.Env(**(_OPTIONS | beside | options)):
         yield
 
 
