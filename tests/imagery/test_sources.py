@@ -848,6 +848,30 @@ def test_stac_items(tmp_path: Path) -> None:
             read_scene(file, lat=lat, lon=lon)
 
 
+def test_a_stac_file_with_nulls_is_read_and_one_out_of_order_is_told(tmp_path: Path) -> None:
+    write(tmp_path / "data.tif", ground(), photometric="RGB")
+    scene = read_scene(tmp_path / "data.tif")
+    lon, lat = scene.grid.centre_lonlat
+    asset = {"href": "data.tif", "roles": ["visual"]}
+    nulls = {"geometry": None, "properties": None, "links": None, "bbox": None}
+    odd = [
+        {"properties": {"providers": ["me"]}},
+        {"assets": {"visual": {**asset, "bands": ["red"]}}},
+        {"assets": {"visual": {"type": "image/tiff"}}},
+        {"geometry": {"type": "Polygon"}},
+    ]
+    file = tmp_path / "item.json"
+    for more in ({}, {"properties": {"providers": None, "license": None}}):
+        file.write_text(
+            json.dumps({**nulls, "assets": {"visual": {**asset, "type": None}}, **more})
+        )
+        assert np.array_equal(read_scene(file, lat=lat, lon=lon).bands, scene.bands)
+    for each in odd:
+        file.write_text(json.dumps({"assets": {"visual": asset}, **each}))
+        with pytest.raises(ImageryError, match=r"^item\.json is not as STAC has it"):
+            read_scene(file, lat=lat, lon=lon)
+
+
 def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:
     # Web Mercator pixels are finer on the ground towards the north, where the old sheet reaches.
     x, y = transformer(LONLAT, WEB_MERCATOR).transform(33.0, 35.0)

@@ -47,8 +47,22 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
     ImageryError
         No item has a picture.
     """
-    options, point = replace(options, reach=options.reach.of(path)), options.point
-    document = _document(path)
+    options = replace(options, reach=options.reach.of(path))
+    try:
+        known = _known(path, options)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ImageryError(
+            f"{path.name} is not as STAC has it: {type(error).__name__}, {error}.",
+            hint="Name its pictures themselves, or the folder that they lie in.",
+        ) from error
+    reader = open_collection(known, options, name=path.name)
+    # Of the one that is shown at the point: a finer one may be older.
+    return replace(reader, source=known[reader.path].source or reader.source)
+
+
+def _known(path: Path, options: OpenOptions) -> dict[str, OpenOptions]:
+    """The pictures of a file, and what is known of each: their bands may come in another order."""
+    document, point = _document(path), options.point
     features = document.get("features", [document])
     if point is not None:
         lon, lat = point
@@ -66,17 +80,19 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
             f"No item of {path.name} has a GeoTIFF or JPEG 2000 asset.",
             hint="Give items with assets of the role `data` or `visual`.",
         )
-    known = dict(items)  # of each its own: their bands may come in another order
-    reader = open_collection(known, options, name=path.name)
-    # Of the one that is shown at the point: a finer one may be older.
-    return replace(reader, source=known[reader.path].source or reader.source)
+    return dict(items)
 
 
 def _document(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        # What is null is as good as not there: some programs write all that there may be.
+        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_said)
     except (OSError, ValueError, RecursionError):
         return None
+
+
+def _said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in pairs if value is not None}
 
 
 def _holds(feature: Mapping[str, Any], lat: float, lon: float) -> bool:
