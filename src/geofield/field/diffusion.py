@@ -41,14 +41,11 @@ def diffuse(
     value = band.astype(np.float32)
     for _ in range(iterations):
         change = np.zeros_like(value)
-        for axis in (0, 1):
-            difference = np.diff(value, axis=axis)
+        for along, changed in ((value, change), (value.T, change.T)):
+            difference = np.diff(along, axis=0)
             flow = difference * np.exp(-np.square(difference / kappa))
-            low = [slice(None), slice(None)]
-            high = [slice(None), slice(None)]
-            low[axis], high[axis] = slice(None, -1), slice(1, None)
-            change[tuple(low)] += flow
-            change[tuple(high)] -= flow
+            changed[:-1] += flow
+            changed[1:] -= flow
         value += np.float32(_STEP) * change
     return value
 

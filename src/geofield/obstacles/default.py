@@ -92,26 +92,9 @@ def detect_by_default(
     others: bool = True,
     progress: Progress | None = None,
 ) -> Found:
-    """Run the default detector.
+    """Run the default detector; `least` is the least probability of what is returned.
 
-    Parameters
-    ----------
-    picture : Scene or PictureReader
-    area : Field or None
-        Only crowns that reach over its outer ring count, wherever their centres are.
-    radius_m : (low, high)
-    polarity : {"dark", "bright", "both"}
-        Of crowns, against the ring around each.
-    least : float
-        Least probability of what is returned.
-    others : bool
-        Whether to look for what is no tree; in a field only.
-    progress : callable, optional
-
-    Raises
-    ------
-    ObstacleError
-        For an unknown polarity.
+    The other arguments are those of :func:`geofield.obstacles.detect_obstacles`.
     """
     refuse_unknown(ObstacleError, "polarity", polarity, ("dark", "bright", "both"))
     turn = Turn.upright(picture.grid)

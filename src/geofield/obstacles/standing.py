@@ -164,8 +164,7 @@ def _outline(part: NDArray[np.bool_]) -> shapely.Polygon:
     filled = ndimage.binary_fill_holes(part).astype(np.uint8)
     rings = [
         shapely.Polygon(shape["coordinates"][0])
-        for shape, value in shapes(filled, mask=filled.astype(bool), connectivity=8)
-        if value
+        for shape, _ in shapes(filled, mask=filled.astype(bool), connectivity=8)
     ]
     largest = max(rings, key=lambda ring: ring.area)
     simple = largest.buffer(0).simplify(0.75)
