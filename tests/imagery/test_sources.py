@@ -853,8 +853,8 @@ def test_a_stac_file_with_nulls_is_read_and_one_out_of_order_is_told(tmp_path: P
     scene = read_scene(tmp_path / "data.tif")
     lon, lat = scene.grid.centre_lonlat
     asset = {"href": "data.tif", "roles": ["visual"]}
-    nulls = {"geometry": None, "properties": None, "links": None, "bbox": None}
-    odd = [
+    nulls: dict[str, Any] = {"geometry": None, "properties": None, "links": None, "bbox": None}
+    odd: list[dict[str, Any]] = [
         {"properties": {"providers": ["me"]}},
         {"assets": {"visual": {**asset, "bands": ["red"]}}},
         {"assets": {"visual": {"type": "image/tiff"}}},
