@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import geopandas as gpd
@@ -58,3 +60,15 @@ def test_commands_count_in_words_and_give_no_figure_that_is_none(tmp_path: Path)
     obstacles.loc[obstacles.index[0], "status"] = None
     obstacles.to_file(edited, layer="obstacles")
     assert "  without a status: 1\n" in run_geofield("info", edited, check=True).stdout
+
+
+def test_an_error_names_an_argument_though_no_settings_were_loaded() -> None:
+    """It spoke of "exclude_lonlat" and "clearance", which no function takes."""
+    code = (
+        "import sys, geofield as gf\n"
+        "error = gf.GeofieldError('Not --exclude-lonlat.', hint='Give a --clearance.')\n"
+        "assert 'geofield.settings' not in sys.modules\n"
+        "print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "Not exclude. Give a clearance_m.\n"

@@ -9,6 +9,7 @@ import os
 import re
 import shlex
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 
 _OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
@@ -108,6 +109,7 @@ def in_python(text: str) -> str:
 
 def _name(found: re.Match[str]) -> str:
     option, value = found.groups()
+    import_module("geofield.settings")  # which lies above this, and tells its names: see `learn`
     name = _NAMES.get(option, option.replace("-", "_"))
     if value is None:
         return name
