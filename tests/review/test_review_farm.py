@@ -170,8 +170,11 @@ def test_one_field_after_another_on_the_page(driver: webdriver.Chrome, farm: Pat
     with served(farm) as (address, process):
         page = Page(driver, address)
         first = page.state()["field_id"]
+        # The list says which field it is, and beside it stands whether it is saved.
+        assert page.run("return document.getElementById('title').className") == "spoken"
         page.press("j", "r")
         page.wait(lambda: page.judged() == 1)
+        assert page.text("unsaved") == "not saved"
         page.button("save")
         page.wait(lambda: "Saved in farm" in page.text("message"))
         page.run("document.body.dataset.ready = ''")

@@ -289,6 +289,101 @@ def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(
     assert page.text("figures").endswith(" % covered")
 
 
+def test_numbers_are_what_a_person_means_by_them(page: Page) -> None:
+    """Of 1,000 came 1, and of 0x10 came 16."""
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    for language, typed, meant in (
+        ("en", "1,000", None),
+        ("en", "0x10", None),
+        ("en", "6,125", None),
+        ("de", "6,125", 6.125),
+        ("de", ".5e1", 5),
+        ("en", "6,5", 6.5),
+        ("en", "12.125", 12.125),
+    ):
+        page.run(
+            f"const one = document.getElementById('language'); one.value = '{language}';"
+            "one.dispatchEvent(new Event('change'))"
+        )
+        after = meant or page.state()["settings"]["spacing_m"]
+        box.clear()
+        box.send_keys(typed, Keys.ENTER)
+        if meant is None:
+            page.wait(lambda typed=typed: f"above 0, not '{typed}'." in page.text("message"))
+        page.wait(lambda after=after: page.state()["settings"]["spacing_m"] == after)
+
+
+def test_an_undone_edit_is_shown_and_keys_speak_of_it(page: Page) -> None:
+    """What was undone stayed out of view, and the next key judged another obstacle."""
+
+    def chosen() -> str:
+        return str(
+            page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+        )
+
+    page.press("c")  # nothing is chosen yet: the most doubtful is shown first
+    page.wait(lambda: page.run("return document.querySelector('#list [aria-current=true]')"))
+    first = chosen()
+    assert not page.state()["can_undo"]
+    page.press("c", "r")
+    page.wait(lambda: page.judged() == 2)
+    page.chord(Keys.CONTROL, "z")
+    page.chord(Keys.CONTROL, "z")
+    page.wait(lambda: chosen() == first)
+    centre, resolution = page.view()
+    x, y = page.obstacle(int(first))["centre"]
+    assert abs(centre[0] - x) + abs(centre[1] - y) < 400 * resolution
+    page.press("r")
+    page.wait(lambda: page.obstacle(int(first))["status"] == "rejected")
+
+
+def test_a_shape_that_is_not_round_says_so_to_the_keys_of_size(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    plan = read_plan(plan_path)
+    session = Session(plan)
+    middle = plan.field.polygon.representative_point()
+    square = shapely.box(*middle.buffer(5).bounds).exterior.coords[:-1]
+    session.do({"do": "polygon", "ring": [list(place) for place in square]})
+    save_plan(session.plan, plan_path, read_from=plan_path)
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        page.run("document.querySelector('#list [data-no=\"22\"]').click()")
+        # Where a keyboard has the bracket behind Alt.
+        page.run("window.dispatchEvent(new KeyboardEvent('keydown', {key: ']', altKey: true}))")
+        page.wait(lambda: "Obstacle 22 is not round." in page.text("message"))
+
+
+def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    plan = read_plan(plan_path)
+    assert plan.obstacles is not None
+    empty = replace(
+        plan, obstacles=plan.obstacles.iloc[:0], evidence=replace(plan.evidence, written=None)
+    )
+    save_plan(Session(replace(empty, tracks=None)).plan, plan_path, read_from=plan_path)
+    size = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        with served(plan_path) as (address, _):
+            page = Page(driver, address)
+            dead = [
+                name
+                for name in ("previous", "next", "confirm", "reject")
+                if page.run(f"return document.getElementById('{name}').disabled")
+            ]
+            assert dead == ["previous", "next", "confirm", "reject"]
+            seen = driver.execute_async_script(
+                "const [done] = arguments; import('/map.js').then(({map, view, sources}) =>"
+                " done(ol.extent.containsExtent(view.calculateExtent(map.getSize()),"
+                " sources.outline.getExtent())));"
+            )
+            assert seen
+    finally:
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
     before = page.obstacle(8)
     page.run("document.querySelector('#list [data-no=\"8\"]').click()")
@@ -395,6 +490,32 @@ def test_edits_come_back_after_the_server_is_killed(
         assert page.judged() == 1
 
 
+def test_what_came_back_is_told_once_and_own_edits_are_of_no_earlier_session(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    with served(plan_path, program=[GEOFIELD]) as (address, process):
+        page = Page(driver, address)
+        page.press("j", "r")
+        page.wait(lambda: page.judged() == 1)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        assert "1 edit of a session" in page.text("message")
+        for press in ("driver.refresh", "reload"):
+            page.run("document.body.dataset.ready = ''; onbeforeunload = null")
+            if press == "reload":
+                page.button("more")
+                page.button("reload")
+            else:
+                driver.refresh()
+            with contextlib.suppress(NoAlertPresentException):
+                driver.switch_to.alert.accept()
+            page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
+            time.sleep(0.2)
+            assert (page.text("message"), page.judged()) == ("", 1), press
+
+
 def test_another_program_changed_or_locked_the_file(page: Page, plan_path: Path) -> None:
     page.press("j", "r")
     page.wait(lambda: page.judged() == 1)
@@ -431,7 +552,7 @@ def test_edits_to_be_made_by_hand_are_named_until_they_were_read(
     page.button("save")
     page.wait(lambda: "Another program" in page.text("message"))
     page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
-    page.wait(lambda: "1 ihrer 2 Änderungen" in page.text("message"))
+    page.wait(lambda: "1 Ihrer 2 Änderungen" in page.text("message"))
     assert f"von Hand: status: obstacle {first} is not there as it was." in page.text("message")
     page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
     assert page.text("message") == ""
@@ -511,8 +632,16 @@ def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:
     second.driver.switch_to.window(first)
     page.press("j", "r")
     page.wait(lambda: "another tab" in page.text("message").lower())
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    box.clear()
+    box.send_keys("7")
     taken_over(page)
     assert page.judged() == 2
+    # What was typed and not applied is still there, and goes along.
+    box = page.driver.find_element(By.NAME, "spacing_m")
+    assert box.get_attribute("value") == "7"
+    page.button("save")
+    page.wait(lambda: page.state()["settings"]["spacing_m"] == 7)
 
 
 def taken_over(page: Page) -> None:
@@ -610,6 +739,9 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     page.driver.find_element(By.CSS_SELECTOR, "#language option[value=de]").click()
     page.run("document.getElementById('menu').close()")
     assert page.text("confirm") == "Bestätigen"
+    assert page.run("return document.getElementById('redo').title") == "Vor (Strg+Umschalt+Z)"
+    lefts = "[...document.querySelectorAll('#settings [name]')].map(one => one.offsetLeft)"
+    assert len(set(page.run(f"return {lefts}"))) == 1  # one below the other
     assert page.run("return document.querySelector('[name=last_strip]').value") == "overrun"
     cut = page.run(
         "return [...document.querySelectorAll('#settings select')].filter(one => {"

@@ -550,7 +550,7 @@ def test_notes_that_are_gone_are_written_again(plan_path: Path) -> None:
     assert second.end() is None
     # What both said is no conflict.
     told = first.reload()["brought_back"]
-    assert "2 of its 2 edits were made again" in told
+    assert "2 of your 2 edits were made again" in told
     journal_path(plan_path).unlink()
     assert "lie in" in str(first.end())
     plan = Desk(plan_path).session.plan

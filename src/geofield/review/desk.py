@@ -53,11 +53,11 @@ class Desk:
         self._picture_path = picture or found or picture_beside(path)
         self._read()
 
-    def _read(self) -> None:
+    def _read(self, *, again: bool = False) -> None:
         # What cannot be read is refused before the journal forgets what is not of this file.
         seen, plan = self._read_plan()
         picture, unshown = self._opened(plan)
-        journal = Journal(self.path, plan)
+        journal = Journal(self.path, plan, is_own=again)
         if journal.begins_at != self.path:
             plan = read_plan(journal.begins_at)
         ground = None if self._picture_path is None else Ground(self._scene_of)
@@ -206,7 +206,7 @@ class Desk:
         """Read the file again; edits that were not saved are kept beside it."""
         with self.lock:
             self.refuse_loss()
-            self._read()
+            self._read(again=True)
             return self.opening()
 
     def refuse_loss(self) -> None:

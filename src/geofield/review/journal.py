@@ -50,9 +50,12 @@ def content_of(plan: Plan) -> str:
 
 
 class Journal:
-    """The edits of one session on a plan's GeoPackage, on the disk; `plan` is what that holds."""
+    """The edits of one session on a plan's GeoPackage, on the disk.
 
-    def __init__(self, plan_path: Path, plan: Plan) -> None:
+    `plan` is what that holds; `is_own` where the same session reads it again.
+    """
+
+    def __init__(self, plan_path: Path, plan: Plan, *, is_own: bool = False) -> None:
         self.plan_path = plan_path
         self.path = journal_path(plan_path)
         #: The plan as it was when the journal began; there only where that was saved over.
@@ -62,6 +65,7 @@ class Journal:
         self._kept, self._rest = b"", b""
         self._waiting: list[Mapping[str, Any]] = []
         self._plan = content_of(plan)
+        self._is_own = is_own
         self._lost: str | None = None
         #: What was noted on another version of the plan, and what stands behind a damaged line.
         self._elsewhere: list[dict[str, Any]] = []
@@ -116,7 +120,7 @@ class Journal:
                 f"Another review of this plan is open: what it did not save ({edits}) is here, "
                 "too. Go on in one of them and close the other: only one can note and save edits."
             )
-        if unsaved:
+        if unsaved and not self._is_own:
             were = "was" if unsaved == 1 else "were"
             edits = counted(unsaved, "edit")
             return f"{edits} of a session that ended without saving {were} brought back."
@@ -254,13 +258,14 @@ class Journal:
         made, lost = refit(session, self._elsewhere)
         for entry in made:
             self.write(entry)
-        since = "an earlier session ended without saving"
+        since, whose = "an earlier session ended without saving", "its"
         if self._is_shared:
             since = "another review of it, which is still open, noted its edits"
+        elif self._is_own:
+            since, whose = "it was opened here", "your"
+        edits, were = counted(len(made) + len(lost), "edit"), "was" if len(made) == 1 else "were"
         words = (
-            f"The plan was changed since {since}: {len(made)} of "
-            f"its {counted(len(made) + len(lost), 'edit')} {'was' if len(made) == 1 else 'were'} "
-            "made again."
+            f"The plan was changed since {since}: {len(made)} of {whose} {edits} {were} made again."
         )
         if not lost and self._damaged is None and self.refused is None:
             kept.unlink()

@@ -35,7 +35,7 @@ const WORDS = {
     v_none: "none", v_boustrophedon: "one by one", v_skip: "skipping some", v_shortest: "shortest",
     outline_no: "Outline {n} · {p} %", alternatives: "Other outlines", k_arrows: "Move the selected obstacle by 0.5 m (Shift: 0.1 m)",
     undone: "Undone", redone: "Redone", deleted: "deleted", k_here: "Add a circle in the middle of the map, where it has the focus",
-    k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
+    Delete: "Del", Escape: "Esc", k_delete: "Delete", k_undo: "Undo", k_redo: "Redo", k_save: "Save", k_help: "This list", k_esc: "Stop what you are doing",
   },
   de: {
     undo: "Zurück", redo: "Vor", save: "Speichern", more: "Mehr", keys: "Tasten", tools: "Werkzeuge", map: "Karte",
@@ -69,7 +69,7 @@ const WORDS = {
     v_none: "keiner", v_boustrophedon: "eine nach der anderen", v_skip: "überspringend", v_shortest: "kürzester",
     outline_no: "Umriss {n} · {p} %", alternatives: "Andere Umrisse", k_arrows: "Gewähltes Hindernis um 0,5 m verschieben (Umschalt: 0,1 m)",
     undone: "Zurückgenommen", redone: "Wiederholt", deleted: "gelöscht", k_here: "Kreis in der Mitte der Karte, wenn sie den Fokus hat",
-    k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
+    Ctrl: "Strg", Shift: "Umschalt", Delete: "Entf", k_delete: "Löschen", k_undo: "Zurück", k_redo: "Vor", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
   },
 };
 
@@ -84,6 +84,9 @@ export function t(name, values = {}) {
   const text = WORDS[language][name] ?? WORDS.en[name] ?? name;
   return text.replace(/\{(\w+)\}/g, (_, key) => values[key]);
 }
+
+// As it stands on a keyboard of the language.
+export const keyName = keys => keys.split("+").map(key => t(key)).join("+");
 
 // What the program says, where it is known in the page's language: as a whole, or its sentences.
 export function told(text) {
@@ -108,6 +111,10 @@ export const number = (value, digits = 0) =>
   value === null || value === undefined ? "–"
     : value.toLocaleString(language, {minimumFractionDigits: digits, maximumFractionDigits: digits});
 
+// A number as it is typed, with a point: of 1,000 a comma in English makes thousands, else it is what the keyboard has.
+export const plain = text =>
+  language === "en" && /^\d{1,3}(,\d{3})+$/.test(text) ? text : text.replace(/^([-+]?\d*),(\d+)$/, "$1.$2");
+
 // A track's heading, from 0.0 to 179.9: 179.97 is north, as 0 is.
 export const heading = degrees => `${number(Math.round(degrees * 10) / 10 % 180, 1)}°`;
 
@@ -116,5 +123,5 @@ export function label(root = document) {
   document.documentElement.lang = language;
   for (const node of root.querySelectorAll("[data-t]")) node.textContent = t(node.dataset.t);
   for (const node of root.querySelectorAll("[data-label]")) node.setAttribute("aria-label", t(node.dataset.label));
-  for (const node of root.querySelectorAll("button[data-key]")) node.title = `${node.textContent} (${node.dataset.key})`;
+  for (const node of root.querySelectorAll("button[data-key]")) node.title = `${node.textContent} (${keyName(node.dataset.key)})`;
 }

@@ -1,6 +1,6 @@
 // The keys that map editors and labelling tools taught people.
 
-import {t} from "./web/words.js";
+import {keyName, t} from "./web/words.js";
 
 const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
@@ -10,10 +10,11 @@ const KEYS = [
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
   ["n", "k_onward", a => a.onward()], ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
 ];
+// Where a keyboard has them behind Alt, they are brackets all the same.
+const BRACKETS = ["[", "]"];
 // Held down, these go on; a verdict that was held too long would speak of the next obstacles, too.
-const ON_AND_ON = ["j", "k", "[", "]"];
+const ON_AND_ON = ["j", "k", ...BRACKETS];
 const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
-const SHOWN = {Delete: "Del", Escape: "Esc"};
 
 export function listen(actions) {
   // Captured before the map sees them: the map pans by arrows where no obstacle is chosen.
@@ -24,7 +25,7 @@ export function listen(actions) {
     if (typing || document.querySelector("dialog[open]")) return;
     if (control && key.toLowerCase() === "z") return done(event, event.shiftKey ? actions.redo : actions.undo);
     if (control && key.toLowerCase() === "y") return done(event, actions.redo);
-    if (control || event.altKey) return;
+    if (control || (event.altKey && !BRACKETS.includes(key))) return;
     if (!document.getElementById("keys-on").checked && key !== "Escape") return;
     if (key in ARROWS) {
       if (event.target.matches?.("input[type=range]")) return;
@@ -46,12 +47,12 @@ function done(event, work) {
 }
 
 export function keyTable(table) {
-  const rows = [...KEYS.map(([key, name]) => [SHOWN[key] ?? key, name]), ["← ↑ ↓ →", "k_arrows"],
+  const rows = [...KEYS, ["← ↑ ↓ →", "k_arrows"],
     ["Ctrl+Z", "k_undo"], ["Ctrl+Shift+Z", "k_redo"], ["Ctrl+S", "k_save"]];
   table.replaceChildren(...rows.map(([key, name]) => {
     const line = document.createElement("tr"), left = document.createElement("td"), right = document.createElement("td");
     const mark = document.createElement("kbd");
-    mark.textContent = key;
+    mark.textContent = keyName(key);
     left.append(mark);
     right.textContent = t(name);
     line.append(left, right);

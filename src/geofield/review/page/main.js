@@ -5,7 +5,7 @@ import * as maps from "./map.js";
 import * as tools from "./tools.js";
 import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
-import {currentLanguage, heading, label, number, setLanguage, t, told} from "./web/words.js";
+import {currentLanguage, heading, label, number, plain, setLanguage, t, told} from "./web/words.js";
 
 const $ = id => document.getElementById(id);
 let state, chosen = null, ended = false;
@@ -36,7 +36,7 @@ function say(text, bad = false, button = null) {
 const sentences = [];
 function speak(text) {
   if (!sentences.length) setTimeout(() => { $("spoken").textContent = sentences.splice(0).join(". "); }, 60);
-  sentences.push(text);
+  if (!sentences.includes(text)) sentences.push(text);
 }
 
 const named = each => `${t("obstacle")} ${each.no}: ${t(each.status)}`;
@@ -59,8 +59,19 @@ function refused(error) {
   else say(error.status === 0 ? t("gone") : error.message, true);
 }
 
-// What the other tab did meanwhile is shown first.
-const takeOver = () => act(() => api.takeOver(), again);
+// What the other tab did meanwhile is shown first; what is typed here stays.
+const takeOver = () => act(() => api.takeOver(), () => {
+  const values = inputs().filter(input => input.value !== input.dataset.shown).map(({name, value}) => [name, value]);
+  sessionStorage.setItem("typed", JSON.stringify({plan: state.plan, values}));
+  again();
+});
+
+function typeAgain() {
+  const {plan, values} = JSON.parse(sessionStorage.getItem("typed") ?? "{}");
+  sessionStorage.removeItem("typed");
+  if (plan === state.plan) for (const [name, value] of values) $("settings").elements[name].value = value;
+}
+
 const reload = () => applied(() => act(() => api.reload(), again));
 
 function again() {
@@ -98,7 +109,10 @@ function show(answer) {
   $("undo").disabled = !state.can_undo;
   $("redo").disabled = !state.can_redo;
   $("save").disabled = !unsaved();
-  $("title").textContent = state.name + (state.edited ? ` · ${t("unsaved")}` : "");
+  $("title").textContent = state.name;
+  // The list of a farm's fields says it, too.
+  $("title").classList.toggle("spoken", state.plans.length > 1 && state.plans[state.plan].startsWith(state.name));
+  $("unsaved").textContent = state.edited ? t("unsaved") : "";
   if (state.unnoted && state.edited) say(t("unnoted", {why: state.unnoted}), true);
   document.title = `${state.edited ? "* " : ""}${state.name} – geofield`;
 }
@@ -155,7 +169,6 @@ function showList() {
   $("list").replaceChildren(...ordered().map(each => {
     const item = document.createElement("li"), press = document.createElement("button");
     press.dataset.no = each.no;
-    press.setAttribute("aria-current", String(each.no === chosen));
     const size = each.radius_m === null ? t("other") : `${number(each.radius_m, 1)} m`;
     const sure = each.confidence === null ? "" : ` · ${number(100 * each.confidence)} %`;
     const cost = each.lost_m ? ` · ${t("lost", {m: number(each.lost_m)})}` : "";
@@ -165,13 +178,20 @@ function showList() {
     return item;
   }));
   if (focused) $("list").querySelector(`[data-no="${focused}"]`)?.focus();
+  for (const name of ["previous", "next"]) $(name).disabled = !all;
+  showChosen();
+}
+
+function showChosen() {
+  for (const press of $("list").querySelectorAll("button"))
+    press.setAttribute("aria-current", String(Number(press.dataset.no) === chosen));
   $("list").querySelector('[aria-current="true"]')?.scrollIntoView({block: "nearest"});
   for (const name of ["confirm", "reject"]) $(name).disabled = chosen === null;
 }
 
 function choose(no, zoom) {
   chosen = no;
-  showList();
+  showChosen();
   maps.sources.obstacles.changed();
   maps.showHandle(no === null ? null : row(no));
   if (no === null) return;
@@ -191,19 +211,21 @@ function step(forth) {
 
 // What a person does is done one after the other: a key that is pressed before the answer to the
 // last one is there speaks of what is chosen then.
-let turn = Promise.resolve(), undone = 0;
+let turn = Promise.resolve(), undone = 0, slow;
 function inTurn(work) {
-  undone++;
-  return turn = turn.then(work).catch(refused).finally(() => undone--);
+  if (!undone++) slow = setTimeout(() => document.body.classList.add("busy"), 300);
+  return turn = turn.then(work).catch(refused).finally(() => {
+    if (--undone) return;
+    clearTimeout(slow);
+    document.body.classList.remove("busy");
+  });
 }
 
 const commit = command => inTurn(() => make(command));
 
 async function make(command) {
-  document.body.classList.toggle("busy", command.do === "ground");
   const before = state.obstacles;
   const done = await act(() => api.edit(command), show);
-  document.body.classList.remove("busy");
   if (!done) {
     show({});
     return false;
@@ -212,7 +234,16 @@ async function make(command) {
   speakOf(command, before);
   const fresh = state.obstacles.find(each => before.every(({no}) => no !== each.no));
   if (fresh) choose(fresh.no, false);
+  else if (command.do === "undo" || command.do === "redo") goBack(before);
   return true;
+}
+
+// What was undone is seen, and the next key speaks of it.
+function goBack(before) {
+  const looks = each => JSON.stringify([each.status, each.rings]);
+  const old = new Map(before.map(each => [each.no, looks(each)]));
+  const changed = state.obstacles.filter(each => old.get(each.no) !== looks(each));
+  if (changed.length === 1) choose(changed[0].no, !maps.sees(changed[0]));
 }
 
 // A refusal that no longer holds is not left standing.
@@ -222,7 +253,7 @@ function settled() {
 
 async function verdict(status) {
   const no = chosen;
-  if (no === null) return;
+  if (no === null) return step(true);  // a word is said of what is seen
   const rows = ordered().filter(waits), place = rows.findIndex(each => each.no === no);
   const following = rows[(place + 1) % rows.length]?.no;
   const done = await make({do: "status", no, status});
@@ -245,18 +276,17 @@ const nudge = (dx, dy) => chosen !== null && ifChosen(no => make({do: "move", no
 
 function resize(factor) {
   const each = row(chosen);
-  if (each && each.radius_m !== null)
-    return make({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
+  if (each) return make({do: "radius", no: chosen, radius_m: Math.max(0.3, Math.round(each.radius_m * factor * 100) / 100)});
 }
 
 const inputs = () => [...$("settings").elements].filter(input => input.name);
 
-// Settings as they are typed where they are others; 6,5 is what a comma on the keyboard says.
+// Settings as they are typed where they are others.
 function typed() {
   const given = {};
   for (const {name, value} of inputs()) {
-    const text = value.trim().replace(/^([-+]?\d+),(\d+)$/, "$1.$2"), before = state.settings[name];
-    const meant = typeof before === "number" && text && Number.isFinite(Number(text)) ? Number(text) : text;
+    const before = state.settings[name], text = plain(value.trim());
+    const meant = typeof before === "number" && /^[-+]?(\d+\.?\d*|\.\d+)$/.test(text) ? Number(text) : text;
     if (String(meant) !== String(before)) given[name] = meant;
   }
   return given;
@@ -326,7 +356,6 @@ async function start() {
   show(state);
   // On a telephone it would lie below the list, unseen.
   if ($("doubts").hasChildNodes()) $("panel").prepend($("outline-h").parentElement);
-  maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
   tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, explain: word => say(t(word)), scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
@@ -366,10 +395,25 @@ async function start() {
     $("place").textContent = `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
   });
   window.addEventListener("beforeunload", event => { if ((unsaved() || undone) && !ended) event.preventDefault(); });
+  // When all around the map has its size.
+  maps.map.updateSize();
+  maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
+  typeAgain();
+  $("save").disabled = !unsaved();
   if (!state.yours) say(t("second"), true, {text: t("take"), act: takeOver});
-  // What names the file of edits that were not made again stays until it was read.
-  else if (state.brought_back) say(told(state.brought_back), false, /\.jsonl\.\d/.test(state.brought_back) ? {text: t("close"), act: () => say("")} : null);
+  else tellWhatCameBack();
   document.body.dataset.ready = "yes";
+}
+
+// Once, however often the page is loaded again; what names the file of edits that were not made again
+// stays until it was read.
+function tellWhatCameBack() {
+  const words = state.brought_back, heard = `told ${state.stamp.split(".")[0]}`;
+  if (!words || sessionStorage.getItem(heard)) return;
+  const note = () => sessionStorage.setItem(heard, "yes");
+  const stays = /\.jsonl\.\d/.test(words);
+  if (!stays) note();
+  say(told(words), false, stays ? {text: t("close"), act: () => { note(); say(""); }} : null);
 }
 
 start().catch(refused);

@@ -43,7 +43,7 @@ export function build(state, chosen) {
   ol.proj.addProjection(projection);
   projection.getMetersPerUnit = () => state.scale;
   projection.setGetPointResolution(resolution => resolution);
-  view.fit(sources.outline.getFeatures().length ? sources.outline.getExtent() : state.bounds, {padding: [30, 30, 30, 30]});
+  view.fit(state.bounds);
 }
 
 function grown([left, bottom, right, top], share) {
@@ -135,6 +135,8 @@ export function obstacleAt(pixel) {
   }, {layerFilter: layer => layer.getSource() === sources.obstacles, hitTolerance: 6});
   return best?.no ?? null;
 }
+
+export const sees = row => ol.extent.containsCoordinate(view.calculateExtent(map.getSize()), row.centre);
 
 export function zoomTo(row) {
   // Below a hand that drags, the map stands still: what is dragged would go with it.
