@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import tempfile
 from pathlib import Path
@@ -127,6 +128,9 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
                 values = self._placed(values, context)
                 words, environment = self.words(values, context, feedback, folder)
                 rows = self.rows()
+                # What the dialogue shows holds: no variable says otherwise behind it.
+                unsaid = {parameters.variable_name(row): None for row in rows if "setting" in row}
+                environment = {**unsaid, **environment}
                 variables = parameters.without_option(
                     self.command, description.parameters(self.command)
                 )
@@ -135,6 +139,10 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
                         environment |= parameters.variable(row, self, values, context)
                     else:
                         words += parameters.words(row, self, values, context)
+                passed_over = Path("geofield.toml").absolute()
+                if os.devnull in words and passed_over.is_file():
+                    told = tr("{0} does not count here unless it is named as settings file.")
+                    feedback.pushInfo(told.format(passed_over))
                 feedback.pushCommandInfo(shlex.join(["geofield", self.command, *words]))
                 result = engine.run(
                     [self.command, *words],

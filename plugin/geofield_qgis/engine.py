@@ -136,8 +136,11 @@ def answer_of(command: str, words: list[str], wait_ms: int = 60_000) -> list[str
     return answer if process.exitCode() == 0 else []
 
 
-def clean_environment(extra: dict[str, str] | None = None) -> QProcessEnvironment:
-    """The environment of a command: the person's own, without what belongs to QGIS."""
+def clean_environment(extra: dict[str, str | None] | None = None) -> QProcessEnvironment:
+    """The environment of a command: the person's own, without what belongs to QGIS.
+
+    An `extra` variable that is None is left out.
+    """
     environment = QProcessEnvironment()
     for name, value in os.environ.items():
         if not name.upper().startswith(_QGIS_OWN):
@@ -145,7 +148,10 @@ def clean_environment(extra: dict[str, str] | None = None) -> QProcessEnvironmen
     environment.insert("PYTHONUTF8", "1")
     environment.insert("PYTHONNOUSERSITE", "1")
     for name, value in (extra or {}).items():
-        environment.insert(name, value)
+        if value is None:
+            environment.remove(name)
+        else:
+            environment.insert(name, value)
     return environment
 
 
@@ -155,7 +161,7 @@ def run(
     is_cancelled: Callable[[], bool] = lambda: False,
     on_progress: Callable[[int, int, str], None] = lambda done, total, what: None,
     on_line: Callable[[str], None] = lambda line: None,
-    environment: dict[str, str] | None = None,
+    environment: dict[str, str | None] | None = None,
     fine: tuple[int, ...] = (0,),
 ) -> Result:
     """Run a command to its end, in any thread.
@@ -171,7 +177,7 @@ def run(
     on_line
         Called with what the command says for a person.
     environment : mapping, optional
-        Further variables.
+        Further variables; None for one that does not count.
     fine : tuple of int
         Exit codes that are no failure.
 

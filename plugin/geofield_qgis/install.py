@@ -101,9 +101,11 @@ class Installer(QObject):
             )
             return
         # An environment knows its own path, so it is made in its place; the old one waits.
-        shutil.rmtree(self._before, ignore_errors=True)
         self._target.parent.mkdir(parents=True, exist_ok=True)
         try:
+            # One that still waits is the last whole one: QGIS was ended while it installed.
+            if self._before.exists():
+                self._put_back()
             if self._target.exists():
                 self._target.rename(self._before)
         except OSError:  # Windows moves nothing that runs
@@ -173,8 +175,3 @@ class Installer(QObject):
 def _version(command: str) -> tuple[int, ...]:
     asked = ["-c", "import sys, venv; print(*sys.version_info[:2])"]
     return tuple(int(each) for each in engine.answer_of(command, asked, wait_ms=20_000))
-
-
-def remove() -> None:
-    """Take the plugin's own environment away."""
-    shutil.rmtree(engine.own_environment(), ignore_errors=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from typing import Any
 
 from qgis.core import (
@@ -65,7 +66,11 @@ def definitions(row: dict[str, Any]) -> list[QgsProcessingParameterDefinition]:
     """The parameters that ask for one value of the command line; an A-B line takes two."""
     made = [_definition(name, label, row) for name, label in _asked(row)]
     for each in made:
-        each.setHelp(tr(row["description"]))
+        each.setHelp(
+            tr("TOML file with a table per stage, for what this form leaves at its default.")
+            if row["name"] == "settings_file"
+            else tr(row["description"])
+        )
         if row.get("setting", row["name"]) not in USUAL:
             each.setFlags(each.flags() | compat.ADVANCED)
     return made
@@ -77,7 +82,8 @@ def words(
     """A value as words of the command line; none when it was not given or is the default."""
     text = as_text(row, algorithm, values, context)
     if text is None:
-        return []
+        # A geofield.toml in the folder that QGIS happens to run in is in no dialogue.
+        return [row["option"], os.devnull] if row["name"] == "settings_file" else []
     if row["type"] == "flag":
         return [row["option"]] if text == ["true"] else [row["off"]]
     if row.get("multiple"):
@@ -146,9 +152,13 @@ def variable(
     text = as_text(row, algorithm, values, context)
     if text is None:
         return {}
-    section, name = row["setting"].split(".")
     several = row.get("multiple") or row["type"] == "numbers"
-    return {f"GEOFIELD_{section}__{name}".upper(): json.dumps(text) if several else text[0]}
+    return {variable_name(row): json.dumps(text) if several else text[0]}
+
+
+def variable_name(row: dict[str, Any]) -> str:
+    """The variable that says a setting: GEOFIELD_TRACKS__SPACING_M."""
+    return f"GEOFIELD_{row['setting']}".replace(".", "__").upper()
 
 
 def _kind(row: dict[str, Any]) -> str:

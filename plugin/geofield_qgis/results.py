@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import (
+    QgsLayerTreeGroup,
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingLayerPostProcessorInterface,
@@ -18,6 +19,8 @@ from qgis.PyQt.QtXml import QDomDocument
 
 #: Kept alive until QGIS has shown the layers: it holds no reference of its own.
 _WAITING: list[Placing] = []
+#: Property of a group: the plan whose layers it holds.
+_PLAN = "geofield/plan"
 
 
 class Entry:
@@ -71,9 +74,9 @@ def entries(plan: str | Path) -> tuple[str, list[Entry]]:
 class Placing(QgsProcessingLayerPostProcessorInterface):
     """Puts a layer that Processing loaded into the group of its plan, at its place."""
 
-    def __init__(self, group: str, place: int, shown: bool) -> None:
+    def __init__(self, plan: Path, title: str, place: int, shown: bool) -> None:
         super().__init__()
-        self.group, self.place, self.shown = group, place, shown
+        self.plan, self.title, self.place, self.shown = plan, title, place, shown
 
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: Any
@@ -82,17 +85,28 @@ class Placing(QgsProcessingLayerPostProcessorInterface):
         if isinstance(layer, QgsVectorLayer):
             # Processing loads layers bare; the style lies in the file.
             layer.loadDefaultStyle()
-        project = context.project() or QgsProject.instance()
-        place_layer(project, layer, self.group, self.place, self.shown)
+        group = group_of(context.project() or QgsProject.instance(), self.plan, self.title)
+        place_layer(layer, group, self.place, self.shown)
 
 
-def place_layer(
-    project: QgsProject, layer: QgsMapLayer, group_name: str, place: int, shown: bool
-) -> None:
+def group_of(project: QgsProject, plan: Path, title: str) -> QgsLayerTreeGroup:
+    """The group of a plan, made where there is none; another plan of the same field has its own."""
+    root, path = project.layerTreeRoot(), str(settled(plan))
+    for group in root.findGroups(True):
+        if group.customProperty(_PLAN) == path:
+            return group
+    taken = root.findGroup(title) is not None
+    group = root.insertGroup(0, f"{title} ({plan.parent.name}/{plan.stem})" if taken else title)
+    group.setCustomProperty(_PLAN, path)
+    return group
+
+
+def place_layer(layer: QgsMapLayer, group: QgsLayerTreeGroup, place: int, shown: bool) -> None:
     """Put a layer into a group; a lower place is nearer to the top."""
-    root = project.layerTreeRoot()
-    group = root.findGroup(group_name) or root.insertGroup(0, group_name)
     layer.setCustomProperty("geofield/place", place)
+    root = group
+    while root.parent() is not None:
+        root = root.parent()
     old = root.findLayer(layer.id())
     index = sum(
         1
@@ -110,13 +124,13 @@ def place_layer(
 
 def load_on_completion(plan: str | Path, context: QgsProcessingContext) -> None:
     """Have Processing load the layers of a plan when the algorithm has ended."""
-    group, found = entries(plan)
+    title, found = entries(plan)
     project = context.project()
     if project is None:
         return
     for place, entry in reversed(list(enumerate(found))):
         details = QgsProcessingContext.LayerDetails(entry.name, project, entry.name)
-        placing = Placing(group, place, entry.shown)
+        placing = Placing(Path(plan), title, place, entry.shown)
         _WAITING.append(placing)
         del _WAITING[:-200]
         details.setPostProcessor(placing)
@@ -132,7 +146,7 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
         The layers by their names in the file (`field`, `obstacles`, ...).
     """
     project = project or QgsProject.instance()
-    group_name, found = entries(plan)
+    title, found = entries(plan)
     shown: dict[str, QgsMapLayer] = {}
     known = {layer.source(): layer for layer in project.mapLayers().values()}
     for place, entry in enumerate(found):
@@ -140,7 +154,7 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
         if layer is None:
             layer = entry.open()
             project.addMapLayer(layer, False)
-            place_layer(project, layer, group_name, place, entry.shown)
+            place_layer(layer, group_of(project, Path(plan), title), place, entry.shown)
         else:
             layer.reload()
         _, _, name = entry.source.rpartition("layername=")

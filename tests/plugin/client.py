@@ -255,7 +255,7 @@ def web_layers(addresses):
     return made
 
 
-def install(requirements, wheels):
+def install(requirements, wheels, killed_before):
     """The installer at work, with requirements of the test's own."""
     from geofield_qgis import engine
     from geofield_qgis import install as own
@@ -269,7 +269,10 @@ def install(requirements, wheels):
         settings.setValue(f"proxy/{name}", value)
     told = {"network": own.network(settings), "consent": own.consent_text()}
     settings.setValue("proxy/proxyEnabled", False)
-    for wheel in wheels:
+    for number, wheel in enumerate(wheels):
+        if number == killed_before:  # QGIS, in the middle of another installation
+            engine.own_environment().rename(engine.own_environment().with_name("engine.before"))
+            engine.own_environment().mkdir()
         installer, ends = own.Installer(wheel), []
         installer.failed.connect(ends.append)
         installer.done.connect(lambda ends=ends: ends.append("done"))
@@ -293,7 +296,7 @@ def install(requirements, wheels):
     installer.start()
     own.Path.rename = rename
     found = engine.find_engine()
-    own.remove()
+    own.shutil.rmtree(engine.own_environment())
     return {**told, "found": found, "in_use": in_use}
 
 

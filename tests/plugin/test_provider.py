@@ -15,6 +15,7 @@ import pytest
 from plugin_place import PLUGINS, POINT, ROOT, SAMPLE
 
 from geofield.formats import read_dataset
+from geofield.plan import read_plan
 
 sys.path.insert(0, str(PLUGINS))
 import describe
@@ -32,6 +33,18 @@ def same_tables(one, other, layers):
 def sample_plan(tmp_path):
     """A copy: QGIS alters a GeoPackage when it opens it."""
     return shutil.copy(ROOT / "sample_data" / "field_1.gpkg", tmp_path / "sample.gpkg")
+
+
+@pytest.fixture(scope="module")
+def qgis_process(qgis_environment):
+    """The environment of a `qgis_process` that has the plugin."""
+    subprocess.run(
+        ["/usr/bin/qgis_process.bin", "plugins", "enable", "geofield_qgis"],
+        env=qgis_environment,
+        capture_output=True,
+        check=False,  # enabled already is an error
+    )
+    return qgis_environment
 
 
 @pytest.fixture(scope="module")
@@ -82,13 +95,7 @@ def test_algorithms_have_all_that_a_dialogue_shows(known):
     assert parameters["SPACING_M"][2] == "Distance between tracks, metres."
 
 
-def test_plan_by_qgis_process(qgis_environment, plan, tmp_path):
-    subprocess.run(
-        ["/usr/bin/qgis_process.bin", "plugins", "enable", "geofield_qgis"],
-        env=qgis_environment,
-        capture_output=True,
-        check=False,  # enabled already is an error
-    )
+def test_plan_by_qgis_process(qgis_process, plan, tmp_path):
     out = tmp_path / "Ergebnis für Anna" / "out"  # a space and an umlaut
     begun = time.monotonic()
     done = subprocess.run(
@@ -96,7 +103,7 @@ def test_plan_by_qgis_process(qgis_environment, plan, tmp_path):
             "/usr/bin/qgis_process.bin", "--json", "run", "geofield:plan", f"--IMAGERY={SAMPLE}",
             f"--POINT={POINT}", "--SPACING_M=4", "--BUFFER_M=1.5", f"--OUTPUT={out}",
         ],
-        env=qgis_environment,
+        env=qgis_process,
         capture_output=True,
         text=True,
         check=False,
@@ -106,6 +113,28 @@ def test_plan_by_qgis_process(qgis_environment, plan, tmp_path):
     results = json.loads(done.stdout[done.stdout.index("{") :])["results"]
     assert results["TRACKS"] == f"{out}/field.gpkg|layername=tracks"
     same_tables(plan / "field.gpkg", out / "field.gpkg", ["field", "obstacles", "segments"])
+
+
+def test_what_the_dialogue_shows_holds(qgis_process, sample_plan, tmp_path):
+    """A geofield.toml in QGIS's working folder and variables won where a default was shown."""
+    (tmp_path / "geofield.toml").write_text("[tracks]\nspacing_m = 9\n")
+    spacings_m, said = [], []
+    for more in ([], [f"--SETTINGS_FILE={tmp_path}/geofield.toml"]):
+        out = tmp_path / f"out{len(more)}"
+        done = subprocess.run(
+            ["/usr/bin/qgis_process.bin", "run", "geofield:tracks",
+             f"--INPUT={sample_plan}|layername=field", f"--OUTPUT={out}", *more],
+            env={**qgis_process, "GEOFIELD_TRACKS__HEADLAND_M": "7"},
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr[-2000:]
+        (made,) = out.glob("*.gpkg")
+        tracks = read_plan(made).settings.tracks
+        spacings_m.append((tracks.spacing_m, tracks.headland_m))
+        said.append("does not count here" in done.stdout)
+    # A file that the dialogue names does.
+    assert spacings_m == [(2.0, 0.0), (9.0, 0.0)]
+    assert said == [True, False]
 
 
 def test_stages_give_what_the_command_line_gives(qgis, plan, geofield, sample_plan, tmp_path):
@@ -302,16 +331,19 @@ def test_in_a_model(qgis, plan, tmp_path):
 
 
 def test_layers_come_styled_in_their_group(qgis, sample_plan, tmp_path):
-    answer = qgis(
-        "loaded",
-        algorithm="geofield:tracks",
-        values={
-            "INPUT": f"{sample_plan}|layername=field",
-            "SPACING_M": 4,
-            "OUTPUT": str(tmp_path / "out"),
-        },
-    )
-    (layers,) = answer["groups"].values()
+    values = {"INPUT": f"{sample_plan}|layername=field", "SPACING_M": 4}
+    answer, both = qgis(
+        "several",
+        requests=[
+            {"do": "loaded", "algorithm": "geofield:tracks",
+             "values": {**values, "OUTPUT": str(tmp_path / out)}}
+            for out in ("out", "again")
+        ],
+    )  # fmt: skip
+    # Another plan of the same field has a group of its own.
+    (title, layers), (more, again) = sorted(both["groups"].items())
+    assert (more, again) == (f"{title} (again/sample)", layers)
+    ((_, layers),) = answer["groups"].items()
     names = [name for name, _, _ in layers]
     assert names.index("Obstacles") < names.index("Tracks") < names.index("Field")
     assert {kind for name, _, kind in layers if name != "Picture"} == {"QgsRuleBasedRenderer"}

@@ -54,6 +54,11 @@
       <translation>Plan (GeoPackage)</translation>
     </message>
     <message>
+      <location filename="algorithm.py" />
+      <source>{0} does not count here unless it is named as settings file.</source>
+      <translation>{0} zählt hier nicht, außer als Einstellungsdatei genannt.</translation>
+    </message>
+    <message>
       <location filename="algorithms.py" />
       <source>Plan a field</source>
       <translation>Ein Feld planen</translation>
@@ -402,6 +407,11 @@
       <location filename="jobs.py" />
       <source>The engine ended unexpectedly; the next edit starts it again.</source>
       <translation>Das Rechenprogramm endete unerwartet; die nächste Änderung startet es wieder.</translation>
+    </message>
+    <message>
+      <location filename="parameters.py" />
+      <source>TOML file with a table per stage, for what this form leaves at its default.</source>
+      <translation>TOML-Datei mit einer Tabelle je Schritt, für alles, was hier auf der Vorgabe steht.</translation>
     </message>
     <message>
       <location filename="planner.py" />
