@@ -13,7 +13,7 @@ from qgis.core import (
     QgsVectorLayer,
     QgsWkbTypes,
 )
-from qgis.PyQt.QtCore import Qt, QTimer
+from qgis.PyQt.QtCore import QEvent, Qt, QTimer
 from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import (
     QDockWidget,
@@ -39,6 +39,8 @@ _PAUSE_MS = 60
 #: How much of the map around an obstacle is shown, in its own diameters.
 _AROUND = 7.0
 _STEP_M = 0.25
+#: Buttons that need no obstacle.
+_OF_PLAN = ("draw", "save")
 
 
 class ReviewDock(QDockWidget):
@@ -110,8 +112,25 @@ class ReviewDock(QDockWidget):
                 shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
                 shortcut.activated.connect(action)
                 self._shortcuts.append(shortcut)
+            place.installEventFilter(self)
         self.visibilityChanged.connect(self._enable_keys)
         self._enable_keys(False)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:
+        """A key that QGIS has a shortcut for as well is the panel's here.
+
+        Qt does nothing where two shortcuts have one key; in German QGIS has J, R and U.
+        """
+        kinds = QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress
+        if event.type() in kinds and self.isVisible() and self._ready:
+            held = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+            for key, action in self._actions.values():
+                if held == Qt.KeyboardModifier.NoModifier and event.text().upper() == key:
+                    event.accept()
+                    if event.type() == QEvent.Type.KeyPress:
+                        action()
+                    return True
+        return super().eventFilter(watched, event)
 
     def _enable_keys(self, _: bool = True) -> None:
         for shortcut in self._shortcuts:
@@ -124,8 +143,13 @@ class ReviewDock(QDockWidget):
 
     def _tell(self) -> None:
         """What the panel says of the plan as it is now."""
+        layer = self.review.layer if self._ready else None
         for name, button in self.buttons.items():
-            button.setEnabled(self._ready or (name == "open" and self._released is None))
+            button.setEnabled(layer is not None and (name in _OF_PLAN or self.current is not None))
+        self.buttons["open"].setEnabled(self._released is None)
+        self.buttons["undo"].setEnabled(layer is not None and layer.undoStack().canUndo())
+        unsaved = layer is not None and layer.isModified()
+        self.setWindowTitle(tr("Review of a field") + (" *" if unsaved else ""))
         self.labels.tell(
             None if self.review is None else self.review.layer, self.path, self.current
         )
@@ -185,6 +209,7 @@ class ReviewDock(QDockWidget):
         """Leave nothing in the window."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._layers_go)
         self.close_review()
+        self.canvas.removeEventFilter(self)
         self.live.close()
         for shortcut in self._shortcuts:
             shortcut.deleteLater()
@@ -249,9 +274,12 @@ class ReviewDock(QDockWidget):
 
     def undo(self) -> None:
         """Take the last edit back; it is the layer's own undo."""
-        if self.review is not None:
-            self.review.undo()
-            self._show_mark()
+        if self.review is None:
+            return
+        changed = self.review.undo()
+        if len(changed) == 1:  # seen, and what the next key speaks of
+            self._go(changed[0])
+        self._show_mark()
 
     def save(self) -> None:
         """Save the edits into the plan's file; the tracks in it follow."""

@@ -26,7 +26,7 @@ from qgis.PyQt.QtWidgets import QProgressBar, QPushButton
 from . import description, engine, plan_files, results, sources
 from .jobs import Awake, Job
 from .map_tools import band
-from .words import tr
+from .words import number, tr
 
 LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
 #: Distance between the tracks that a click plans, metres.
@@ -196,9 +196,9 @@ class Planner(QObject):
                 each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
             (row,) = result.data["fields"]
             self._say(
-                tr(
-                    "{0} tracks, {1:.1f} km. Shift+click adds ground, Alt+click takes it away."
-                ).format(row["track_count"], row["length_m"] / 1000),
+                tr("{0} tracks, {1} km. Shift+click adds ground, Alt+click takes it away.").format(
+                    row["track_count"], number(row["length_m"] / 1000, 1)
+                ),
                 good=True,
             )
             self.finished.emit(target)

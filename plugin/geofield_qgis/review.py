@@ -110,9 +110,18 @@ class Review:
         with self._step(tr("Draw obstacle")):
             self.layer.addFeature(feature)
 
-    def undo(self) -> None:
-        """Take the last edit back."""
+    def undo(self) -> list[int]:
+        """Take the last edit back; the ids of the obstacles that are otherwise now."""
+        before = self._looks()
         self.layer.undoStack().undo()
+        return [each for each, look in self._looks().items() if before.get(each) != look]
+
+    def _looks(self) -> dict[int, tuple[Any, bytes]]:
+        """Status and shape of each obstacle, by its id."""
+        return {
+            each.id(): (value(each, "status"), bytes(each.geometry().asWkb()))
+            for each in self.layer.getFeatures()
+        }
 
     @contextmanager
     def _step(self, name: str) -> Iterator[None]:

@@ -11,7 +11,7 @@ from qgis.PyQt.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from . import plan_files
 from .review import OPEN, counts, value
-from .words import tr
+from .words import number, tr
 
 
 class ReviewLabels(QWidget):
@@ -56,9 +56,9 @@ class ReviewLabels(QWidget):
             return
         radius_m, confidence = value(feature, "radius_m"), value(feature, "confidence")
         parts = [tr("Obstacle {0}").format(value(feature, "obstacle_no", tr("new")))]
-        parts.append(str(value(feature, "status", "added")))
+        parts.append(_said(value(feature, "status", "added")))
         if radius_m:
-            parts.append(tr("radius {0:.2f} m").format(radius_m))
+            parts.append(tr("radius {0} m").format(number(radius_m, 2)))
         if confidence is not None:
             parts.append(tr("confidence {0:.0%}").format(confidence))
         self.here.setText(", ".join(parts))
@@ -71,7 +71,7 @@ class ReviewLabels(QWidget):
             self.title.setText(path)
             self._show_doubts([])
             return
-        text = f"{value(row, 'name', '')}, {value(row, 'area_ha', 0.0):.2f} ha"
+        text = f"{value(row, 'name', '')}, {number(value(row, 'area_ha', 0.0), 2)} ha"
         certainty = value(row, "certainty")
         if certainty is not None:
             text += tr(", outline {0:.0%} certain").format(certainty)
@@ -82,8 +82,8 @@ class ReviewLabels(QWidget):
     def tell_figures(self, answer: Mapping[str, Any]) -> None:
         """Tell of tracks that the engine planned."""
         figures = answer["figures"]
-        text = tr("{0} tracks in {1} segments, {2:.2f} km").format(
-            figures["tracks"], figures["segments"], figures["length_m"] / 1000
+        text = tr("{0} tracks in {1} segments, {2} km").format(
+            figures["tracks"], figures["segments"], number(figures["length_m"] / 1000, 2)
         )
         self.figures.setText("\n".join([text, *answer.get("notes", [])]))
         self._obstacle_doubts = answer.get("doubts", [])
@@ -91,3 +91,15 @@ class ReviewLabels(QWidget):
     def _show_doubts(self, doubts: list[str]) -> None:
         self.doubts.setText("\n".join(doubts))
         self.doubts.setVisible(bool(doubts))
+
+
+def _said(status: str) -> str:
+    """A status in words."""
+    words = {
+        "detected": tr("detected"),
+        "possible": tr("possible: not driven around"),
+        "confirmed": tr("confirmed"),
+        "rejected": tr("rejected"),
+        "added": tr("added by hand"),
+    }
+    return words.get(status, status)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qgis.PyQt.QtCore import QCoreApplication, QTranslator
+from qgis.PyQt.QtCore import QCoreApplication, QLocale, QTranslator
 from qgis.PyQt.QtXml import QDomDocument
 
 CONTEXT = "geofield"
@@ -18,6 +18,11 @@ FOLDER = Path(__file__).with_name("i18n")
 def tr(text: str) -> str:
     """A text in the language of QGIS."""
     return QCoreApplication.translate(CONTEXT, text)
+
+
+def number(value: float, digits: int) -> str:
+    """A number as it is written in the language of QGIS."""
+    return QLocale().toString(float(value), "f", digits)
 
 
 class Words(QTranslator):
@@ -50,6 +55,9 @@ class Words(QTranslator):
 
     def translate(
         self, context: str, text: str, disambiguation: str | None = None, number: int = -1
-    ) -> str:
-        """The translation of a text; nothing for what is not the plugin's."""
-        return self.words.get(text, "") if context == CONTEXT else ""
+    ) -> str | None:
+        """The translation of a text; None for what is not the plugin's.
+
+        An empty text would be taken for the translation: QGIS's own words were blank.
+        """
+        return self.words.get(text) if context == CONTEXT else None

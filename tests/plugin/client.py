@@ -240,6 +240,7 @@ def spoken(language):
         "plan": PlanAlgorithm().displayName(),
         "group": tracks.group(),
         "label": tracks.parameterDefinition("SPACING_M").description(),
+        "theirs": QCoreApplication.translate("QgsProcessingParameters", "%1 [optional]"),
     }
 
 

@@ -19,7 +19,7 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtTest import QTest
-from qgis.PyQt.QtWidgets import QApplication
+from qgis.PyQt.QtWidgets import QAction, QApplication
 from qgis.utils import iface, plugins, reloadPlugin
 
 
@@ -90,7 +90,10 @@ def work():
     until(dock.labels.figures.text, 200, "figures")
     screenshot("planned")
 
-    # Review by keys.
+    # Review by keys; as in German, QGIS has one of them, too.
+    theirs = QAction(window)
+    theirs.setShortcut("R")
+    window.addAction(theirs)
     layer = dock.review.layer
     before = statuses(layer)
     ANSWER["before"], ANSWER["count_before"] = before, dock.labels.count.text()
@@ -108,12 +111,14 @@ def work():
     dock._show_tracks = hear
     until(lambda: dock.preview.is_shown, 100, "preview")
     edited = time.monotonic()
+    ANSWER["third"] = layer.getFeature(dock.current)["obstacle_no"]
     key(Qt.Key.Key_R)
     until(lambda: answered, 100, "second preview")
     ANSWER["replan_s"] = answered[-1] - edited
     ANSWER["decided"] = {first: statuses(layer)[first], second: statuses(layer)[second]}
     key(Qt.Key.Key_U)
     after = statuses(layer)
+    ANSWER["undone"] = [layer.getFeature(dock.current)["obstacle_no"], dock.windowTitle()]
     ANSWER["changed"] = sorted(no for no in before if before[no] != after[no])
     ANSWER["undo_steps"] = layer.undoStack().count()
     dock.step(1)

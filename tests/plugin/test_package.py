@@ -135,4 +135,5 @@ def test_german_is_spoken(qgis):
         "plan": "Ein Feld planen",
         "group": "Schritt für Schritt",
         "label": "Spurabstand (m)",
+        "theirs": "%1 [optional]",  # QGIS's own words: they were blank in every dialogue
     }

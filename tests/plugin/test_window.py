@@ -107,6 +107,8 @@ def test_keys_confirm_reject_and_undo(seen):
     # The third decision was undone by the layer's own undo.
     assert seen["changed"] == sorted(int(number) for number in seen["decided"])
     assert seen["undo_steps"] == 3
+    # It is shown again, and the title says that something is not saved.
+    assert seen["undone"] == [seen["third"], "Review of a field *"]
     assert seen["replan_s"] < 15.0  # one on a machine that has nothing else to do
 
 

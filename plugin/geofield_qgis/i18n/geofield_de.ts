@@ -445,8 +445,8 @@
     </message>
     <message>
       <location filename="planner.py" />
-      <source>{0} tracks, {1:.1f} km. Shift+click adds ground, Alt+click takes it away.</source>
-      <translation>{0} Spuren, {1:.1f} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
+      <source>{0} tracks, {1} km. Shift+click adds ground, Alt+click takes it away.</source>
+      <translation>{0} Spuren, {1} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
     </message>
     <message>
       <location filename="review.py" />
@@ -470,6 +470,31 @@
     </message>
     <message>
       <location filename="review_labels.py" />
+      <source>detected</source>
+      <translation>gefunden</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>possible: not driven around</source>
+      <translation>möglich: wird nicht umfahren</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>confirmed</source>
+      <translation>bestätigt</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>rejected</source>
+      <translation>verworfen</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
+      <source>added by hand</source>
+      <translation>von Hand</translation>
+    </message>
+    <message>
+      <location filename="review_labels.py" />
       <source>{0} confirmed</source>
       <translation>{0} bestätigt</translation>
     </message>
@@ -490,8 +515,8 @@
     </message>
     <message>
       <location filename="review_labels.py" />
-      <source>{0} tracks in {1} segments, {2:.2f} km</source>
-      <translation>{0} Spuren in {1} Abschnitten, {2:.2f} km</translation>
+      <source>{0} tracks in {1} segments, {2} km</source>
+      <translation>{0} Spuren in {1} Abschnitten, {2} km</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
@@ -515,8 +540,8 @@
     </message>
     <message>
       <location filename="review_labels.py" />
-      <source>radius {0:.2f} m</source>
-      <translation>Radius {0:.2f} m</translation>
+      <source>radius {0} m</source>
+      <translation>Radius {0} m</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
