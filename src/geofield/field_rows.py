@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 import shapely
 
@@ -63,7 +64,7 @@ def _own(values: pd.Series[Any]) -> Any:
     """A value of the user's own; a missing one is of its column's type, and equal to itself."""
     value = values.iloc[0]
     if not values.isna().iloc[0]:
-        return value
+        return value.tolist() if isinstance(value, np.ndarray) else value
     return math.nan if values.dtype.kind in "iuf" else pd.NaT if values.dtype.kind == "M" else None
 
 

@@ -111,6 +111,14 @@ def test_the_users_columns_stand_beside_each_other(plans: list[gf.Plan]) -> None
     assert fields.loc["north/2", "yield_t"] == 7.25
 
 
+def test_a_list_may_stand_in_a_column_of_ones_own(tmp_path: Path) -> None:
+    field = gf.Field(
+        shapely.box(500_000, 5e6, 500_200, 5_000_100), 32632, own=(("crops", ["a", "b"]),)
+    )
+    Farm([gf.Plan(field)]).write(tmp_path / "farm")
+    assert read_farm(tmp_path / "farm")[field.field_id].field == field
+
+
 def test_ids_that_come_twice_are_refused(plans: list[gf.Plan]) -> None:
     with pytest.raises(FormatError, match="Süd 1"):
         Farm([plans[0], plans[0]])

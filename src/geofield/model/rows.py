@@ -105,7 +105,9 @@ class Rows:
             values = self._frame[name].tolist()
         if values is None:
             return [None] * len(self)
-        return [None if pd.isna(value) else value for value in values]
+        # Of a list `isna` asks each part.
+        scalar = pd.api.types.is_scalar
+        return [None if scalar(value) and pd.isna(value) else value for value in values]
 
 
 class _Table:
