@@ -119,9 +119,19 @@ def test_every_edit_survives_every_stage(
     assert (field["name"], field["crop"], field["soil"]) == ("Long meadow", "rye", 41)
 
 
-def test_only_edited_rows_are_a_persons_word(folder: Path, made: SimulatedField) -> None:
+def there_and_back(table: Frame) -> Frame:
+    """As the layer is after it was saved in a CRS for all of Europe and then in its own again."""
+    return table.to_crs("EPSG:3035").to_crs(table.crs)
+
+
+@pytest.mark.parametrize("arrange", [rearranged, there_and_back])
+def test_only_edited_rows_are_a_persons_word(
+    folder: Path, made: SimulatedField, arrange: Callable[[Frame], Frame]
+) -> None:
     before = plan_in(folder)
-    rewritten(folder / "out/field.gpkg", "obstacles", rearranged)
+    rewritten(folder / "out/field.gpkg", "obstacles", arrange)
+    told = geofield("tracks", folder / "out/field.gpkg", "-o", folder / "out/field.gpkg")
+    assert "obstacles" not in told
     run(folder, made, "--overwrite")
     after = plan_in(folder)
     assert set(rows(after)["status"]) <= {"detected", "possible"}

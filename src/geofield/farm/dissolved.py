@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.farm.as_left import tell
 from geofield.farm.layers import FIELD_ID
-from geofield.model.tracks_written import SAME_M
-from geofield.model.written import same_shapes
+from geofield.model.written import SAME_M, same_shapes
 from geofield.wording import counted, some_of
 
 #: What tells the rows of a field apart.

@@ -12,7 +12,8 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import ground_lengths_m
 from geofield.errors import FormatWarning
-from geofield.model.tracks_written import SAME_M, TracksWritten, track_numbers
+from geofield.model.tracks_written import TracksWritten, track_numbers
+from geofield.model.written import SAME_M
 from geofield.notes import warn
 from geofield.wording import counted
 

@@ -13,7 +13,8 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import FormatWarning
 from geofield.model.obstacles import active, circle_polygons, floats
-from geofield.model.written import SAME_M, Record, WrittenRow, same_shapes, shapes_of_plain
+from geofield.model.resized import differ
+from geofield.model.written import Record, WrittenRow, same_shapes, shapes_of_plain
 from geofield.notes import warn
 from geofield.wording import counted, some_of
 
@@ -149,8 +150,8 @@ def _keep_sizes(table: gpd.GeoDataFrame, taken: _Taken, record: Record) -> None:
             held.append(own)
         elif np.isnan(numbers[at]):
             table.loc[at, "buffer_m"] = np.nan  # it is in the shape
-        typed = own is None or own.radius_m is None or abs(own.radius_m - radius[at]) > SAME_M
-        if not (np.isfinite(radius[at]) and typed):
+        was = np.nan if own is None or own.radius_m is None else own.radius_m
+        if not (np.isfinite(radius[at]) and differ(radius[at], was)):
             continue
         middle = shapely.centroid(table.geometry[at])
         total = radius[at] + np.nan_to_num(margin[at])

@@ -15,7 +15,6 @@ from geofield.model.obstacles import (
     LINE_HALF_WIDTH_M,
     POINT_RADIUS_M,
     QUARTER_SEGMENTS,
-    FloatArray,
     circle_polygons,
     floats,
     still_round,
@@ -31,8 +30,9 @@ if TYPE_CHECKING:
 _TYPED_M = 1e-4
 
 
-def differ(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
+def differ(one: ArrayLike, other: ArrayLike) -> NDArray[np.bool_]:
     """Whether lengths differ; two missing ones do not."""
+    one, other = np.asarray(one, float), np.asarray(other, float)
     same = (np.abs(one - other) <= _TYPED_M) | (np.isnan(one) & np.isnan(other))
     return np.asarray(~same, dtype=bool)
 

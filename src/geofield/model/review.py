@@ -8,7 +8,7 @@ detection with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from geofield.model.obstacles import (
 from geofield.model.resized import as_areas, circles, differ, grown, shape_now, widened
 from geofield.model.whole_layer import tell_all_reshaped, tell_none_left
 from geofield.model.written import (
-    MOVED_M,
+    SAME_M,
     PlainShape,
     Record,
     Written,
@@ -134,7 +134,14 @@ def reconcile(
         elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
     gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
     former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
-    return result, Written.of(result, kept, former, earlier.last_no)
+    now = Written.of(result, kept, former, earlier.last_no)
+    # What nobody changed is measured by what was written still, or it would drift.
+    same = set(rows.at["obstacle_no"][known[~changed[known]]].tolist())
+    measures = (
+        one._replace(shape=record[one.obstacle_no].shape) if one.obstacle_no in same else one
+        for one in now.rows
+    )
+    return result, replace(now, rows=tuple(measures))
 
 
 @dataclass(frozen=True)
@@ -381,7 +388,7 @@ def _place(rows: _Rows, grid: Grid | None) -> None:
     x, y = shapely.get_coordinates(shapely.centroid(rows.shapes)).T
     at = rows.at
     recorded = transformer(LONLAT, rows.crs).transform(at["lon"], at["lat"])
-    moved = ~(np.hypot(x - recorded[0], y - recorded[1]) <= MOVED_M)
+    moved = ~(np.hypot(x - recorded[0], y - recorded[1]) <= SAME_M)
     if not moved.any():
         return
     x, y = x[moved], y[moved]

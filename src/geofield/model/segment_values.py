@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.model.own_values import own_values, with_own_values
-from geofield.model.tracks_written import DECIMALS, SAME_M
+from geofield.model.tracks_written import DECIMALS
+from geofield.model.written import SAME_M
 
 if TYPE_CHECKING:
     import geopandas as gpd

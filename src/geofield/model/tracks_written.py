@@ -12,12 +12,11 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
+from geofield.model.written import SAME_M
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: A vertex farther than this from the one that was written was moved by a person, metres.
-SAME_M = 0.002
 #: Places are told to the millimetre.
 DECIMALS = 3
 
