@@ -117,7 +117,6 @@ def merge(
     parts = [part for part in (word, fresh) if len(part)]
     joined = pd.concat(parts) if parts else fresh
     result = schema.conform(schema.OBSTACLES, joined, extras=True)
-    result.attrs.update(detected.attrs)
     is_word = result["obstacle_no"].isin(previous["obstacle_no"][kept]).to_numpy(bool)
     found = detected[~free][met < len(word)]
     changes = Changes(

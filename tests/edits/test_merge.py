@@ -1,0 +1,96 @@
+"""A later detection joined with what a person said, row by row, without a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from affine import Affine
+from changed_plans import Frame
+from pyproj import CRS
+from shapely.affinity import translate
+
+from geofield.grid import Grid
+from geofield.model.merge import Changes, merge
+from geofield.model.obstacles import from_circles_px
+from geofield.model.review import reconcile
+from geofield.model.written import Written
+
+#: On the central meridian a metre is 2 pixels; the picture reaches beyond the field to all sides.
+GRID = Grid(500, 300, Affine(0.5, 0, 499_975, 0, -0.5, 5_600_125), CRS(32633))
+FIELD = shapely.box(500_000, 5_600_000, 500_200, 5_600_100)
+#: Pixels west of the field's middle.
+WEST_PX = shapely.box(0, 0, 250, 300)
+
+
+def found(*circles: tuple[float, float, float], buffer_m: float = 0.0) -> Frame:
+    """Detected circles: metres east and north of the field's corner, and the radius, metres."""
+    east, north, radius_m = np.array(circles, float).reshape(-1, 3).T
+    return from_circles_px(
+        (east + 25) * 2, (125 - north) * 2, radius_m * 2, GRID, buffer_m=buffer_m
+    )  # fmt: skip
+
+
+def searched_again(
+    before: Frame, edited: Frame, *circles: tuple[float, float, float], **how: float
+) -> tuple[Frame, Changes]:
+    """The table after a person edited it and a picture showed other circles, and what is told."""
+    table, written = reconcile(edited, Written.of(before, np.zeros(len(before), bool)), GRID)
+    result, _, changes = merge(found(*circles, **how), table, written, FIELD, GRID)
+    return result.set_index("obstacle_no", drop=False), changes
+
+
+def with_status(table: Frame, *status: str) -> Frame:
+    return table.assign(status=list(status))
+
+
+@pytest.mark.parametrize("status", ["confirmed", "rejected"])
+def test_what_hardly_reaches_out_of_a_reviewed_obstacle_is_part_of_it(status: str) -> None:
+    before = found((50, 50, 8), (90, 50, 4))
+    again = (90, 50, 4), (50.5, 50, 7), (56.5, 50, 2), (50, 57, 3)
+    after, changes = searched_again(before, with_status(before, status, "detected"), *again)
+    # Of the last one more than three tenths lie outside, of the one before less.
+    assert (changes.new, changes.gone, changes.found_again) == ((3,), (), 1)
+    assert after["status"].to_dict() == {1: status, 2: "detected", 3: "detected"}
+    assert after.geometry[3].centroid.y == pytest.approx(5_600_057, abs=0.1)
+
+
+def test_what_stands_outside_the_field_is_not_sought() -> None:
+    before = found((50, 50, 4), (-10, 50, 4))
+    _, changes = searched_again(before, with_status(before, "confirmed", "confirmed"))
+    assert changes.kept == 2
+    assert changes.unfound == (1,)
+
+
+def test_what_nobody_reviewed_stays_unseen_in_the_field_alone() -> None:
+    before = found((150, 50, 4), (210, 50, 4), (30, 50, 4))
+    table, written = reconcile(before, Written.of(before, np.zeros(3, bool)), GRID)
+    result, _, changes = merge(found(), table, written, FIELD, GRID, WEST_PX)
+    assert (changes.unseen, changes.gone) == (1, (2, 3))
+    assert result["obstacle_no"].tolist() == [1]
+
+
+def test_only_what_is_driven_through_of_an_avoided_tree_is_told() -> None:
+    before = found((30, 50, 2), (60, 50, 2), (90, 50, 4), (120, 50, 2))
+    edited = with_status(before, "confirmed", "rejected", "confirmed", "confirmed")
+    beside = Frame(geometry=[translate(found((120, 50, 6)).geometry[0], 0.5)], crs=edited.crs)
+    edited = pd.concat([edited, beside], ignore_index=True)
+    # The third is as large as it was, with a wider margin; the fourth grew into what was drawn.
+    again = (30, 50, 4), (60, 50, 4), (90, 50, 4), (120, 50, 4)
+    _, changes = searched_again(before, edited, *again, buffer_m=3.0)
+    assert changes.outgrown == (1,)
+    assert "1 of yours smaller than what is found there (1)" in changes.in_words()
+
+
+def test_where_a_person_drew_nothing_was_found() -> None:
+    """What is moved away from such a place leaves no mark that hides a tree there."""
+    before = found((30, 50, 3))
+    drawn = Frame(geometry=[found((80, 50, 3)).geometry[0]], crs=before.crs)
+    both = pd.concat([before, drawn], ignore_index=True)
+    table, written = reconcile(both, Written.of(before, np.zeros(1, bool)), GRID)
+    shapes = [table.geometry[0], translate(table.geometry[1], 40)]
+    table, written = reconcile(table.set_geometry(shapes, crs=table.crs), written, GRID)
+    result, _, changes = merge(found((30, 50, 3), (80, 50, 3)), table, written, FIELD, GRID)
+    assert (changes.new, changes.stay_deleted) == ((3,), 0)
+    assert set(result["status"]) == {"detected", "added"}
