@@ -47,13 +47,14 @@ def with_status(table: Frame, *status: str) -> Frame:
 
 @pytest.mark.parametrize("status", ["confirmed", "rejected"])
 def test_what_hardly_reaches_out_of_a_reviewed_obstacle_is_part_of_it(status: str) -> None:
-    before = found((50, 50, 8), (90, 50, 4))
-    again = (90, 50, 4), (50.5, 50, 7), (56.5, 50, 2), (50, 57, 3)
-    after, changes = searched_again(before, with_status(before, status, "detected"), *again)
+    before = found((120, 50, 4), (50, 50, 8), (90, 50, 4))
+    again = (120, 50, 4), (90, 50, 4), (50.5, 50, 7), (56.5, 50, 2), (50, 57, 3)
+    edited = with_status(before, status, status, "detected")
+    after, changes = searched_again(before, edited, *again)
     # Of the last one more than three tenths lie outside, of the one before less.
-    assert (changes.new, changes.gone, changes.found_again) == ((3,), (), 1)
-    assert after["status"].to_dict() == {1: status, 2: "detected", 3: "detected"}
-    assert after.geometry[3].centroid.y == pytest.approx(5_600_057, abs=0.1)
+    assert (changes.new, changes.gone, changes.found_again) == ((4,), (), 1)
+    assert after["status"].to_dict() == {1: status, 2: status, 3: "detected", 4: "detected"}
+    assert after.geometry[4].centroid.y == pytest.approx(5_600_057, abs=0.1)
 
 
 def test_what_stands_outside_the_field_is_not_sought() -> None:
@@ -94,3 +95,20 @@ def test_where_a_person_drew_nothing_was_found() -> None:
     result, _, changes = merge(found((30, 50, 3), (80, 50, 3)), table, written, FIELD, GRID)
     assert (changes.new, changes.stay_deleted) == ((3,), 0)
     assert set(result["status"]) == {"detected", "added"}
+
+
+def test_a_tree_moved_a_little_hides_none_where_it_stood() -> None:
+    before = found((30, 50, 4))
+    edited = before.set_geometry([translate(before.geometry[0], 3)], crs=before.crs)
+    after, changes = searched_again(before, edited, (33, 50, 4), (28, 50, 1.5))
+    assert (changes.new, changes.stay_deleted) == ((2,), 0)
+    assert after["status"].tolist() == ["confirmed", "detected"]
+
+
+def test_a_margin_typed_with_the_shape_that_it_makes_grows_it_once() -> None:
+    before = found((30, 50, 4))
+    wide = found((31, 50, 4), buffer_m=2.0)
+    edited = before.assign(buffer_m=2.0).set_geometry(wide.geometry.to_numpy(), crs=before.crs)
+    after, _ = searched_again(before, edited, (30, 50, 4))
+    assert after["radius_m"][1] == pytest.approx(before["radius_m"][0])
+    assert after.geometry[1].equals_exact(wide.geometry[0], 1e-3)
