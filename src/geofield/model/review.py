@@ -278,8 +278,6 @@ def _bring_up_to_date(
     Returns which rows were changed, and the former shapes of what was found there and drawn anew.
     """
     changed = np.zeros(len(rows), dtype=bool)
-    if not len(known):
-        return changed, []
     former: list[PlainShape] = []
     anew: list[int] = []
     shapes = shapes_of_plain([row.shape for row in before])
@@ -383,8 +381,6 @@ def _copied(
 
 def _place(rows: _Rows, grid: Grid | None) -> None:
     """Bring the position columns of rows that were moved up to date."""
-    if not len(rows):
-        return
     x, y = shapely.get_coordinates(shapely.centroid(rows.shapes)).T
     at = rows.at
     recorded = transformer(LONLAT, rows.crs).transform(at["lon"], at["lat"])

@@ -69,8 +69,6 @@ def with_values(
     segments: gpd.GeoDataFrame, values: Sequence[SegmentValues], spacing_m: float
 ) -> gpd.GeoDataFrame:
     """Segments with what a person wrote for the ground where they are."""
-    if not values:
-        return segments
     at = _piece_of_each(segments.geometry.to_numpy(), values, spacing_m)
     return with_own_values(
         schema.SEGMENTS, segments, [values[one].own if one >= 0 else None for one in at.tolist()]
@@ -82,8 +80,6 @@ def _piece_of_each(
 ) -> NDArray[np.int64]:
     """For each segment which piece most of it lies along, or -1."""
     best = np.full(len(lines), -1, np.int64)
-    if not values or not len(lines):
-        return best
     pieces = shapely.from_wkt([one.line for one in values])
     around = shapely.buffer(pieces, _NEAR * spacing_m, cap_style="flat")
     piece, row = shapely.STRtree(lines).query(around, predicate="intersects")

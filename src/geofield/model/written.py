@@ -230,8 +230,6 @@ def matches(shapes: Any, others: Any, *, once: bool = False) -> NDArray[np.int64
     """
     mine, theirs = np.asarray(shapes, dtype=object), np.asarray(others, dtype=object)
     result = np.full(len(mine), -1, dtype=np.int64)
-    if not len(mine) or not len(theirs):
-        return result
     rows, candidates = shapely.STRtree(theirs).query(mine, predicate="intersects")
     centre, other = _middles(mine)[rows], _middles(theirs)[candidates]
     same = shapely.intersects(centre, theirs[candidates]) | shapely.intersects(other, mine[rows])
