@@ -335,10 +335,10 @@ def test_each_field_of_a_set_of_shapefiles_has_its_own_tracks(tmp_path):
     assert lines[0] == lines[1]
 
 
-def test_the_places_of_a_farm_are_known(tmp_path):
+def test_places_that_are_no_farms_are_a_persons_own(tmp_path):
     points = gpd.GeoDataFrame(geometry=[shapely.Point(0, 0)], crs=4326)
-    # In a plan of one field, places are a person's own.
-    for number, layer, told in ((2, "places", 0), (2, "mine", 1), (1, "places", 1)):
+    # A farm's overview says which layers are its own (`test_an_overview_of_one_field...`).
+    for number, layer, told in ((2, "places", 1), (2, "mine", 1), (1, "places", 1)):
         folder = tmp_path / f"{layer}{number}"
         write_datasets(FARM[:number], folder, ["gpkg"])
         pyogrio.write_dataframe(points, folder / "field.gpkg", layer=layer)

@@ -310,7 +310,9 @@ def test_numbers_are_what_a_person_means_by_them(page: Page) -> None:
         box.send_keys(typed, Keys.ENTER)
         if meant is None:
             page.wait(lambda typed=typed: f"above 0, not '{typed}'." in page.text("message"))
-        page.wait(lambda after=after: page.state()["settings"]["spacing_m"] == after)
+        else:
+            page.wait(lambda after=after: page.state()["settings"]["spacing_m"] == after)
+        assert page.state()["settings"]["spacing_m"] == after
 
 
 def test_an_undone_edit_is_shown_and_keys_speak_of_it(page: Page) -> None:
@@ -352,6 +354,7 @@ def test_a_shape_that_is_not_round_says_so_to_the_keys_of_size(
         # Where a keyboard has the bracket behind Alt.
         page.run("window.dispatchEvent(new KeyboardEvent('keydown', {key: ']', altKey: true}))")
         page.wait(lambda: "Obstacle 22 is not round." in page.text("message"))
+        assert not page.state()["can_undo"]
 
 
 def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field(
