@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import signal
 import sqlite3
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -476,15 +477,20 @@ def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
     assert page.state()["obstacles"][-1]["status"] == "added"
 
 
+def reject_and_kill(page: Page, process: subprocess.Popen[str]) -> None:
+    """Reject the first obstacle, and end the server as a power cut does."""
+    page.press("j", "r")
+    page.wait(lambda: page.judged() == 1)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
 def test_edits_come_back_after_the_server_is_killed(
     driver: webdriver.Chrome, plan_path: Path
 ) -> None:
     with served(plan_path, program=[GEOFIELD]) as (address, process):
         page = Page(driver, address)
-        page.press("j", "r")
-        page.wait(lambda: page.judged() == 1)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
+        reject_and_kill(page, process)
         page.press("r")
         page.wait(lambda: "geofield has ended" in page.text("message"))
     with served(plan_path) as (address, _):
@@ -498,10 +504,7 @@ def test_what_came_back_is_told_once_and_own_edits_are_of_no_earlier_session(
 ) -> None:
     with served(plan_path, program=[GEOFIELD]) as (address, process):
         page = Page(driver, address)
-        page.press("j", "r")
-        page.wait(lambda: page.judged() == 1)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
+        reject_and_kill(page, process)
     with served(plan_path) as (address, _):
         page = Page(driver, address)
         assert "1 edit of a session" in page.text("message")
