@@ -155,8 +155,10 @@ def renamed(field: Field, previous: Plan) -> Field:
     if field.method == "boundary" and not same:
         # Another parcel, whose name is its own where it has one.
         given = field.name != field.field_id
-        return replace(field, name=field.name if given else known.name, own=known.own)
-    return replace(field, field_id=known.field_id, name=known.name, own=known.own)
+        own = {**dict(known.own), **dict(field.own)}
+        return replace(field, name=field.name if given else known.name, own=tuple(own.items()))
+    own = {**dict(field.own), **dict(known.own)}
+    return replace(field, field_id=known.field_id, name=known.name, own=tuple(own.items()))
 
 
 def field_changes(previous: Plan, field: Field, *, kept: bool) -> tuple[str, ...]:

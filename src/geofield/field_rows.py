@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
 import shapely
 
 from geofield import schema
@@ -16,6 +13,7 @@ from geofield.errors import FormatError
 from geofield.model.dataset import Dataset
 from geofield.model.evidence import quality_from_json
 from geofield.model.field import Alternative, Field, refuse_no_areas
+from geofield.model.own_values import first_of
 from geofield.model.rows import Rows
 
 if TYPE_CHECKING:
@@ -55,17 +53,9 @@ def field_from_row(rows: gpd.GeoDataFrame, dataset: Dataset, evidence: Mapping[s
         imagery=text("imagery"),
         imagery_date=text("imagery_date") or None,
         licence=text("licence"),
-        own=tuple((name, _own(rows[name])) for name in schema.own_columns(schema.FIELD, rows)),
+        own=tuple((name, first_of(rows[name])) for name in schema.own_columns(schema.FIELD, rows)),
         alternatives=_alternatives(dataset.tables.get(schema.ALTERNATIVES.name)),
     )
-
-
-def _own(values: pd.Series[Any]) -> Any:
-    """A value of the user's own; a missing one is of its column's type, and equal to itself."""
-    value = values.iloc[0]
-    if not values.isna().iloc[0]:
-        return value.tolist() if isinstance(value, np.ndarray) else value
-    return math.nan if values.dtype.kind in "iuf" else pd.NaT if values.dtype.kind == "M" else None
 
 
 def _alternatives(rows: gpd.GeoDataFrame | None) -> tuple[Alternative, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -49,6 +49,35 @@ def command(*words: str | Path) -> str:
         for word in words
     ]
     return f"geofield {list2cmdline(plain) if os.name == 'nt' else shlex.join(plain)}"
+
+
+def unlike(
+    name: str,
+    taken: set[str],
+    joint: str,
+    *,
+    length: int | None = None,
+    key: Callable[[str], str] = str.lower,
+) -> str:
+    """A name that is not taken, with a number behind it where it must have one; taken from now on.
+
+    Parameters
+    ----------
+    taken : set of str
+        Keys of the names that are taken; changed.
+    joint : str
+        Between name and number.
+    length : int, optional
+        What the name is cut to where a number comes behind it.
+    key : callable
+        What must differ; the name in small letters when not given.
+    """
+    unique, number = name, 1
+    while key(unique) in taken:
+        number += 1
+        unique = f"{name[:length]}{joint}{number}"
+    taken.add(key(unique))
+    return unique
 
 
 def cell_text(value: object) -> str:

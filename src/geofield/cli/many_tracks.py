@@ -14,7 +14,7 @@ from geofield.cli.field_notes import labels, notes_in, remarks, tell_farm, tell_
 from geofield.cli.parcels import tell_places
 from geofield.cli.standing import tell_unreached
 from geofield.errors import GeofieldError, TrackError
-from geofield.wording import counted
+from geofield.wording import counted, unlike
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -153,7 +153,6 @@ def _figures(farm: Farm, places: Places, wanted: Wanted) -> Told:
 def _each(places: Places, job: Job, wanted: Wanted) -> Told:
     """One after the other, each into a file of its own."""
     from geofield.farm.work import plan_place
-    from geofield.formats.names import unlike
     from geofield.notes import listening
     from geofield.plan_files import save_plan
 

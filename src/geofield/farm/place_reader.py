@@ -27,10 +27,9 @@ from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
 from geofield.formats.antimeridian import joined
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
-from geofield.formats.names import unlike
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import cell_text, counted, nearest, some_of
+from geofield.wording import cell_text, counted, nearest, some_of, unlike
 
 _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
@@ -75,7 +74,8 @@ def read_places(
         where = str(path)
     if not raw.table.num_rows:
         raise FormatError(f"{where} is empty: it holds no places.", hint="Give one row per field.")
-    raw = _without_ours(raw)
+    # What geofield wrote beside the names of its own outlines is no word of the user's.
+    raw = replace(raw, table=raw.table.select(schema.of_others(raw.table.column_names)))
     id_name, name_name = _found(raw, id_column, ID_COLUMNS), _found(raw, name_column, NAME_COLUMNS)
     lat_name, lon_name = _found(raw, lat_column, _LAT), _found(raw, lon_column, _LON)
     notes: list[str] = []
@@ -104,7 +104,7 @@ def read_places(
     ids, names = _names(raw, id_name, name_name, unnamed, kept, part, lat, lon)
     return Places(
         where, ids, names, lat, lon, kept + 1, outlines, source,
-        own.rename_columns(_unlike_ours(own.column_names)),
+        own.rename_columns(schema.own_names(schema.FIELD, own.column_names)),
         said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip
 
@@ -143,18 +143,6 @@ def read_table(path: Path) -> gpd.GeoDataFrame:
     points[known] = shapely.points(x[known], y[known])
     crs = LONLAT if names == lonlat else None
     return gpd.GeoDataFrame(raw.table.to_pandas(), geometry=points, crs=crs)
-
-
-def _without_ours(raw: RawPlaces) -> RawPlaces:
-    """Outlines of geofield itself: what it wrote beside their names is no word of the user's."""
-    ours = set(schema.FIELD.column_names)
-    shared = ours & set(raw.table.column_names)
-    if "field_id" not in shared or 2 * len(shared) < len(ours):
-        return raw
-    gone = (ours - {"field_id", "name"}) | {"utm_epsg"}
-    return replace(
-        raw, table=raw.table.select([n for n in raw.table.column_names if n not in gone])
-    )
 
 
 def _plain(table: pa.Table) -> pa.Table:
@@ -389,12 +377,3 @@ def _place_id(lat: float, lon: float, row: int) -> str:
     if not (np.isfinite(lat) and np.isfinite(lon)):
         return f"row{row}"
     return position_words(lat, lon, 4)
-
-
-def _unlike_ours(names: Sequence[str]) -> list[str]:
-    """Names for a user's columns that are none of ours, each once."""
-    ours = {*schema.FIELD.column_names, "geometry", "geometry_utm", "utm_epsg", "bbox", "chunk"}
-    taken = {name for name in names if name.lower() not in {*ours, "fid"}}
-    return [
-        name if name in taken else unlike(f"place_{name}", taken, "_", key=str) for name in names
-    ]

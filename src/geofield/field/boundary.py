@@ -9,12 +9,14 @@ import shapely
 from pyproj import CRS
 from shapely import Polygon
 
+from geofield import schema
 from geofield.crossings import in_words, mended
 from geofield.crs import LONLAT, ground_areas_m2, metric_crs, reproject, transformer
 from geofield.datum import datum_notes
 from geofield.errors import CRSError, FieldError, FieldWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
+from geofield.model.own_values import first_of
 from geofield.notes import warn
 from geofield.wording import cell_text, counted, none_of
 
@@ -215,13 +217,23 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: 
     if own != target and own.is_geographic:
         polygon = shapely.segmentize(polygon, 0.001)
     polygon = reproject(polygon, own, target)
-    label = ""
-    for column in _NAME_COLUMNS:
-        if column in row.columns and row[column].notna().iloc[0]:
-            label = cell_text(row[column].iloc[0])
-            break
-    quality = FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons)
-    return Field(polygon, target, name=label, method="boundary", quality=quality)
+    there = [name for name in _NAME_COLUMNS if name in row and row[name].notna().iloc[0]]
+    known = {name: cell_text(row[name].iloc[0]) for name in there}
+    label = next(iter(known), "")
+    others = row[schema.of_others(row.columns)].columns
+    further = others.difference([label, "field_id", "fid", row.geometry.name], sort=False)
+    return Field(
+        polygon,
+        target,
+        name=known.get(label, ""),
+        field_id=known.get("field_id", ""),
+        method="boundary",
+        quality=FieldQuality(1.0 if not reasons else 0.4, reasons, trusted=not reasons),
+        own=tuple(
+            (new, first_of(row[name]))
+            for new, name in zip(schema.own_names(schema.FIELD, further), further, strict=True)
+        ),
+    )
 
 
 def _repaired(

@@ -26,7 +26,7 @@ from geofield import schema
 from geofield.crs import LONLAT, authority_name, reproject
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import split
-from geofield.formats.names import unlike
+from geofield.wording import unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd

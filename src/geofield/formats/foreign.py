@@ -37,6 +37,11 @@ __all__ = ["RawLayer", "files_in", "layer_names", "read_foreign", "read_parquet"
 
 #: Of GDAL's opening a file that has no layer, of dates that are none, of systems in pieces.
 _DAMAGED = (IndexError, ValueError, ProjError)
+#: Whole numbers, of which pandas makes others beside an empty cell.
+_WHOLE = (pa.int8(), pa.int16(), pa.int32(), pa.int64(), pa.uint8(), pa.uint16(), pa.uint32())
+#: What GDAL makes of a placemark: what is said of it, and how it looks.
+KML_SAID = ("Name", "description", "timestamp", "begin", "end", "snippet")
+KML_LOOKS = (*("id", "altitudeMode", "tessellate", "extrude", "visibility", "drawOrder", "icon"),)
 #: No coordinate of a metric CRS is larger.
 _FAR_M = 1e8
 
@@ -73,7 +78,49 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
         raise unreadable(path, error) from error
     if not isinstance(frame, gpd.GeoDataFrame):
         raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
-    return frame
+    return _as_filled(_exact(frame, path, layer), path)
+
+
+def _exact(frame: gpd.GeoDataFrame, path: Path, layer: str | None) -> gpd.GeoDataFrame:
+    """A layer of which the columns have the types that they have in the file.
+
+    Beside an empty cell pandas makes a number with a point of a whole number or truth value, and
+    a time of a date: from 2**53 on that is another number.
+    """
+    import pyogrio
+
+    info = pyogrio.read_info(path, layer=layer)
+    kinds = dict(zip(info["fields"], info["ogr_types"], strict=True))
+    if "geometry" in kinds:
+        warn(
+            f"{path.name}: the column 'geometry' of layer {info['layer_name']!r} has the name of "
+            "the shapes and is not kept: give it another name.",
+            FormatWarning,
+            stacklevel=4,
+        )
+    names = [
+        name
+        for name in frame.columns.drop(frame.geometry.name)
+        if kinds[name] in ("OFTDate", "OFTBinary")
+        or (kinds[name] in ("OFTInteger", "OFTInteger64") and frame[name].isna().any())
+    ]
+    if not names:
+        return frame
+    table = pyogrio.read_arrow(path, layer=layer, columns=names, read_geometry=False)[1]
+    types = {pa.bool_(): pd.BooleanDtype(), **dict.fromkeys(_WHOLE, pd.Int64Dtype())}
+    exact = table.to_pandas(types_mapper=lambda kind: types.get(kind, pd.ArrowDtype(kind)))
+    return frame.assign(**exact.iloc[frame.index])
+
+
+def _as_filled(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
+    """A layer without what GDAL makes a column of in every file of its kind, and nobody said."""
+    suffix = path.suffix.lower()
+    if suffix not in (".kml", ".kmz", ".gpx"):
+        return frame
+    made = [name for name in frame if suffix == ".gpx" or name in KML_SAID]
+    empty = [name for name in made if frame[name].isna().all()]
+    looks = KML_LOOKS if suffix != ".gpx" else ()
+    return frame.drop(columns=[*empty, *frame.columns.intersection(looks)])
 
 
 def read_parquet(path: Path) -> gpd.GeoDataFrame:

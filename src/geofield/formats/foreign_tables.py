@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
 from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
+from geofield.model.own_values import as_numbers, told_beside
 from geofield.notes import warn
 from geofield.wording import cell_text, counted, some_of
 
@@ -40,7 +42,8 @@ BUFFER_COLUMNS = ("buffer_m", "buffer")
 NUMBER_COLUMNS = ("obstacle_no", "obst_no", "number", "no")
 _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
-_DECIMAL_COMMA = r"^\s*([+-]?\d+),(\d+)\s*$"
+#: How geofield names lines in formats without numbers.
+_OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
 _LARGEST = 2**53
 
@@ -57,13 +60,13 @@ def column_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> Any:
 def numbers_like(frame: gpd.GeoDataFrame, names: tuple[str, ...]) -> np.ndarray:
     """A column's numbers as floats, texts with a decimal comma, too; NaN where there are none."""
     series = column_like(frame, names)
-    if series is None:
-        return np.full(len(frame), np.nan)
-    if not pd.api.types.is_numeric_dtype(series):
-        series = series.astype(str).str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
-    numeric = pd.to_numeric(series, errors="coerce")
-    # A copy: what pandas hands out may be read-only.
-    return np.array(numeric.to_numpy(dtype="float64", na_value=np.nan))
+    return np.full(len(frame), np.nan) if series is None else as_numbers(series)
+
+
+def _sources(frame: gpd.GeoDataFrame, names: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """The columns by whose names those of a layer were found, with these."""
+    found = {into: column_like(frame, each) for into, each in names.items()}
+    return {str(series.name): into for into, series in found.items() if series is not None}
 
 
 def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
@@ -91,7 +94,10 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
     }
     if data.get("method", [None]) == [None]:
         data["method"] = ["boundary"]
-    return schema.table(schema.FIELD, data, [polygon], crs)
+    table = schema.table(schema.FIELD, data, [polygon], crs)
+    rows = frame[schema.of_others(frame.columns)]
+    told = _sources(frame, {"name": NAME_COLUMNS, "field_id": ID_COLUMNS})
+    return table.assign(**told_beside(schema.FIELD, table, rows, told))
 
 
 def _value(frame: gpd.GeoDataFrame, column: schema.Column) -> Any:
@@ -110,7 +116,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     """Points and polygons as layer `obstacles`.
 
     A point becomes the circle of its radius and safety margin. Rows without a status were
-    put there by a person: they are `added`.
+    put there by a person: they are `added`. Further columns stay, as they do of others.
     """
     geometry = np.asarray(shapely.force_2d(frame.geometry.to_numpy()), dtype=object)
     count = len(geometry)
@@ -160,7 +166,12 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         "lon": lon,
     }
     table = schema.table(schema.OBSTACLES, data, shapely.orient_polygons(geometry), crs)
-    return schema.conform(schema.OBSTACLES, table)
+    told = _sources(
+        frame,
+        {"radius_m": RADIUS_COLUMNS, "buffer_m": BUFFER_COLUMNS, "obstacle_no": NUMBER_COLUMNS},
+    )
+    own = told_beside(schema.OBSTACLES, table, frame, told)
+    return schema.conform(schema.OBSTACLES, table.assign(**own), extras=True)
 
 
 def line_tables(
@@ -173,7 +184,7 @@ def line_tables(
     """
     owners = column_like(frame, ("field_id",))
     if owners is not None and owners.notna().all() and owners.nunique() > 1:
-        rows = frame.groupby(owners.to_numpy(), sort=False)
+        rows = frame.drop(columns=str(owners.name)).groupby(owners.to_numpy(), sort=False)
         parts = [(one, line_tables(own, crs, extras=extras)) for one, own in rows]
         tracks, segments = (
             pd.concat([part[at].assign(field_id=one) for one, part in parts], ignore_index=True)
@@ -188,8 +199,13 @@ def line_tables(
         "segment_no": segment,
         "length_m": ground_lengths_m(geometry, crs),
     }
-    own = {name: frame[name].array for name in schema.own_columns(schema.SEGMENTS, frame)}
-    table = schema.table(schema.SEGMENTS, values, geometry, crs, own)
+    table = schema.table(schema.SEGMENTS, values, geometry, crs)
+    if extras:
+        told = _sources(frame, {"track_no": _TRACK, "segment_no": _SEGMENT})
+        names = column_like(frame, NAME_COLUMNS)
+        if names is not None and all(_OUR_NAME.fullmatch(str(name)) for name in names):
+            frame = frame.drop(columns=str(names.name))
+        table = table.assign(**told_beside(schema.SEGMENTS, table, frame, told))
     segments = schema.conform(schema.SEGMENTS, table, extras=extras)
     each: list[Any] = [part for _, part in segments.groupby("track_no", sort=True)]
     wholes = [shapely.multilinestrings(list(part.geometry)) for part in each]
@@ -229,7 +245,7 @@ def _numbers_in_names(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:
     names = column_like(frame, NAME_COLUMNS)
     texts = [""] * len(frame) if names is None else [str(name) for name in names]
     one_each = np.ones(len(frame))
-    own = [re.fullmatch(r"Track (\d+)(?:-(\d+))?", text) for text in texts]
+    own = [_OUR_NAME.fullmatch(text) for text in texts]
     if all(own):
         found = [(float(match[1]), float(match[2] or 1)) for match in own if match]
         track, segment = np.array(found).T

@@ -6,10 +6,9 @@ import sqlite3
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import shapely
 from pyproj import CRS
@@ -61,8 +60,7 @@ def read(path: Path) -> Dataset:
     known = {layer.name: layer for layer in schema.LAYERS if layer.name in own}
     for name in layers:
         if name in known and name != schema.TRACK_POINTS.name:
-            frame = _exact(known[name], read_vector(path, name), path)
-            tables[name] = _own_table(known[name], frame, crs, path)
+            tables[name] = _own_table(known[name], read_vector(path, name), crs, path)
     if schema.OBSTACLES.name in tables:
         written = Evidence.from_json(record.provenance.evidence).written
         tables[schema.OBSTACLES.name] = parts_apart(
@@ -158,38 +156,6 @@ def in_own_terms(
         return frame
     shapes = frame.geometry.to_numpy()
     return frame.set_geometry(frame.geometry.mask(alone, shapely.get_geometry(shapes, 0)))
-
-
-def _exact(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
-    """A layer of which a person's own columns have the types that they have in the file.
-
-    Beside an empty cell pandas makes a number with a point of a whole number or truth value, and
-    a time of a date: from 2**53 on that is another number.
-    """
-    import pyogrio
-
-    if "geometry" in pyogrio.read_info(path, layer=of.name)["fields"]:
-        warn(
-            f"{path.name}: the column 'geometry' of layer {of.name!r} has the name of the shapes "
-            "and is not kept: give it another name.",
-            FormatWarning,
-            stacklevel=3,
-        )
-    names = schema.own_columns(of, frame)
-    if not names:
-        return frame
-    table = pyogrio.read_arrow(path, layer=of.name, columns=names, read_geometry=False)[1]
-    exact: dict[str, pd.Series[Any]] = {}
-    for name in (one for one in names if one in table.column_names):
-        kind = table.schema.field(name).type
-        if pa.types.is_date(kind) or pa.types.is_binary(kind):
-            exact[name] = table[name].to_pandas(types_mapper=pd.ArrowDtype)
-        elif table[name].null_count and pa.types.is_boolean(kind):
-            exact[name] = table[name].to_pandas(types_mapper=lambda _: pd.BooleanDtype())
-        elif table[name].null_count and pa.types.is_integer(kind):
-            whole = table[name].cast(pa.int64())
-            exact[name] = whole.to_pandas(types_mapper=lambda _: pd.Int64Dtype())
-    return frame.assign(**exact) if exact else frame
 
 
 def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import pandas as pd
@@ -13,12 +13,22 @@ import shapely
 
 from geofield import schema, theme
 from geofield.formats.arrow import cut_lonlat, exact_geometry
-from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
+from geofield.formats.foreign import (
+    KML_LOOKS,
+    KML_SAID,
+    RawLayer,
+    layer_names,
+    read_foreign,
+    read_vector,
+)
 from geofield.formats.many import told_apart
 from geofield.formats.origin import lineage
 from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
 from geofield.schema import Layer
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 KML = "http://www.opengis.net/kml/2.2"
 #: 1e-9 degrees are a tenth of a millimetre.
@@ -47,11 +57,8 @@ _STYLES: dict[str, tuple[str, float, str | None]] = {
         for status, look in theme.STATUS.items()
     },
 }
-#: What GDAL makes of a placemark; a column of the same name has a 2 behind it.
-_DRIVER_COLUMNS = [
-    *("id", "Name", "description", "timestamp", "begin", "end", "altitudeMode", "tessellate"),
-    *("extrude", "visibility", "drawOrder", "icon"),
-]
+#: How the placemarks of a plan are called where nobody called them otherwise.
+_OUR_NAMES = r"Obstacle \d+( \(\w+\))?|Track \d+|Gap \d+ of track \d+"
 
 
 def write(
@@ -81,15 +88,23 @@ def write(
 
 def read(path: Path) -> Dataset:
     """The dataset in a KML or KMZ file."""
-    layers = []
-    for name in layer_names(path):
-        frame = read_vector(path, name)
-        columns = {f"{each}2": each for each in _DRIVER_COLUMNS} | {"name2": "name"}
-        if "name2" not in frame.columns:
-            frame = frame.rename(columns={"Name": "name"})
-        frame = frame.drop(columns=_DRIVER_COLUMNS, errors="ignore").rename(columns=columns)
-        layers.append(RawLayer(name, frame))
+    layers = [_raw(name, read_vector(path, name)) for name in layer_names(path)]
     return read_foreign(layers, path)
+
+
+def _raw(name: str, frame: gpd.GeoDataFrame) -> RawLayer:
+    """A layer with the columns of which GDAL has another name beside its own, as a person has them.
+
+    A name of ours is no person's word; one that somebody gave a placemark is.
+    """
+    given = frame.pop("Name") if "Name" in frame else pd.Series(index=frame.index, dtype="string")
+    other = {f"{each}2": each for each in (*KML_SAID[1:], *KML_LOOKS)} | {"name2": "name"}
+    frame = frame.rename(columns={one: of for one, of in other.items() if of not in frame})
+    if "track_no" in frame or "obstacle_no" in frame:
+        given = given.mask(given.astype("string").str.fullmatch(_OUR_NAMES))
+    if "name" in frame:
+        given = given.fillna(frame["name"])
+    return RawLayer(name, frame.assign(name=given) if given.notna().any() else frame)
 
 
 def _schema(layer: Layer, datasets: Sequence[Dataset]) -> ET.Element:

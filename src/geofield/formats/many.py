@@ -18,10 +18,11 @@ from geofield import schema
 from geofield.crs import LONLAT, PACIFIC, metric_crs, reproject, transformer
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import seamless
-from geofield.formats.names import safe_name, unlike
+from geofield.formats.names import safe_name
 from geofield.formats.origin import imagery_day
 from geofield.model import Dataset, Provenance
 from geofield.model.lost_numbers import numbered
+from geofield.wording import unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,35 +27,6 @@ def safe_name(name: str, *, length: int = 40) -> str:
     if not plain:
         return "field"
     return f"{plain}_" if plain.upper() in _RESERVED else plain
-
-
-def unlike(
-    name: str,
-    taken: set[str],
-    joint: str,
-    *,
-    length: int | None = None,
-    key: Callable[[str], str] = str.lower,
-) -> str:
-    """A name that is not taken, with a number behind it where it must have one; taken from now on.
-
-    Parameters
-    ----------
-    taken : set of str
-        Keys of the names that are taken; changed.
-    joint : str
-        Between name and number.
-    length : int, optional
-        What the name is cut to where a number comes behind it.
-    key : callable
-        What must differ; the name in small letters when not given.
-    """
-    unique, number = name, 1
-    while key(unique) in taken:
-        number += 1
-        unique = f"{name[:length]}{joint}{number}"
-    taken.add(key(unique))
-    return unique
 
 
 def cut_name(name: str, length: int) -> str:

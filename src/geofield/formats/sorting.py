@@ -130,7 +130,7 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
     if lines and "tracks" not in tables:
         notes += [part.told(len(part.frame), "taken as guidance") for part in lines]
         drawn = _joined([part.frame for part in lines])
-        tables["tracks"], tables["segments"] = line_tables(drawn, metric)
+        tables["tracks"], tables["segments"] = line_tables(drawn, metric, extras=True)
     elif "segments" in tables and "tracks" not in tables:
         own = tables["segments"]
         tables["tracks"], tables["segments"] = line_tables(own, metric, extras=True)

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geofield import schema
+from geofield.wording import cell_text
 
 if TYPE_CHECKING:
     import geopandas as gpd
     import pandas as pd
+
+_DECIMAL_COMMA = r"^\s*([+-]?\d+),(\d+)\s*$"
+#: Sizes that differ by less are the same, share; positions, degrees (ten metres).
+_SAME_SHARE, _SAME_DEG = 1e-3, 1e-4
 
 
 def own_values(layer: schema.Layer, table: gpd.GeoDataFrame) -> dict[int, dict[str, Any]]:
@@ -34,6 +41,61 @@ def own_values(layer: schema.Layer, table: gpd.GeoDataFrame) -> dict[int, dict[s
         if said:
             found[row] = said
     return found
+
+
+def told_beside(
+    of: schema.Layer, table: gpd.GeoDataFrame, rows: gpd.GeoDataFrame, told: Mapping[str, str]
+) -> dict[str, Any]:
+    """Columns of another program's `rows` that the `table` made of them does not repeat, by name.
+
+    `told` has the layer's column that was made of one, by its name; else that is the one of the
+    same name. What says something else than the layer's column is kept under another name.
+    """
+    ours = {name.lower(): name for name in of.column_names}
+    kept = []
+    for name in rows.columns.difference([rows.geometry.name, "geometry", "fid"], sort=False):
+        into = told.get(name, ours.get(name.lower()))
+        if into is None or not _repeats(of.column(into), rows[name], table[into]):
+            kept.append(name)
+    names = schema.own_names(of, kept)
+    return {new: rows[name].array for new, name in zip(names, kept, strict=True)}
+
+
+def _repeats(column: schema.Column, said: pd.Series[Any], told: pd.Series[Any]) -> bool:
+    """Whether a layer's column tells all that another program's says; 0 is no number there."""
+    texts = said.astype("string").fillna("").str.strip()
+    if column.type in ("int", "float"):
+        numbers, ours = as_numbers(said), told.to_numpy("float64", na_value=np.nan)
+        share, off = (0.0, _SAME_DEG) if column.unit == "deg" else (_SAME_SHARE, 0.0)
+        # Of things that had one number, as the parts of a row, the first keeps it.
+        whole = column.type == "int"
+        same = np.isin(numbers, ours) if whole else np.isclose(numbers, ours, rtol=share, atol=off)
+        return bool((same | (numbers == 0) | (texts == "").to_numpy(bool)).all())
+    return all(
+        not text or text.lower() == str(ours).lower() or cell_text(value) == ours
+        for value, text, ours in zip(said, texts, told, strict=True)
+    )
+
+
+def as_numbers(values: pd.Series[Any]) -> NDArray[np.float64]:
+    """Numbers as floats, texts with a decimal comma, too; NaN where there are none."""
+    import pandas as pd
+
+    if not pd.api.types.is_numeric_dtype(values):
+        values = values.astype(str).str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
+    numeric = pd.to_numeric(values, errors="coerce")
+    # A copy: what pandas hands out may be read-only.
+    return np.array(numeric.to_numpy(dtype="float64", na_value=np.nan))
+
+
+def first_of(values: pd.Series[Any]) -> Any:
+    """The value in the first row; a missing one is of its column's type, and equal to itself."""
+    import pandas as pd
+
+    value = values.iloc[0]
+    if not values.isna().iloc[0]:
+        return value.tolist() if isinstance(value, np.ndarray) else value
+    return math.nan if values.dtype.kind in "iuf" else pd.NaT if values.dtype.kind == "M" else None
 
 
 def with_own_values(

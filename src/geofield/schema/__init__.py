@@ -27,7 +27,15 @@ from geofield.schema.layers import (
     layer,
 )
 from geofield.schema.meanings import meaning, unit_in_words
-from geofield.schema.tables import conform, empty, own_columns, own_type, table
+from geofield.schema.tables import (
+    conform,
+    empty,
+    of_others,
+    own_columns,
+    own_names,
+    own_type,
+    table,
+)
 
 __all__ = [
     "ALTERNATIVES",
@@ -54,7 +62,9 @@ __all__ = [
     "empty",
     "layer",
     "meaning",
+    "of_others",
     "own_columns",
+    "own_names",
     "own_type",
     "table",
     "unit_in_words",

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from geofield.errors import FormatError, FormatWarning
 from geofield.notes import warn
 from geofield.schema.columns import ColumnType, Layer
+from geofield.schema.layers import FIELD
+from geofield.wording import unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd
     import pandas as pd
     from pyproj import CRS
+
+#: Columns of files with several fields, and of their shapes; small letters.
+_OURS = ("field_id", "fid", "geometry", "geometry_utm", "utm_epsg", "bbox", "chunk")
 
 
 def empty(of: Layer, crs: CRS) -> gpd.GeoDataFrame:
@@ -60,6 +65,33 @@ def own_columns(of: Layer, frame: gpd.GeoDataFrame) -> list[str]:
     """The columns that the user added to a layer."""
     known = {*of.column_names, frame.geometry.name, "geometry", "fid"}
     return [name for name in frame.columns if name not in known]
+
+
+def own_names(of: Layer, names: Iterable[str]) -> list[str]:
+    """Names for a user's columns that are none of a layer's, each once: `own_kind`, `place_doubts`.
+
+    Nor are they any that files of several fields have beside the layer's.
+    """
+    before = "place_" if of is FIELD else "own_"
+    ours = {*of.column_names, *_OURS}
+    names = list(names)
+    taken = {name for name in names if name.lower() not in ours}
+    return [
+        name if name in taken else unlike(f"{before}{name}", taken, "_", key=str) for name in names
+    ]
+
+
+def of_others(names: Iterable[str]) -> list[str]:
+    """The columns of outlines that geofield does not write itself; all in another program's.
+
+    Id and name are a person's word in either.
+    """
+    names, ours = list(names), set(FIELD.column_names)
+    shared = ours & set(names)
+    if FIELD.key[0] not in shared or 2 * len(shared) < len(ours):
+        return names
+    gone = (ours - {*FIELD.key, "name"}) | {"utm_epsg"}
+    return [name for name in names if name not in gone]
 
 
 def own_type(values: pd.Series[Any]) -> ColumnType:
