@@ -189,6 +189,27 @@ def test_the_command_prints_figures_and_draws(tmp_path, capsys):
         main(["evaluate", *arguments, "--draw", str(tmp_path / "hits.png"), "--overwrite"])
 
 
+def test_a_truth_in_a_table(tmp_path, capsys):
+    """In longitude and latitude, or x and y of the plan; it was taken for a file of no layers."""
+    from geofield.cli import main
+
+    found = table([(500_000, 4_000_000), (500_040, 4_000_000)])
+    found.to_file(tmp_path / "found.gpkg", layer="obstacles")
+    for crs, names in ((4326, ("lon", "lat")), (found.crs, ("x", "y"))):
+        places = found.geometry.centroid.to_crs(crs)
+        (tmp_path / "truth.csv").write_text(
+            "\n".join([",".join(names), *(f"{one.x!r},{one.y!r}" for one in places)])
+        )
+        with pytest.raises(SystemExit, match="0"):
+            main(["evaluate", str(tmp_path / "found.gpkg"), str(tmp_path / "truth.csv"), "--json"])
+        said = capsys.readouterr()
+        assert '"hits": 2' in said.out
+        assert ("taken as of found.gpkg" in said.err) == (crs == found.crs)
+    with pytest.raises(SystemExit, match="1"):  # of what DETECTED has nobody knows the CRS
+        main(["evaluate", str(tmp_path / "truth.csv"), str(tmp_path / "found.gpkg")])
+    assert "truth.csv has no CRS" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("rows", ["", '{"type": "Feature", "properties": {}, "geometry": null}'])
 def test_a_file_in_degrees_in_which_nothing_lies_anywhere(tmp_path, capsys, rows):
     from geofield.cli import main

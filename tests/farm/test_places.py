@@ -105,6 +105,18 @@ def test_every_kind_of_file_gives_the_same_places(kind: str, tmp_path: Path) -> 
     assert dict(places[2].own) == {"farmer": "x"}
 
 
+def test_texts_that_are_called_like_missing_numbers(tmp_path: Path) -> None:
+    """NA, nan, null and None as names and notes were read as missing; of numbers NA is."""
+    rows = (
+        "name,lat,lon,note,spacing_m\nNA,50.1,15.1,nan,3\nnull,50.2,15.2,wet,NA\nNaN,50.3,15.3,,\n"
+    )
+    (tmp_path / "places.csv").write_text(rows)
+    places = list(read_places(tmp_path / "places.csv"))
+    assert [place.name for place in places] == ["NA", "null", "NaN"]
+    assert [dict(place.own).get("note") for place in places] == ["nan", "wet", None]
+    assert [dict(place.settings) for place in places] == [{"spacing_m": 3.0}, {}, {}]
+
+
 def test_ids_in_columns_of_numbers(tmp_path: Path) -> None:
     """20 digits, as cadastres have them and Shapefiles hold as numbers, ended in a traceback."""
     for given, ids in (
@@ -374,6 +386,12 @@ def test_layers_and_rows_that_are_none(tmp_path: Path) -> None:
     as_frame(POINTS).to_file(tmp_path / "a.gpkg", layer="fields")
     with pytest.raises(FormatError, match=r"no layer 'felds'.*fields"):
         read_places(tmp_path / "a.gpkg", layer="felds")
+    for kind in ("csv", "parquet"):  # which have none: the layer changed nothing, without a word
+        path = tmp_path / f"b.{kind}"
+        (POINTS.to_csv if kind == "csv" else POINTS.to_parquet)(path, index=False)
+        with pytest.raises(FormatError, match="one table and has no layer 'felds'"):
+            read_places(path, layer="felds")
+        assert len(read_places(path, layer="b")) == len(POINTS)
     (tmp_path / "a.csv").write_text("id,lat,lon\n1,47.5,15.3,a,b\n")
     with pytest.raises(FormatError) as told:
         read_places(tmp_path / "a.csv")

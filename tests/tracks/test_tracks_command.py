@@ -405,6 +405,15 @@ def test_a_blank_name_is_none(tmp_path: Path) -> None:
     assert row["name"] == "Field 1"
 
 
+def test_options_of_one_field_are_refused_for_several(tmp_path: Path) -> None:
+    """`--fresh` changed nothing there, without a word."""
+    outlines(2).to_file(tmp_path / "parcels.gpkg")
+    for option, told in ((["--fresh"], "--fresh is of the plan"), (["--name", "x"], "--name is")):
+        done = run_geofield("tracks", tmp_path / "parcels.gpkg", *option, "-o", tmp_path / "f.gpkg")
+        assert done.returncode == 2
+        assert told in " ".join(done.stderr.split())
+
+
 def test_a_file_that_is_read_is_never_replaced(tmp_path: Path) -> None:
     one, many, trees = (tmp_path / f"{name}.gpkg" for name in ("one", "many", "Field_1"))
     outlines(1).to_file(one)

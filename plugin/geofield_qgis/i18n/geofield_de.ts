@@ -1695,7 +1695,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.</source>
+      <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons, which may be a CSV.</source>
       <translation type="unfinished" />
     </message>
     <message>

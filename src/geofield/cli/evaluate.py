@@ -16,7 +16,11 @@ from geofield.errors import ObstacleError
 from geofield.wording import counted
 
 if TYPE_CHECKING:
+    import geopandas as gpd
+
     from geofield.evaluation import Evaluation
+
+_USUAL = "obstacles"
 
 
 @click.command(
@@ -38,7 +42,7 @@ Examples (on the project's own sample):
     show_default=True,
     help="Distance between centres within which a detection is a hit, metres.",
 )
-@click.option("--layer", default="obstacles", show_default=True, help="Layer of DETECTED.")
+@click.option("--layer", default=_USUAL, show_default=True, help="Layer of DETECTED.")
 @click.option(
     "--truth-layer", help="Layer of TRUTH; when not given `obstacles`, else its first one."
 )
@@ -69,7 +73,7 @@ def evaluate(
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Compare DETECTED obstacles with a TRUTH of points, boxes or polygons.
+    """Compare DETECTED obstacles with a TRUTH of points, boxes or polygons, which may be a CSV.
 
     TRUTH may be a plan that a person reviewed: what they rejected is no true obstacle. Matching is
     one to one. Prints precision, recall, F1 and the error of the radii with
@@ -77,8 +81,9 @@ def evaluate(
     within 2 m of their centres, what ground false ones cost, and how many the confidences say
     stand among those that are merely possible.
     """
-    from geofield.evaluation import draw_matches, read_obstacles
+    from geofield.evaluation import draw_matches, placed
     from geofield.evaluation import evaluate as compare
+    from geofield.farm.place_files import CSV
     from geofield.imagery.write import replacing
     from geofield.plan import read_plan
 
@@ -90,8 +95,12 @@ def evaluate(
     # Entered first: what may not be replaced is refused before the work.
     drawing = replacing(picture, overwrite=overwrite, inputs=inputs) if picture else nullcontext()
     with drawing as place:
-        found = read_obstacles(detected, layer, metric=True)
-        true = read_obstacles(truth, truth_layer)
+        found = placed(_rows(detected, layer), detected.name, metric=True)
+        true = _rows(truth, truth_layer)
+        if true.crs is None and truth.suffix.lower() in CSV:
+            say_note(f"{truth.name} does not say its CRS: x and y are taken as of {detected.name}.")
+            true = true.set_crs(found.crs)
+        true = placed(true, truth.name)
         options: dict[str, Any] = {"distance_m": distance_m, "seed": seed}
         if driving:
             plan = read_plan(detected)
@@ -115,6 +124,17 @@ def evaluate(
         echo_json(figures)
         return
     _tell(result)
+
+
+def _rows(path: Path, layer: str | None) -> gpd.GeoDataFrame:
+    """The rows of any vector file, or of a table with positions."""
+    from geofield.evaluation import read_obstacles
+    from geofield.farm.place_files import CSV
+    from geofield.farm.place_reader import read_table
+
+    if path.suffix.lower() in CSV:
+        return read_table(path, None if layer == _USUAL else layer)
+    return read_obstacles(path, layer)
 
 
 def _tell(result: Evaluation) -> None:

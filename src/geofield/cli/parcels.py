@@ -52,10 +52,12 @@ def parcel_and_point(
     from geofield.farm.place_reader import read_table
     from geofield.field import field_from_boundary
     from geofield.formats.antimeridian import joined
+    from geofield.formats.catalogue import PARQUET
     from geofield.formats.foreign import layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
 
     in_layers = path.suffix.lower() not in CSV
+    alone = path.suffix.lower() in (*CSV, *PARQUET)
     try:
         layers = layer_names(path) if in_layers and layer is None and not is_own(path) else []
         if len(layers) > 1:
@@ -64,11 +66,11 @@ def parcel_and_point(
                 "parcels; name another with --boundary-layer."
             )
             layer = layers[0]
-        table = read_vector(path, layer) if in_layers else read_table(path)
+        table = read_vector(path, layer) if in_layers else read_table(path, layer)
     except FormatError as error:
         of_layers = "`ogrinfo` shows the layers of a file; name one with --boundary-layer."
         raise FieldError(
-            f"The boundary: {error.message}", hint=of_layers if in_layers else error.hint
+            f"The boundary: {error.message}", hint=error.hint if alone else of_layers
         ) from None
     if table.crs is not None:
         whole = joined(table.geometry.to_numpy(), parse_crs(table.crs))

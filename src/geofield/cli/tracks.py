@@ -115,8 +115,9 @@ def tracks(
     if places is None or not places.settings.num_columns:
         tell_idle(settings)  # a column could choose another way for its field
     tell_obstacles(job, several=several)
-    if name and several:
-        raise click.UsageError("--name is one field's name: the file has several.")
+    if several and (name or fresh):
+        told = "--name is one field's name" if name else "--fresh is of the plan of one field"
+        raise click.UsageError(f"{told}: the file has several.")
     rows: list[dict[str, Any]]
     failed: dict[str, str] = {}
     if places is not None and several:

@@ -3,7 +3,7 @@
 from geofield.evaluation.compare import Evaluation, evaluate
 from geofield.evaluation.driving import Driving, driving, unseen
 from geofield.evaluation.matching import Matches, match_points
-from geofield.evaluation.picture import draw_matches, read_obstacles
+from geofield.evaluation.picture import draw_matches, placed, read_obstacles
 from geofield.evaluation.scores import Score, reliability
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "driving",
     "evaluate",
     "match_points",
+    "placed",
     "read_obstacles",
     "reliability",
     "unseen",

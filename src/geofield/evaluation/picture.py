@@ -25,9 +25,7 @@ HIT, MISSED, FALSE = (40, 200, 90), (60, 150, 255), (235, 60, 50)
 _SIDE_PX = 1200
 
 
-def read_obstacles(
-    path: Path, layer: str | None = None, *, metric: bool = False
-) -> gpd.GeoDataFrame:
+def read_obstacles(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     """Read a table of obstacles or of a truth from any vector file.
 
     Parameters
@@ -35,15 +33,11 @@ def read_obstacles(
     path : path
     layer : str, optional
         When not given or when the file has one layer only: `obstacles`, else the first one.
-    metric : bool
-        Reproject to the UTM zone where the file is in another CRS.
 
     Raises
     ------
     ObstacleError
         When the file cannot be read or has no such layer.
-    CRSError
-        When it has no CRS.
     """
     import geopandas as gpd
     import pyogrio
@@ -67,9 +61,22 @@ def read_obstacles(
     except pyogrio.errors.DataSourceError as error:
         told = unreadable(path, error)
         raise ObstacleError(told.message, hint=told.hint) from None
-    refuse_nowhere(frame.geometry.to_numpy(), path.name)
+    return frame
+
+
+def placed(frame: gpd.GeoDataFrame, name: str, *, metric: bool = False) -> gpd.GeoDataFrame:
+    """A table of a file that is somewhere; `metric` in the UTM zone where it is in another CRS.
+
+    Raises
+    ------
+    CRSError
+        When it has no CRS.
+    """
+    refuse_nowhere(frame.geometry.to_numpy(), name)
     if frame.crs is None:
-        raise CRSError(f"{path.name} has no CRS.", hint="Set it in QGIS: Set layer CRS.")
+        raise CRSError(
+            f"{name} has no CRS.", hint="Set it in QGIS (Set layer CRS), or give lon and lat."
+        )
     if metric and not is_utm(frame.crs):
         lies = np.isfinite(frame.total_bounds).all()  # else any zone will do
         frame = frame.to_crs(frame.estimate_utm_crs() if lies else utm_crs(0.0, 0.0))

@@ -18,6 +18,7 @@ import shapely
 from geofield.errors import CRSError, FormatError
 from geofield.farm.row_crs import refuse_other_rows
 from geofield.formats.catalogue import PARQUET
+from geofield.formats.foreign import refuse_layer
 from geofield.strangers import check_vector, unreadable
 from geofield.wording import nearest
 
@@ -59,6 +60,8 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         raise FormatError(
             f"There is no file {path}.", hint="PLACES is a file with a row per field."
         )
+    if path.suffix.lower() in (*CSV, *PARQUET):
+        refuse_layer(path, layer)
     if path.suffix.lower() in CSV:
         return _csv(path, {text.lower() for text in texts if text})
     if path.suffix.lower() in PARQUET:
@@ -110,8 +113,6 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
             parse_options=table_csv.ParseOptions(delimiter=mark, newlines_in_values=True),
             convert_options=table_csv.ConvertOptions(
                 column_types={name: pa.string() for name in names if name.lower() in texts},
-                strings_can_be_null=True,
-                quoted_strings_can_be_null=True,
                 decimal_point="," if comma else ".",
             ),
         )
@@ -127,6 +128,9 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     if len(set(names)) < len(names):
         raise FormatError(f"{path} has two columns of the same name.")
     texts_in = [name for name in names if pa.types.is_string(table.schema.field(name).type)]
+    for name in texts_in:  # NA and null are missing numbers, but texts as others
+        empty = pc.equal(table[name], "")
+        table = table.set_column(names.index(name), name, pc.if_else(empty, None, table[name]))
     column = next((name for name in texts_in if name.lower() in _GEOMETRY), None)
     if column is None:
         return RawPlaces(path.name, table)

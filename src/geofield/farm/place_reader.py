@@ -35,6 +35,8 @@ _LAT = ("lat", "latitude")
 _LON = ("lon", "lng", "long", "longitude")
 _X = ("x", "easting", "east", "rechtswert")
 _Y = ("y", "northing", "north", "hochwert")
+#: What tables have where a number is missing.
+_MISSING = ("", "na", "n/a", "nan", "null")
 _BATCH = 50_000
 
 
@@ -109,17 +111,17 @@ def read_places(
     )  # fmt: skip
 
 
-def read_table(path: Path) -> gpd.GeoDataFrame:
+def read_table(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     """The rows of a CSV table: shapes as WKT, or points by columns lat and lon, or x and y.
 
-    What are no degrees is of no CRS: a table cannot say it.
+    What are no degrees is of no CRS: a table cannot say it. Nor has it a `layer`.
 
     Raises
     ------
     FormatError
         When there are no such columns, or positions are no positions.
     """
-    raw = read_raw(path, layer=None, texts=())
+    raw = read_raw(path, layer=layer, texts=())
     if raw.geometry is not None:
         shapes = shapely.from_wkb(raw.geometry.to_numpy(zero_copy_only=False))
         west, south, east, north = shapely.total_bounds(shapes)
@@ -142,7 +144,8 @@ def read_table(path: Path) -> gpd.GeoDataFrame:
     points = np.full(len(x), None)
     points[known] = shapely.points(x[known], y[known])
     crs = LONLAT if names == lonlat else None
-    return gpd.GeoDataFrame(raw.table.to_pandas(), geometry=points, crs=crs)
+    rest = raw.table.drop_columns(list(names)).to_pandas()
+    return gpd.GeoDataFrame(rest, geometry=points, crs=crs)
 
 
 def _plain(table: pa.Table) -> pa.Table:
@@ -259,7 +262,7 @@ def _degrees(raw: RawPlaces, name: str, letters: str) -> NDArray[np.float64]:
         return _numbers(raw, name)
     except FormatError:
         texts = [(text or "").strip() for text in raw.table[name].to_pylist()]
-        angles = [angle_of(text, letters) if text else np.nan for text in texts]
+        angles = [np.nan if text.lower() in _MISSING else angle_of(text, letters) for text in texts]
         if None in angles:
             raise
         return np.array(angles, dtype=np.float64)

@@ -59,6 +59,7 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     from pyogrio.errors import DataLayerError, DataSourceError
 
     if path.suffix.lower() in PARQUET:
+        refuse_layer(path, layer)
         return read_parquet(path)
     _look_at(path)
     try:
@@ -176,6 +177,19 @@ def files_in(path: Path, *suffixes: str) -> list[Path]:
     if not path.is_dir():
         return [path]
     return sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
+
+
+def refuse_layer(path: Path, layer: str | None) -> None:
+    """Refuse a layer of a file that is one table, under another name than the file's.
+
+    Raises
+    ------
+    FormatError
+    """
+    if layer not in (None, path.stem):
+        raise FormatError(
+            f"{path} is one table and has no layer {layer!r}.", hint="Leave the layer out."
+        )
 
 
 def layer_names(path: Path) -> list[str]:
