@@ -112,6 +112,14 @@ def test_what_is_left_out_is_said(tmp_path):
     assert found["taken"] == [line for line in said.splitlines() if ": " in line]
 
 
+def test_rows_without_a_shape_are_told(tmp_path):
+    """They were left out without a word."""
+    nowhere = write(tmp_path / "field.gpkg", [BOX, None, shapely.Polygon()], name=["a", "b", "c"])
+    _, said, plan = imported(tmp_path, nowhere)
+    assert plan.name == "a"
+    assert "field.gpkg: field: 2 rows have no shape and are left out" in said
+
+
 def test_own_columns_of_guidance_come_back(tmp_path):
     """They were gone where the tracks are made of it: a Shapefile has no layer of whole ones."""
     dataset = make_dataset()

@@ -129,6 +129,9 @@ def test_unknown_names_get_the_nearest_one() -> None:
         find_source("swizerland")
     with pytest.raises(ImageryError, match="There is no picture"):
         find_source("folder/none.tif")
+    with pytest.raises(ImageryError, match="one picture of a file") as caught:
+        find_source("GPKG:/fields/a.gpkg:ortho")  # as QGIS names it
+    assert "gdal_translate" in str(caught.value.hint)
 
 
 @pytest.mark.parametrize(

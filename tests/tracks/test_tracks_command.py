@@ -539,6 +539,9 @@ def test_trees_in_a_table_of_latitudes_and_longitudes(tmp_path: Path, mark: str)
     trees.write_text("name,up,right\noak,1,2\n")
     told = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "no.gpkg", 1)
     assert "no columns lat and lon" in told
+    trees.write_text("\n".join(mark.join(row) for row in rows).replace("oak", "öak"), "cp1252")
+    told = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "no.gpkg", 1)
+    assert "Save it as UTF-8" in told  # bytes are no name of a tree
     metres = [["North", "East", "radius_m"], ["5600030", "500050", "3"]]
     trees.write_text("\n".join(map(mark.join, metres)))
     assert "does not say its CRS" in planned_around(tmp_path / "parcel.gpkg", trees, tmp_path, 1)

@@ -24,6 +24,7 @@ from geofield.wording import nearest
 
 CSV = (".csv", ".tsv", ".txt")
 _ROWS = "Give one row per field."
+_UTF_8 = "Save it as UTF-8 (Excel: CSV UTF-8)."
 #: Kinds of shapes that may have arcs: circular strings to multi-surfaces.
 _CURVED = range(8, 13)
 _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
@@ -121,10 +122,12 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         if "Empty CSV" in str(error):
             raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS) from None
-        hint = "Save it as UTF-8 (Excel: CSV UTF-8)."
+        hint = _UTF_8
         if "Expected" in str(error) and b"\0" not in head:
             hint = "Each row has as many values as the first: quote texts that hold commas."
         raise FormatError(f"{path} cannot be read: {error}.", hint=hint) from None
+    if any(pa.types.is_binary(kind) for kind in table.schema.types):
+        raise FormatError(f"{path} has texts that are no UTF-8.", hint=_UTF_8)
     if len(set(names)) < len(names):
         raise FormatError(f"{path} has two columns of the same name.")
     texts_in = [name for name in names if pa.types.is_string(table.schema.field(name).type)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -163,6 +164,11 @@ def _kind_of_file(file: Path) -> str:
 
 
 def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
+    if re.match("[A-Z][A-Z0-9_]+:", what):  # as QGIS and GDAL name what lies in a file
+        return ImageryError(
+            f"{what} is one picture of a file; only whole files are read.",
+            hint=f"Take it out: gdal_translate {what!r} picture.tif",
+        )
     near = nearest(what.lower(), catalogue, cutoff=0.5)
     looks_like_path = "/" in what or "\\" in what or Path(what).suffix != ""
     if looks_like_path and not near:
