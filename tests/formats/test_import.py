@@ -112,6 +112,24 @@ def test_what_is_left_out_is_said(tmp_path):
     assert found["taken"] == [line for line in said.splitlines() if ": " in line]
 
 
+def test_a_fence_is_no_guidance(tmp_path):
+    """A machine was steered along it; and what came beside a plan's own obstacles was dropped."""
+    dataset = make_dataset()
+    write_dataset(dataset, tmp_path, ["geojson"], tell_drops=False)
+    west, south, east, north = dataset.table("field").total_bounds
+    line = shapely.LineString([(west + 5, south + 5), (east - 5, north - 5)])
+    fence = gpd.GeoDataFrame({"radius_m": [0.5]}, geometry=[line], crs=dataset.crs).to_crs(4326)
+    fence.to_file(tmp_path / "geojson" / "fences.geojson")
+    _, said, plan = imported(tmp_path, tmp_path / "geojson")
+    assert "fences: 1 line taken as obstacles, by name" in said
+    before, now = dataset.table("obstacles"), plan.table("obstacles")
+    assert len(now) == len(before) + 1
+    assert now["obstacle_no"].is_unique
+    assert now["obstacle_no"].tolist()[:-1] == before["obstacle_no"].tolist()
+    assert now.area.iloc[-1] == pytest.approx(line.length, rel=0.01)
+    assert len(plan.table("tracks")) == len(dataset.table("tracks"))
+
+
 def test_rows_without_a_shape_are_told(tmp_path):
     """They were left out without a word."""
     nowhere = write(tmp_path / "field.gpkg", [BOX, None, shapely.Polygon()], name=["a", "b", "c"])

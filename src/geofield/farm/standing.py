@@ -34,7 +34,6 @@ from geofield.formats.foreign_tables import (
 )
 from geofield.formats.gpkg_read import is_own
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
-from geofield.model.resized import strips
 from geofield.model.review import reconcile
 from geofield.model.written import (
     free_number,
@@ -177,14 +176,6 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
         )
     around = _around(plan, standing)
     mine = standing.iloc[around].to_crs(plan.field.crs)
-    line = mine.geometry.geom_type.isin(_LINES).to_numpy()
-    if line.any():
-        shapes = mine.geometry.to_numpy().copy()
-        shapes[line] = strips(shapes[line], _reach_m(mine)[line], plan.field.crs)
-        mine = mine.set_geometry(shapes, crs=plan.field.crs)
-        sized = column_like(mine, RADIUS_COLUMNS)
-        if sized is not None:  # a strip is no circle
-            mine[sized.name] = sized.mask(line)
     near = mine.geometry.intersects(plan.field.polygon.buffer(standing.attrs[_NEAR]))
     if not near.any() and _swapped_here(standing, plan):
         raise TrackError(

@@ -17,8 +17,14 @@ from geofield.crs import LONLAT, grid_north_deg, ground_lengths_m, transformer
 from geofield.errors import FormatWarning, SeveralFieldsError
 from geofield.model import Field
 from geofield.model.obstacle_numbers import possible_numbers
-from geofield.model.obstacles import POINT_RADIUS_M, circle_polygons, numbered
+from geofield.model.obstacles import (
+    LINE_HALF_WIDTH_M,
+    POINT_RADIUS_M,
+    circle_polygons,
+    numbered,
+)
 from geofield.model.own_values import as_numbers, told_beside
+from geofield.model.resized import strips
 from geofield.notes import warn
 from geofield.wording import cell_text, counted, some_of
 
@@ -42,6 +48,8 @@ BUFFER_COLUMNS = ("buffer_m", "buffer")
 NUMBER_COLUMNS = ("obstacle_no", "obst_no", "number", "no")
 _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
+#: Line strings and rings, as shapely counts types.
+_LINES = (1, 2)
 #: How geofield names lines in formats without numbers.
 _OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
@@ -113,10 +121,10 @@ def _value(frame: gpd.GeoDataFrame, column: schema.Column) -> Any:
 
 
 def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFrame:
-    """Points and polygons as layer `obstacles`.
+    """Points, lines and polygons as layer `obstacles`.
 
-    A point becomes the circle of its radius and safety margin. Rows without a status were
-    put there by a person: they are `added`. Further columns stay, as they do of others.
+    A point becomes the circle of its radius and safety margin, a line a strip of them. Rows
+    without a status were put there by a person: they are `added`. Further columns stay.
     """
     geometry = np.asarray(shapely.force_2d(frame.geometry.to_numpy()), dtype=object)
     count = len(geometry)
@@ -149,6 +157,10 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
         geometry[is_point] = circle_polygons(
             x[is_point], y[is_point], radius[is_point] + margin[is_point], crs
         )
+    is_line = np.isin(shapely.get_type_id(geometry), _LINES)
+    half_m = np.fmax(radius, LINE_HALF_WIDTH_M) + margin
+    geometry[is_line] = strips(geometry[is_line], half_m[is_line], crs)
+    radius[is_line] = np.nan  # a strip is no circle
     lon, lat = transformer(crs, LONLAT).transform(x, y)
     numbers = numbers_like(frame, NUMBER_COLUMNS)
     numbers[pd.Series(numbers).duplicated()] = np.nan

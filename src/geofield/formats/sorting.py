@@ -1,9 +1,9 @@
 """What other programs' layers are: the field's outline, obstacles, guidance lines.
 
-Points are obstacles and lines are guidance. Of polygons, one that is alone is the field;
-among several, whole words of the layer's name and its columns say whether they are outlines
-or obstacles, and where they are silent, the largest is the field and what lies in it
-obstacles. Nothing is left out or taken without a word.
+Points are obstacles and lines guidance, but for fences and the like, by the layer's name. Of
+polygons, one that is alone is the field; among several, whole words of the layer's name and its
+columns say whether they are outlines or obstacles, and where they are silent, the largest is the
+field and what lies in it obstacles. Nothing is left out or taken without a word.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import pandas as pd
 import shapely
 from pyproj import CRS
 
+from geofield import schema
 from geofield.crossings import in_words, largest_part, mended
 from geofield.crs import LONLAT
 from geofield.errors import FormatWarning
@@ -40,7 +41,8 @@ def _words(text: str) -> frozenset[str]:
 _OBSTACLE_WORDS = _words(
     """obstacle obstacles obstruction obstructions hindernis hindernisse tree trees baum baeume
     bäume arbre arbres exclusion exclusions hole holes interior inner flag flags pond ponds
-    building buildings areafeature pointfeature"""
+    building buildings areafeature pointfeature fence fences zaun zäune hedge hedges hecke hecken
+    ditch ditches graben gräben wire wires"""
 )
 _FIELD_WORDS = _words(
     """field fields boundary boundaries outline outlines border perimeter parcel parcels parzelle
@@ -122,10 +124,17 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
     if outlines:
         whole = _repaired(_joined(outlines), path, slivers=False)
         tables["field"] = field_table(whole, metric, path)
-    standing = [*(part.frame for part in points), *inside]
-    if standing and "obstacles" not in tables:
-        tables["obstacles"] = obstacle_table(_repaired(_joined(standing), path), metric, path)
     lines = [part for part in parts if part.kind == "LineString"]
+    fences = [part for part in lines if _words(part.layer) & _OBSTACLE_WORDS]
+    notes += [part.told(len(part.frame), "taken as obstacles, by name") for part in fences]
+    standing = [*(part.frame for part in (*points, *fences)), *inside]
+    if standing:
+        found = obstacle_table(_repaired(_joined(standing), path), metric, path)
+        if "obstacles" in tables:  # behind those that have numbers
+            found["obstacle_no"] = pd.NA
+            found = numbered(_joined([tables["obstacles"], found]))
+        tables["obstacles"] = schema.conform(schema.OBSTACLES, found, extras=True)
+    lines = [part for part in lines if part not in fences]
     lines = _with_length(_without_asides(lines, tables, notes), notes)
     if lines and "tracks" not in tables:
         notes += [part.told(len(part.frame), "taken as guidance") for part in lines]
@@ -253,7 +262,7 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
     sound.loc[bad, sound.geometry.name] = np.array(shapes, dtype=object)
     warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
     sound = sound.explode(index_parts=False, ignore_index=True)
-    return sound[sound.geom_type.isin(["Polygon", "Point"])]
+    return sound[sound.geom_type.isin(["Polygon", "Point", "LineString"])]
 
 
 def _joined(frames: list[Any]) -> Any:
