@@ -16,11 +16,12 @@ from geofield.errors import (
     TrackWarning,
     refuse_other,
 )
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence
 from geofield.model.field import MAKE_ONE, Field
 from geofield.model.own_values import empty_columns
 from geofield.model.review import reconcile
 from geofield.model.track_edits import TrackEdits
+from geofield.model.written import same_shapes
 from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.settings import Settings, TrackSettings, as_before, option_named
@@ -151,8 +152,7 @@ def kept_outline(previous: Plan) -> Field:
 def renamed(field: Field, previous: Plan) -> Field:
     """A field in the place of an earlier plan's: the names and columns that a person gave stay."""
     known = previous.field
-    same = outline_digest(field.polygon) == outline_digest(known.polygon)
-    if field.method == "boundary" and not same:
+    if field.method == "boundary" and not same_shapes([field.polygon], [known.polygon])[0]:
         # Another parcel, whose name is its own where it has one.
         given = field.name != field.field_id
         own = {**dict(known.own), **dict(field.own)}

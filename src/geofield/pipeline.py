@@ -35,7 +35,7 @@ from geofield.earlier import (
     with_said_tracks,
 )
 from geofield.errors import FieldError, FieldWarning, GeofieldError, ImageryWarning, TrackError
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence, outline_record
 from geofield.model.field import Field
 from geofield.model.merge import merge
 from geofield.model.obstacles import on_grid
@@ -221,7 +221,7 @@ def run_field(
         grid=scene.grid,
         evidence=Evidence(
             (lat, lon),
-            outline_digest(field.polygon),
+            outline_record(field.polygon),
             written=written,
             track_edits=edits,
             said_tracks=() if previous is None else still_said(previous, settings),
@@ -347,7 +347,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     warn_of_unsearched(evidence)
     told += [*tracks_come_back(plan), tracks.edits.in_words()]
     if field is not plan.field:
-        evidence = replace(evidence, outline=outline_digest(field.polygon))
+        evidence = replace(evidence, outline=outline_record(field.polygon))
     return replace(
         plan,
         field=field,

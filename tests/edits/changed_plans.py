@@ -49,3 +49,8 @@ def at(table: Frame, number: int) -> pd.Series[bool]:
 
 def shrunk(table: Frame) -> Frame:
     return table.set_geometry(table.geometry.buffer(-6), crs=table.crs)
+
+
+def there_and_back(table: Frame) -> Frame:
+    """As the layer is after it was saved in a CRS for all of Europe and then in its own again."""
+    return table.to_crs("EPSG:3035").to_crs(table.crs)

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run
+from changed_plans import Frame, at, geofield, plan_in, rewritten, rows, run, there_and_back
 from shapely.affinity import translate
 
 from geofield.crs import ground_scale_of
@@ -117,11 +117,6 @@ def test_every_edit_survives_every_stage(
         assert types["visits" if name == "obstacles" else "soil"].kind == "i"
     field = gpd.read_file(file, layer="field").iloc[0]
     assert (field["name"], field["crop"], field["soil"]) == ("Long meadow", "rye", 41)
-
-
-def there_and_back(table: Frame) -> Frame:
-    """As the layer is after it was saved in a CRS for all of Europe and then in its own again."""
-    return table.to_crs("EPSG:3035").to_crs(table.crs)
 
 
 @pytest.mark.parametrize("arrange", [rearranged, there_and_back])

@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from changed_plans import Frame, geofield, plan_in, rewritten, run, shrunk
+from changed_plans import Frame, geofield, plan_in, rewritten, run, shrunk, there_and_back
 from shapely.affinity import translate
 
 from geofield.formats import validate_file
+from geofield.model.evidence import Evidence
+from geofield.model.field import Field
 from geofield.simulate import SimulatedField
 from geofield_command import run_geofield
 
@@ -31,7 +33,8 @@ def test_a_drawn_outline_stands_above_the_boundary_given(
     run(folder, made, *own)
     given = plan_in(folder).field
     assert (given.method, given.name) == ("boundary", "Parcel 7")
-    rewritten(file, "field", lambda table: table.assign(name="Mine", crop="rye"))
+    renamed = there_and_back(gpd.read_file(file, layer="field")).assign(name="Mine", crop="rye")
+    rewritten(file, "field", lambda table: renamed)
     run(folder, made, *own)
     same = plan_in(folder).field
     assert same.polygon.equals(given.polygon)
@@ -45,6 +48,38 @@ def test_a_drawn_outline_stands_above_the_boundary_given(
     kept = plan_in(folder).field
     assert kept.polygon.equals(moved)
     assert (kept.method, kept.name, dict(kept.own)) == ("drawn", "Mine", {"crop": "rye"})
+
+
+def test_an_outline_that_was_saved_in_another_crs_and_back_is_no_edit(
+    folder: Path, made: SimulatedField
+) -> None:
+    """It counted as drawn, however little it was off, and was never found again."""
+    file, found = folder / "out/field.gpkg", plan_in(folder)
+    rewritten(file, "field", there_and_back)
+    read = plan_in(folder)
+    assert 0 < read.field.polygon.hausdorff_distance(found.field.polygon) < 0.01
+    assert (read.outline_edited, read.field.method) == (False, found.field.method)
+    geofield("tracks", file, "-o", file)
+    told = run(folder, made, "--overwrite")
+    assert "outline as before" in told or "outline other by" in told
+    after = plan_in(folder).field
+    assert after.polygon.equals(found.field.polygon)
+    # A hand moves a corner farther than that, and puts one on a straight side.
+    ring = shapely.get_coordinates(found.field.polygon.exterior)
+    ring[[0, -1]] += 0.03
+    assert found.evidence.moved(shapely.Polygon(ring))
+    finer = shapely.segmentize(found.field.polygon, 5.0)
+    assert not found.evidence.moved(shapely.reverse(finer))
+
+
+def test_an_outline_that_an_earlier_version_wrote_is_known_by_its_fingerprint() -> None:
+    square = shapely.box(500000, 5600000, 500200, 5600100)
+    written = "636f6cdd7bad1606916d7fe6a07e3fabc585556624b2492a4f56ea02ee540681"
+    evidence = Evidence.from_json({"field": {"method": "auto", "outline_sha256": written}})
+    assert not evidence.moved(shapely.reverse(square))
+    assert evidence.moved(translate(square, 1e-6))
+    again = Evidence.from_json(evidence.to_json(Field(square, "EPSG:32633"), None))
+    assert again == evidence
 
 
 def test_an_outline_of_which_nobody_recorded_how_it_was_written(

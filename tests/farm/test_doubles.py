@@ -19,7 +19,7 @@ from geofield.farm.edited_in_place import edited_in_place
 from geofield.farm.overview import write_overview
 from geofield.farm.put_back import put_back, take_in_place
 from geofield.farm.store import Store
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence, outline_record
 from geofield.model.obstacles import from_polygons
 from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan
@@ -41,7 +41,7 @@ def farm(tmp_path: Path) -> Path:
         trees = shapely.buffer(shapely.points([(x + 30, Y + 30), (x + 60, Y + 70)]), 3)
         shape = shapely.box(x, Y, x + 100, Y + 100)
         field = gf.Field(shape, crs=UTM, name=one, field_id=one, method="boundary")
-        known = Evidence(outline=outline_digest(shape))
+        known = Evidence(outline=outline_record(shape))
         found = from_polygons(trees, UTM, buffer_m=0.0, status="added")
         settings = Settings(tracks={"spacing_m": 6.0})
         plans.append(run_tracks(gf.Plan(field, obstacles=found, evidence=known), settings=settings))

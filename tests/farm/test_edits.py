@@ -24,7 +24,7 @@ from geofield.errors import FieldWarning, FormatError
 from geofield.farm.edits import put_edits
 from geofield.farm.put_back import _put, put_back
 from geofield.farm.store import Store
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence, outline_record
 from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan
 from geofield.review import Session
@@ -505,7 +505,7 @@ def test_a_plan_without_obstacles_goes_back_as_it_is(tmp_path: Path) -> None:
     shape = shapely.box(500_000, 5_000_000, 500_100, 5_000_100)
     field = gf.Field(shape, crs=CRS(32633), field_id="a", name="a")
     tracks = gf.plan_tracks(shape, crs=field.crs, spacing_m=9)
-    known = Evidence(outline=outline_digest(shape))
+    known = Evidence(outline=outline_record(shape))
     plan = gf.Plan(field, tracks=tracks, settings=Settings(), evidence=known)
     gf.Farm([plan]).write(tmp_path / "farm")
     geofield("farm", "get", tmp_path / "farm", "a", "-o", tmp_path / "a.gpkg")

@@ -17,7 +17,7 @@ from geofield import schema
 from geofield.cli.main import cli
 from geofield.errors import FormatError
 from geofield.farm.put_back import put_back
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence, outline_record
 from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan
 from geofield.settings import Settings
@@ -32,7 +32,7 @@ def _farm(folder: Path, y: float = 5_300_000.0) -> Path:
     plans = []
     for one, x in (("a", 500_000.0), ("b", 500_200.0)):
         field = gf.Field(shapely.box(x, y, x + 100, y + 100), UTM, name=one, field_id=one)
-        evidence = Evidence(outline=outline_digest(field.polygon))
+        evidence = Evidence(outline=outline_record(field.polygon))
         plans.append(run_tracks(gf.Plan(field, evidence=evidence), settings=settings))
     return gf.Farm(plans).write(folder)
 

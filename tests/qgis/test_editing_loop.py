@@ -14,7 +14,7 @@ from geofield.cli.tracks import tracks
 from geofield.errors import FormatWarning, TrackWarning
 from geofield.formats import read_dataset, write_dataset
 from geofield.model import Field, Provenance
-from geofield.model.evidence import outline_digest
+from geofield.model.evidence import outline_record
 from geofield.notes import listening
 
 
@@ -42,7 +42,7 @@ def plan_file(tmp_path):
             {name: dataset.tables[name] for name in ("field", "obstacles")},
             dataset.crs,
             dataset.name,
-            Provenance(evidence={"field": {"outline_sha256": outline_digest(outline.polygon)}}),
+            Provenance(evidence={"field": {"outline": outline_record(outline.polygon)}}),
             dataset.grid,
         ),
         tmp_path,

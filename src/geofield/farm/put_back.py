@@ -27,6 +27,7 @@ from geofield.farm.store import Store
 from geofield.farm.taken_out import note_put, refuse_changed, settings_taken
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
+from geofield.model.written import same_shapes
 from geofield.notes import warn
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
@@ -210,7 +211,7 @@ def _with_its_outline(plan: Plan, before: Plan) -> Plan:
     """A plan whose outline counts as drawn where only the farm can tell that it was moved."""
     if plan.evidence.outline is not None:
         return plan
-    if plan.field.polygon.equals_exact(before.field.polygon, 1e-6):
+    if same_shapes([plan.field.polygon], [before.field.polygon])[0]:
         return plan
     return replace(plan, field=replace(plan.field, method="drawn", quality=None))
 

@@ -24,7 +24,7 @@ from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
 from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
-from geofield.model.evidence import Evidence, outline_digest
+from geofield.model.evidence import Evidence, outline_record
 from geofield.model.field import Field
 from geofield.notes import listening, warn
 from geofield.pipeline import run_field, run_obstacles, run_tracks
@@ -91,7 +91,7 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
         plan = previous
     elif boundary is not None:
         # As it was given: what a person moves of it later is known by that.
-        evidence = Evidence(outline=outline_digest(boundary.polygon))
+        evidence = Evidence(outline=outline_record(boundary.polygon))
         plan = _around(Plan(boundary, evidence=evidence), job)
     else:
         raise FieldError(
@@ -152,7 +152,7 @@ def _on_parcel(previous: Plan, place: Place) -> Plan:
     # Of parcels that were reviewed without a record nobody knows who drew them.
     given = field.method == "boundary" and previous.evidence.outline is not None
     if given and not drew_outline(previous):
-        evidence = replace(previous.evidence, outline=outline_digest(polygon))
+        evidence = replace(previous.evidence, outline=outline_record(polygon))
         return replace(previous, field=replace(field, polygon=polygon), evidence=evidence)
     apart = polygon.symmetric_difference(field.polygon).area
     if apart > _PARTED * min(polygon.area, field.polygon.area):

@@ -16,7 +16,7 @@ from geofield.model.field import Field, FieldQuality
 from geofield.model.frame import Shown
 from geofield.model.searched import UNSEARCHED, unsearched
 from geofield.model.track_edits import TrackEdits
-from geofield.model.written import Written
+from geofield.model.written import DECIMALS, Written, same_shapes
 
 #: How the doubt begins that nobody saw a part of the field.
 UNSEEN = "The picture does not show"
@@ -28,7 +28,7 @@ class Evidence:
 
     #: Latitude and longitude that the field was looked for at, degrees.
     point: tuple[float, float] | None = None
-    #: Fingerprint of the outline as stage 2 left it: another one means a person drew.
+    #: The outline as stage 2 left it (:func:`outline_record`): another one means a person drew.
     outline: str | None = None
     #: How obstacles were found, plain JSON values.
     detection: Mapping[str, Any] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Evidence:
 
     def moved(self, outline: shapely.Polygon) -> bool:
         """Whether a person moved an outline since a stage wrote it; not, where nobody knows."""
-        return self.outline is not None and self.outline != outline_digest(outline)
+        return self.outline is not None and not is_outline(self.outline, outline)
 
     def with_unsearched(self, outline: Field) -> Evidence:
         """The same with the doubt about ground that the outline gained, or without it."""
@@ -83,7 +83,7 @@ class Evidence:
         """Plain JSON values, with those of the field's quality and of the tracks."""
         outline: dict[str, Any] = {}
         if self.outline is not None:
-            outline = {"method": of.method, "outline_sha256": self.outline}
+            outline = {"method": of.method, "outline": self.outline}
         if of.quality is not None:
             outline["quality"] = _quality_json(of.quality)
         said = {"tracks": list(self.said_tracks)} if self.said_tracks else None
@@ -106,9 +106,10 @@ class Evidence:
     def from_json(cls, value: Mapping[str, Any]) -> Evidence:
         """The evidence that was written with :meth:`to_json`, by this or an earlier version."""
         point, written = value.get("point"), value.get("written")
+        stage_2 = value.get("field", {})
         return cls(
             None if point is None else (float(point["lat"]), float(point["lon"])),
-            value.get("field", {}).get("outline_sha256"),
+            stage_2.get("outline", stage_2.get("outline_sha256")),
             dict(value.get("obstacles", {})),
             None if written is None else Written.from_json(written),
             TrackEdits.from_json(value.get("track_edits", {})),
@@ -119,10 +120,19 @@ class Evidence:
         )
 
 
-def outline_digest(outline: shapely.Polygon) -> str:
-    """A fingerprint of an outline, to tell whether a person has moved it since."""
-    ring = shapely.normalize(outline)
-    return hashlib.sha256(shapely.to_wkb(ring, byte_order=1)).hexdigest()
+def outline_record(outline: shapely.Polygon) -> str:
+    """An outline in plain words, to tell whether a person has moved it since."""
+    return str(shapely.to_wkt(outline, rounding_precision=DECIMALS))
+
+
+def is_outline(recorded: str, outline: shapely.Polygon) -> bool:
+    """Whether an outline is the one of an :func:`outline_record`, however its ring is arranged."""
+    known: shapely.Geometry | None = shapely.from_wkt(recorded, on_invalid="ignore")
+    if known is not None:
+        return bool(same_shapes([known], [outline])[0])
+    # Earlier versions wrote a fingerprint.
+    ring = shapely.to_wkb(shapely.normalize(outline), byte_order=1)
+    return recorded == hashlib.sha256(ring).hexdigest()
 
 
 def shown_from_json(value: Mapping[str, Any]) -> Shown | None:

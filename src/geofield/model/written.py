@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 SAME_M = 0.02
 #: What is farther than this from a circle is recorded as drawn, and what is smaller, metres.
 _ROUND_M = 0.0005
-_DECIMALS = 4
+#: Of coordinates in a record.
+DECIMALS = 4
 _WORDS = ("kind", "status")
 
 #: A shape in plain values: centre x, y and radius of a circle, or WKT; in units of the CRS.
@@ -175,13 +176,13 @@ def plain(geometry: Any) -> list[PlainShape]:
     geometry = np.asarray(geometry, dtype=object)
     fitted = fitted_circles(geometry)
     result: list[PlainShape] = [
-        str(text) for text in shapely.to_wkt(geometry, rounding_precision=_DECIMALS)
+        str(text) for text in shapely.to_wkt(geometry, rounding_precision=DECIMALS)
     ]
     # Of nothing but its centre a circle would be empty.
     rows = np.flatnonzero(still_round(geometry, fitted[:, 2]) & (fitted[:, 2] > 2 * _ROUND_M))
     # Some are round enough to be driven around as circles, but were drawn as they are.
     rows = rows[same_shapes(plain_circles(*fitted[rows].T), geometry[rows], _ROUND_M)]
-    for row, (x, y, radius) in zip(rows, fitted[rows].round(_DECIMALS).tolist(), strict=True):
+    for row, (x, y, radius) in zip(rows, fitted[rows].round(DECIMALS).tolist(), strict=True):
         result[row] = (x, y, radius)
     return result
 
@@ -250,9 +251,9 @@ def _middles(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
 def _moved(shape: PlainShape, source: CRS, target: CRS) -> PlainShape:
     if not isinstance(shape, str):
         x, y = transformer(source, target).transform(shape[0], shape[1])
-        return (round(x, _DECIMALS), round(y, _DECIMALS), shape[2])
+        return (round(x, DECIMALS), round(y, DECIMALS), shape[2])
     moved = reproject(shapely.from_wkt(shape), source, target)
-    return str(shapely.to_wkt(moved, rounding_precision=_DECIMALS))
+    return str(shapely.to_wkt(moved, rounding_precision=DECIMALS))
 
 
 def _word(value: Any) -> str | None:

@@ -19,7 +19,7 @@ from shapely import Polygon
 from geofield import schema
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.errors import GeofieldError
-from geofield.model.evidence import outline_digest
+from geofield.model.evidence import outline_record
 from geofield.model.obstacles import circle_polygons, from_polygons
 from geofield.model.written import free_number
 from geofield.settings import Settings, TrackSettings
@@ -141,7 +141,7 @@ def choose(plan: Plan, command: Command) -> Plan:
     field = plan.field.choose(_whole(command, "no"))
     # Chosen, not drawn: a further point is a later word on it.
     return replace(
-        plan, field=field, evidence=replace(plan.evidence, outline=outline_digest(field.polygon))
+        plan, field=field, evidence=replace(plan.evidence, outline=outline_record(field.polygon))
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.earlier import bars_points
-from geofield.model.evidence import outline_digest
+from geofield.model.evidence import outline_record
 from geofield.model.scene import Scene
 from geofield.plan import Plan
 from geofield.review.commands import Command, EditError, places_of
@@ -75,7 +75,7 @@ class Ground:
             field=found,
             settings=settings.model_copy(update={"field": said}),
             evidence=replace(
-                plan.evidence, outline=outline_digest(found.polygon), point=(lat0, lon0)
+                plan.evidence, outline=outline_record(found.polygon), point=(lat0, lon0)
             ),
         )
 

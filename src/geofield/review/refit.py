@@ -11,7 +11,7 @@ from itertools import takewhile
 from typing import Any
 
 from geofield.errors import GeofieldError
-from geofield.model.evidence import outline_digest
+from geofield.model.evidence import is_outline, outline_record
 from geofield.plan import Plan
 from geofield.review.commands import EditError
 from geofield.review.session import Session
@@ -59,7 +59,7 @@ def refitted(plan: Plan, entry: Entry) -> dict[str, Any]:
         When that has not what the edit changes, or has it otherwise.
     """
     command = {name: value for name, value in entry.items() if name != "was"}
-    if command.get("do") in _OF_OUTLINE and entry.get("was") != _outline_of(plan):
+    if command.get("do") in _OF_OUTLINE and not _has_outline(plan, entry.get("was")):
         raise EditError("the outline is another one.")
     if command.get("do") not in _OF_OUTLINE and "no" in command:
         fits = [entry.get("was")]
@@ -93,7 +93,12 @@ def refit(session: Session, entries: Sequence[Entry]) -> tuple[list[Entry], list
 
 
 def _outline_of(plan: Plan) -> list[Any]:
-    return [outline_digest(plan.field.polygon), len(plan.field.alternatives)]
+    return [outline_record(plan.field.polygon), len(plan.field.alternatives)]
+
+
+def _has_outline(plan: Plan, was: Any) -> bool:
+    recorded, choices = was or ("", -1)
+    return choices == len(plan.field.alternatives) and is_outline(recorded, plan.field.polygon)
 
 
 def _obstacles_of(plan: Plan) -> dict[int, list[Any]]:
