@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import geopandas as gpd
@@ -92,3 +93,14 @@ def test_a_ring_of_a_field_still_has_an_id() -> None:
     crs = CRS.from_epsg(32636)
     around = shapely.Point(548000, 3881000).buffer(100).exterior.buffer(1)
     assert place_id(around, crs) == place_id(shapely.Polygon(around.exterior), crs)
+
+
+def test_the_id_of_a_strip_half_around_the_world_fills_no_memory() -> None:
+    """Its roundest latitude came with 22 million longitudes, and in 300 seconds."""
+    degree_m = 111_319.49
+    strip = shapely.box(-100 * degree_m, 1_020_000, 125 * degree_m, 1_020_002)
+    tracemalloc.start()
+    assert place_id(strip, CRS(3857)) == "9.12402N0.00000E"
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 150e6

@@ -8,6 +8,7 @@ that do not overlap share no position: they never have the same id.
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import shapely
@@ -47,29 +48,34 @@ def place_id(polygon: Polygon, crs: CRS) -> str:
     box = (south, north, west, east)
     for digits, tenths in _STEPS:
         per_degree = 10**digits / tenths
-        found = _inside(whole, crs, per_degree, box)
-        if len(found):
-            lat, lon = min(found.tolist(), key=lambda one: (_rank(one[0]), _rank(one[1]), one))
-            return position_words(lat / per_degree, lon / per_degree, digits)
+        found = _roundest(whole, crs, per_degree, box)
+        if found is not None:
+            return position_words(found[0] / per_degree, found[1] / per_degree, digits)
     return position_words(lat_0, lon_0, 7)
 
 
-def _inside(
+def _roundest(
     whole: Polygon, crs: CRS, per_degree: float, box: tuple[float, float, float, float]
-) -> NDArray[np.int64]:
-    """Positions of a lattice inside an outline: whole numbers of steps, latitude first."""
-    lat = np.arange(math.ceil(box[0] * per_degree), math.floor(box[1] * per_degree) + 1)
-    lon = np.arange(math.ceil(box[2] * per_degree), math.floor(box[3] * per_degree) + 1)
-    if not len(lat) or not len(lon):
-        return np.empty((0, 2), np.int64)
-    pairs = np.stack(np.meshgrid(lat, lon, indexing="ij"), axis=-1).reshape(-1, 2)
-    x, y = transformer(LONLAT, crs).transform(pairs[:, 1] / per_degree, pairs[:, 0] / per_degree)
-    return np.asarray(pairs[shapely.contains_xy(whole, x, y)], np.int64)
+) -> tuple[int, int] | None:
+    """The roundest position of a lattice inside an outline: numbers of steps, latitude first."""
+    south, west = (math.ceil(side * per_degree) for side in box[::2])
+    north, east = (math.floor(side * per_degree) for side in box[1::2])
+    lonlat = transformer(LONLAT, crs)
+    for lats, lons in product(_by_roundness(south, north), _by_roundness(west, east)):
+        lat, lon = (each.ravel() for each in np.meshgrid(lats, lons, indexing="ij"))
+        inside = shapely.contains_xy(whole, *lonlat.transform(lon / per_degree, lat / per_degree))
+        if inside.any():
+            first = inside.argmax()
+            return int(lat[first]), int(lon[first])
+    return None
 
 
-def _rank(steps: int) -> int:
-    """How far from round a number of steps is: multiples of a high power of two come first."""
-    return -(steps & -steps) if steps else -(1 << 62)
+def _by_roundness(first: int, last: int) -> list[NDArray[np.int64]]:
+    """The whole numbers of a range: 0, then the multiples of a high power of two, down to 1."""
+    powers = range(max(abs(first), abs(last)).bit_length(), -1, -1)
+    odd = [np.arange(-(-first >> power) | 1, (last >> power) + 1, 2) << power for power in powers]
+    zero = np.zeros(int(first <= 0 <= last), np.int64)
+    return [each for each in (zero, *odd) if len(each)]
 
 
 def position_words(lat: float, lon: float, digits: int) -> str:
