@@ -13,10 +13,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from geofield.late import late_names
+from geofield.wording import names_from
 
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from geofield.errors import GeofieldError, GeofieldWarning
     from geofield.evaluation import evaluate
     from geofield.farm import Farm, plan_fields, read_farm
@@ -77,6 +80,16 @@ __getattr__ = late_names(
         "tracks": "plan_route plan_tracks",
     },
 )
+
+
+def _options() -> Mapping[str, str]:
+    from geofield.settings import NAMES
+
+    return NAMES
+
+
+# Settings are above what words errors, and slow to load.
+names_from(_options)
 
 
 def __dir__() -> list[str]:

@@ -8,8 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Callable, Iterable, Sequence
-from importlib import import_module
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 _OPTION = re.compile(r"--([a-z][a-z0-9-]*)(?: ([A-Z0-9/](?:[\w:/+-]|\.(?=\w))*|mask\b))?")
@@ -25,6 +24,7 @@ _NAMES = {
     "boundary-name": "name=",
     "json": "the value itself",
 }
+_SOURCES: list[Callable[[], Mapping[str, str]]] = []
 
 
 def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
@@ -117,9 +117,9 @@ def some_of(names: Sequence[str], most: int) -> str:
     return f"{', '.join(names[:most])}{more}"
 
 
-def learn(names: dict[str, str]) -> None:
-    """Tell what options are called in Python: those of the settings know their own names."""
-    _NAMES.update(names)
+def names_from(source: Callable[[], Mapping[str, str]]) -> None:
+    """Tell who knows what more options are called; that is asked when a message names an option."""
+    _SOURCES.append(source)
 
 
 def in_python(text: str) -> str:
@@ -138,8 +138,10 @@ def in_python(text: str) -> str:
 
 def _name(found: re.Match[str]) -> str:
     option, value = found.groups()
-    import_module("geofield.settings")  # which lies above this, and tells its names: see `learn`
-    name = _NAMES.get(option, option.replace("-", "_"))
+    known = dict(_NAMES)
+    for source in _SOURCES:
+        known.update(source())
+    name = known.get(option, option.replace("-", "_"))
     if value is None:
         return name
     try:

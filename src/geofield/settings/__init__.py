@@ -15,9 +15,10 @@ from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import LonLat
 from geofield.settings.sections import SECTIONS, Stage
 from geofield.settings.tracks import DirectionName, TrackSettings
-from geofield.settings.whole import Settings, option_named
+from geofield.settings.whole import NAMES, Settings, option_named
 
 __all__ = [
+    "NAMES",
     "SECTIONS",
     "DirectionName",
     "ExportSettings",

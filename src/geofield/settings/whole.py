@@ -16,7 +16,6 @@ from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import Section
 from geofield.settings.sections import MODELS
 from geofield.settings.tracks import TrackSettings
-from geofield.wording import learn
 
 
 class Settings(Section):
@@ -59,10 +58,9 @@ def option_named(name: str, field: FieldInfo) -> str:
     return "--" + name.removesuffix(unit).replace("_", "-")
 
 
-learn(
-    {
-        option_named(name, field)[2:]: name
-        for model in MODELS.values()
-        for name, field in model.model_fields.items()
-    }
-)
+#: What the options of settings are called in Python.
+NAMES = {
+    option_named(name, field)[2:]: name
+    for model in MODELS.values()
+    for name, field in model.model_fields.items()
+}
