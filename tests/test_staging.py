@@ -245,13 +245,19 @@ def whole(plan: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
-def test_a_stop_at_any_moment_leaves_products_whole(plan: Path, kind: signal.Signals) -> None:
+def test_a_stop_at_any_moment_leaves_products_whole(
+    plan: Path, kind: signal.Signals, tmp_path: Path
+) -> None:
     dice = random.Random(int(kind))
     for spacing in (5, 6, 7):
-        line = [str(GEOFIELD), "tracks", str(plan), "--spacing", str(spacing), "-o", str(plan)]
-        with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as process:
+        log = tmp_path / f"{spacing}.log"
+        line = ["tracks", plan, "--spacing", str(spacing), "-o", plan, "--log", log]
+        with subprocess.Popen([GEOFIELD, *line], stderr=subprocess.PIPE, text=True) as process:
             try:
-                time.sleep(dice.uniform(0.3, 2.5))
+                # Before that it is Python that stops, in whatever it was loading.
+                while not log.exists() and process.poll() is None:
+                    time.sleep(0.01)
+                time.sleep(dice.uniform(0.0, 2.2))
                 process.send_signal(kind)
                 _, told = process.communicate(timeout=60)
             except BaseException:

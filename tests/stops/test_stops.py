@@ -9,6 +9,7 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -44,6 +45,14 @@ def test_a_stop_leaves_old_products_or_new_ones(
         for work, aimed in moments
     ]
     assert not [each for each in stops if each.faults]
+
+
+def test_a_stop_while_the_command_line_loads_shows_no_traceback(tmp_path: Path) -> None:
+    """Ctrl+C right behind Enter showed where in Python's imports it came, up to a second long."""
+    (tmp_path / "click.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    line = [sys.executable, "-m", "geofield", "info", "field.gpkg"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
 
 
 def test_work_that_outlives_its_terminal_goes_on(works: list[Work], tmp_path: Path) -> None:
