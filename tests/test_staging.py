@@ -251,7 +251,7 @@ def test_a_stop_at_any_moment_leaves_products_whole(
     dice = random.Random(int(kind))
     for spacing in (5, 6, 7):
         log = tmp_path / f"{spacing}.log"
-        line = ["tracks", plan, "--spacing", str(spacing), "-o", plan, "--log", log]
+        line = ["tracks", str(plan), "--spacing", str(spacing), "-o", str(plan), "--log", str(log)]
         with subprocess.Popen([GEOFIELD, *line], stderr=subprocess.PIPE, text=True) as process:
             try:
                 # Before that it is Python that stops, in whatever it was loading.
