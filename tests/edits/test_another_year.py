@@ -21,6 +21,7 @@ from geofield_command import run_geofield
 
 #: A crown of the picture (tree 1) and a bare place in the field, middle column and row.
 CROWN, BARE, HALF_PX = (265, 111), (230, 230), 16
+TAGS = ("GEOFIELD_SOURCE", "GEOFIELD_IMAGERY_DATE")
 
 
 def of_year(folder: Path, year: int, *, first: int = 0, tree: int = 0, date: str = "") -> Path:
@@ -244,3 +245,38 @@ def test_a_reviewed_field_of_a_farm_is_searched_in_the_picture_of_another_year(
         assert rows(read_farm(folder / "farm")["a"]).equals(before)
     assert "It stays as reviewed: " in done.stderr
     assert reviewed.read_bytes() == kept
+
+
+def test_a_farm_knows_its_picture_by_what_it_shows(folder: Path) -> None:
+    """By its name alone another year's in its place was no news: what grew there stayed unseen."""
+    outline = gpd.read_file(folder / "out/field.gpkg", layer="field").assign(id="a")
+    outline[["id", "geometry"]].to_file(folder / "parcels.gpkg")
+    farm, picture, moved = folder / "farm", folder / "picture.tif", folder / "moved/picture.tif"
+    batch = ["batch", folder / "parcels.gpkg", picture]
+    more = ["--spacing", 6, "--workers", 1, "--out", farm]
+    geofield(*batch, *more)
+    geofield("farm", "get", farm, "a", "-o", folder / "a.gpkg")
+    geofield("farm", "put", folder / "a.gpkg", farm)
+    # Packed otherwise, with overviews and elsewhere it is the same.
+    moved.parent.mkdir()
+    with rasterio.open(picture) as whole:
+        profile = whole.profile | {"compress": "lzw", "tiled": True}
+        with rasterio.open(moved, "w", **profile) as written:
+            written.write(whole.read())
+            written.update_tags(**whole.tags())
+            written.build_overviews([2])
+            said = {name: whole.tags().get(name, "") for name in TAGS}
+    told = geofield(*batch[:-1], moved, *more)
+    assert "1 of 1" in told
+    assert "Pace" not in told
+    with rasterio.open(of_year(folder, 2018, tree=1), "r+") as later:
+        later.update_tags(**said)
+    (folder / "2018.tif").replace(picture)
+    done = run_geofield(*batch, *more)
+    assert "a farm of other work: the pictures or obstacles differ." in done.stderr
+    told = geofield("export", farm, "-f", "map", "--out", folder / "map")
+    assert "picture.tif is not what the farm was planned on, though it is called the same" in told
+    told = geofield(*batch, *more, "--fresh")
+    assert "Planned on simulated-11, no longer on what it showed before: " in told
+    assert "1 new (12)" in " ".join(told.split())
+    assert "no longer on" not in geofield(*batch[:-1], moved, *more, "--fresh")

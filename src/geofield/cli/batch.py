@@ -286,12 +286,14 @@ def _imagery(
 
     from geofield.cli.imagery_tools import source_of
     from geofield.farm.pictures import refuse_elsewhere
-    from geofield.imagery import Imagery, is_own_picture
+    from geofield.imagery import Imagery, is_own_picture, pictures_digest
     from geofield.imagery.sources import PictureSource
 
     if is_own_picture(what):
         refuse_elsewhere(Path(what), places, settings)
-        return Imagery(str(Path(what).absolute())), {"imagery": Path(what).name}
+        digest = pictures_digest(Path(what), allow=settings.fetch.allow)
+        about = {"imagery": Path(what).name, "imagery_digest": digest}
+        return Imagery(str(Path(what).absolute()), digest=digest), about
     first = int(np.flatnonzero(np.isfinite(places.lat))[0])
     point = (float(places.lon[first]), float(places.lat[first]))
     source, options = source_of(what, settings, point, acknowledged=acknowledged)

@@ -8,11 +8,13 @@ import numpy as np
 import shapely
 
 from geofield.crs import LONLAT, reproject
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, ImageryWarning
 from geofield.farm.folder import Record
 from geofield.farm.places import Places
 from geofield.farm.store import Store
 from geofield.grid import Grid
+from geofield.imagery import pictures_digest
+from geofield.notes import warn
 from geofield.settings import Settings
 from geofield.windows import grid_of
 from geofield.wording import none_of
@@ -60,8 +62,34 @@ def _inside(grid: Grid, lat: np.ndarray, lon: np.ndarray) -> np.ndarray:
 
 
 def pictures_of(folder: Path) -> Path | None:
-    """The pictures that the farm was planned on, beside it or in the current folder."""
+    """The pictures that the farm was planned on, beside it or in the current folder.
+
+    Warns
+    -----
+    ImageryWarning
+        Of others that are called the same, where those are not there.
+    """
     record = Record.read(Store.of(folder)) or Record()
-    name = str(record.imagery.get("imagery", ""))
+    name, digest = (str(record.imagery.get(key, "")) for key in ("imagery", "imagery_digest"))
     places = (folder.parent / name, Path(name)) if name else ()
-    return next((place for place in places if place.exists()), None)
+    there = [place for place in places if place.exists()]
+    for place in there:
+        if not digest or _shows(place, digest):
+            return place
+    if there:
+        warn(
+            f"{there[0]} is not what the farm was planned on, though it is called the same: it is "
+            "not shown. Put its picture there, or have it planned on this one: geofield batch ... "
+            "--fresh.",
+            ImageryWarning,
+            stacklevel=2,
+        )
+    return None
+
+
+def _shows(path: Path, digest: str) -> bool:
+    """Whether pictures show what others did, or cannot be opened, which is told later."""
+    try:
+        return pictures_digest(path) == digest
+    except ImageryError:
+        return True

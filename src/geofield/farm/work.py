@@ -26,6 +26,7 @@ from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
 from geofield.model.evidence import Evidence, outline_record
 from geofield.model.field import Field
+from geofield.model.scene import ImagerySource
 from geofield.notes import listening, warn
 from geofield.pipeline import run_field, run_obstacles, run_tracks
 from geofield.plan import Plan
@@ -39,6 +40,8 @@ _SHARED = 0.1
 _PARTED = 0.01
 #: Outlines that differ by less are the same, metres.
 _SAME_M = 0.001
+#: What the pictures showed that a plan was made on, in its evidence.
+_PICTURES = "pictures"
 
 
 @dataclass(frozen=True)
@@ -206,17 +209,27 @@ def _on_picture(
             picture.path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
             boundary=boundary, window=window, fetch_wider=picture.wider,
         )  # fmt: skip
-        if previous is not None:
-            plan = replace(plan, evidence=replace(plan.evidence, farm=previous.evidence.farm))
+        farm = {} if previous is None else previous.evidence.farm
+        if imagery.digest:
+            farm = {**farm, _PICTURES: imagery.digest}
+        plan = replace(plan, evidence=replace(plan.evidence, farm=farm))
         plan = run_obstacles(_around(plan, job), plan.scene or window, settings=seen)
-        if previous is not None and not plan.source.is_same_picture(previous.source):
+        if previous is not None and _is_other(plan.source, imagery, previous):
+            before = previous.source.name or "no picture"
+            if before == plan.source.name:
+                before = "what it showed before"
             warn(
-                f"Planned on {plan.source.name}, no longer on "
-                f"{previous.source.name or 'no picture'}: {'; '.join(plan.changes)}.",
+                f"Planned on {plan.source.name}, no longer on {before}: {'; '.join(plan.changes)}.",
                 FieldWarning,
                 stacklevel=2,
             )
         return plan
+
+
+def _is_other(source: ImagerySource, imagery: Imagery, reviewed: Plan) -> bool:
+    """Whether a picture is another one than a plan was made on, whatever it is called."""
+    noted = reviewed.evidence.farm.get(_PICTURES, imagery.digest)
+    return noted != imagery.digest or not source.is_same_picture(reviewed.source)
 
 
 def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Imagery | None) -> bool:
@@ -237,7 +250,7 @@ def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Image
     except (FieldError, ImageryError, PointOutsideError) as error:
         warn(f"It stays as reviewed: {error.message}", FieldWarning, stacklevel=3)
         return False
-    return not scene.source.is_same_picture(reviewed.source)
+    return _is_other(scene.source, imagery, reviewed)
 
 
 def _around(plan: Plan, job: Job) -> Plan:

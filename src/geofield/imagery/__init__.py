@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired, Where, acquire
     from geofield.imagery.facts import picture_facts, source_of
     from geofield.imagery.opening import FetchOptions
-    from geofield.imagery.pictures import open_reader
+    from geofield.imagery.pictures import open_reader, pictures_digest
     from geofield.imagery.place_picture import Imagery, PlacePicture, is_own_picture
     from geofield.imagery.reader import SceneReader
     from geofield.imagery.scene import read_scene
@@ -33,6 +33,7 @@ __all__ = [
     "is_own_picture",
     "open_reader",
     "picture_facts",
+    "pictures_digest",
     "read_scene",
     "source_of",
     "write_scene",
@@ -44,7 +45,7 @@ __getattr__ = late_names(
         "acquisition": "Acquired Where acquire",
         "facts": "picture_facts source_of",
         "opening": "FetchOptions",
-        "pictures": "open_reader",
+        "pictures": "open_reader pictures_digest",
         "place_picture": "Imagery PlacePicture is_own_picture",
         "reader": "SceneReader",
         "scene": "read_scene",

@@ -43,7 +43,7 @@ def roles_of(dataset: Any, given: Sequence[str] | None) -> BandRoles:
     if not given:
         unnamed = {"alpha", "undefined"}
         looks = [
-            look_of(_sample(dataset, i + 1)) if name in unnamed else "picture"
+            look_of(sampled(dataset, i + 1)) if name in unnamed else "picture"
             for i, name in enumerate(marked)
         ]
     return find_roles(dataset.descriptions, marked, looks, given)
@@ -62,10 +62,10 @@ def source_of(path: str | Path) -> ImagerySource:
         return source_from_tags(dataset.tags(), str(path))
 
 
-def _sample(dataset: Any, band: int) -> NDArray[Any]:
+def sampled(dataset: Any, bands: int | list[int]) -> NDArray[Any]:
     """Values of 3 x 3 small windows spread over the picture: the same ones every time."""
     windows = spread(dataset.shape, _SAMPLE_PX, 3)
-    return np.concatenate([dataset.read(band, window=each).ravel() for each in windows])
+    return np.concatenate([dataset.read(bands, window=each).ravel() for each in windows])
 
 
 def spread(shape: tuple[int, int], side_px: int, each_way: int) -> list[Window]:
@@ -85,7 +85,7 @@ def top_of(dataset: Any, alpha: int | None) -> float | None:
     """
     if alpha is None:
         return None
-    sample = _sample(dataset, alpha + 1)
+    sample = sampled(dataset, alpha + 1)
     most = float(np.nanmax(sample, initial=0))
     ends = [end for end in OPAQUE if end >= most]
     if sample.dtype.kind in "ui":

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
 import sqlite3
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from geofield.errors import ImageryError
 from geofield.imagery.collection import open_collection
-from geofield.imagery.gdal import display_name, is_remote
+from geofield.imagery.facts import sampled
+from geofield.imagery.gdal import display_name, gdal_env, is_remote, open_picture, reading
 from geofield.imagery.opening import OpenOptions
 from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.stac import is_stac, open_stac
+from geofield.imagery.tags import source_from_tags
 from geofield.strangers import check_vector, database
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
+#: Of a set no more than about so many are looked into to know it again.
+_MOST_SAMPLED = 100
 
 
 def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneReader:
@@ -42,17 +48,63 @@ def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneR
     if is_remote(path) and not path.lower().partition("?")[0].endswith((".json", ".geojson")):
         return SceneReader.open(path, options)
     file = Path(path)
-    if file.is_dir():
-        return open_collection(pictures_in(file), options, name=file.name)
-    if file.suffix.lower() in (".json", ".geojson") and file.is_file() and is_stac(file):
+    if _is_stac(file):
         return open_stac(file, options)
+    several = _several(file, options.reach)
+    if several:
+        return open_collection(several, options, name=file.name)
+    return SceneReader.open(path, options)
+
+
+def pictures_digest(path: Path, *, allow: Sequence[str] = ()) -> str:
+    """A fingerprint of what the user's own picture, or set of pictures, shows, and where.
+
+    It stays where files are moved, packed anew or given overviews. Of a large set it looks into
+    some, and knows the others by their names; of what lies on servers it knows no more.
+
+    Raises
+    ------
+    ImageryError
+        When a picture that is alone cannot be opened.
+    """
+    if _is_stac(path):
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    reach = Reach(tuple(allow))
+    several = _several(path, reach)
+    if not several:
+        return hashlib.sha256(_looked_at(str(path), reach)).hexdigest()
+    digest = hashlib.sha256("\n".join(map(display_name, several)).encode())
+    for each in several[:: -(-len(several) // _MOST_SAMPLED)]:
+        if not is_remote(each):
+            with suppress(ImageryError):  # as is one that cannot be opened
+                digest.update(_looked_at(each, reach))
+    return digest.hexdigest()
+
+
+def _looked_at(path: str, reach: Reach) -> bytes:
+    """Where a picture lies and its pixels here and there."""
+    with gdal_env(path), open_picture(path, reach.of(path)) as dataset:
+        date = source_from_tags(dataset.tags(), path).date
+        about = repr((dataset.shape, dataset.dtypes, tuple(dataset.transform), date)).encode()
+        with suppress(ImageryError), reading(path):  # damage is told where it lies
+            about += sampled(dataset, list(dataset.indexes)).tobytes()
+    return about
+
+
+def _is_stac(file: Path) -> bool:
+    return file.suffix.lower() in (".json", ".geojson") and file.is_file() and is_stac(file)
+
+
+def _several(file: Path, reach: Reach) -> list[str]:
+    """The pictures of a folder or a tile index; empty for what is a picture itself."""
+    if file.is_dir():
+        return pictures_in(file)
     if file.suffix.lower() in _INDEXES and file.is_file() and not holds_tiles(file):
         located = pictures_of_index(file)
         for each in located:
-            options.reach.of(path).require(each, file.name)
-        if located:
-            return open_collection(located, options, name=file.name)
-    return SceneReader.open(path, options)
+            reach.of(file).require(each, file.name)
+        return located
+    return []
 
 
 def pictures_in(folder: Path) -> list[str]:

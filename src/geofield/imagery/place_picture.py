@@ -83,11 +83,14 @@ class Imagery:
         Its terms were checked.
     options : FetchOptions, optional
         Of the source.
+    digest : str
+        Of what the user's own pictures show, where somebody looked.
     """
 
     path: str = ""
     source: Source | None = None
     options: FetchOptions | None = None
+    digest: str = ""
 
     @contextmanager
     def at(
