@@ -860,11 +860,17 @@ def test_a_stac_file_with_nulls_is_read_and_one_out_of_order_is_told(tmp_path: P
     odd: list[dict[str, Any]] = [
         {"properties": {"providers": ["me"]}},
         {"assets": {"visual": {**asset, "bands": ["red"]}}},
-        {"assets": {"visual": {"type": "image/tiff"}}},
         {"geometry": {"type": "Polygon"}},
+        {"geometry": {"type": "Field", "coordinates": []}},
+        {"bbox": [33, 35]},
     ]
     file = tmp_path / "item.json"
-    for more in ({}, {"properties": {"providers": None, "license": None}}):
+    dated = {"datetime": None, "start_datetime": "2018-01-01T00:00:00Z", "proj:epsg": None}
+    for more in (
+        {},
+        {"properties": {"providers": None, "license": None}},
+        {"properties": {"providers": [None], **dated}, "links": [None], "bbox": [None] * 4},
+    ):
         file.write_text(
             json.dumps({**nulls, "assets": {"visual": {**asset, "type": None}}, **more})
         )
@@ -873,6 +879,17 @@ def test_a_stac_file_with_nulls_is_read_and_one_out_of_order_is_told(tmp_path: P
         file.write_text(json.dumps({"assets": {"visual": asset}, **each}))
         with pytest.raises(ImageryError, match=r"^item\.json is not as STAC has it"):
             read_scene(file, lat=lat, lon=lon)
+    # An asset, or an item of several, that is null is none, and the others are read.
+    none: dict[str, Any] = {"none": None, "no address": {"type": "image/tiff", "href": None}}
+    bands = {"visual": {**asset, "bands": [None, None, None]}}
+    items = [None, {"assets": None}, {**nulls, "assets": {**none, **bands}}]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": items}))
+    assert np.array_equal(read_scene(file, lat=lat, lon=lon).bands, scene.bands)
+    for assets in (None, {}, none):
+        file.write_text(json.dumps({"stac_version": "1.0.0", **nulls, "assets": assets}))
+        with pytest.raises(ImageryError, match=r"^No item of item\.json has a GeoTIFF") as told:
+            read_scene(file, lat=lat, lon=lon)
+        assert told.value.hint == "Give items with assets of the role `data` or `visual`."
 
 
 def test_the_date_is_that_of_the_item_that_is_shown(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import rasterio
 import shapely
+from shapely.errors import ShapelyError
 from shapely.geometry import Point, shape
 
 from geofield.errors import ImageryError, PointOutsideError
@@ -31,10 +32,8 @@ _SINGLE = ("red", "green", "blue", "nir")
 def is_stac(path: Path) -> bool:
     """Whether a file is a STAC item or a collection of items (and not plain GeoJSON)."""
     document = _document(path)
-    if not isinstance(document, dict):
-        return False
-    features = document.get("features", [document])
-    return bool(features) and all(isinstance(f, dict) and "assets" in f for f in features)
+    items = [each for each in (document, *_items(document)) if isinstance(each, dict)]
+    return any({"stac_version", "assets"} & each.keys() for each in items)
 
 
 def open_stac(path: Path, options: OpenOptions) -> SceneReader:
@@ -50,7 +49,7 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
     options = replace(options, reach=options.reach.of(path))
     try:
         known = _known(path, options)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError, ShapelyError) as error:
         raise ImageryError(
             f"{path.name} is not as STAC has it: {type(error).__name__}, {error}.",
             hint="Name its pictures themselves, or the folder that they lie in.",
@@ -62,8 +61,7 @@ def open_stac(path: Path, options: OpenOptions) -> SceneReader:
 
 def _known(path: Path, options: OpenOptions) -> dict[str, OpenOptions]:
     """The pictures of a file, and what is known of each: their bands may come in another order."""
-    document, point = _document(path), options.point
-    features = document.get("features", [document])
+    features, point = _items(_document(path)), options.point
     if point is not None:
         lon, lat = point
         here = [f for f in features if _holds(f, lat, lon)]
@@ -83,23 +81,36 @@ def _known(path: Path, options: OpenOptions) -> dict[str, OpenOptions]:
     return dict(items)
 
 
-def _document(path: Path) -> Any:
+def _document(path: Path) -> dict[str, Any]:
+    """What a file holds; nothing where it is no JSON object."""
     try:
         # What is null is as good as not there: some programs write all that there may be.
-        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_said)
+        document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_said)
     except (OSError, ValueError, RecursionError):
-        return None
+        return {}
+    return document if isinstance(document, dict) else {}
 
 
 def _said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return {name: value for name, value in pairs if value is not None}
 
 
+def _items(document: Mapping[str, Any]) -> list[Any]:
+    """The items of a document, which may be one."""
+    features = document.get("features", [document])
+    return _there(features) if isinstance(features, list) else []
+
+
+def _there(given: Iterable[Any]) -> list[Any]:
+    """Those of a list that are not null."""
+    return [each for each in given if each is not None]
+
+
 def _holds(feature: Mapping[str, Any], lat: float, lon: float) -> bool:
     if feature.get("geometry"):
         return bool(shapely.intersects(shape(feature["geometry"]), Point(lon, lat)))
     box = feature.get("bbox")
-    if not box:
+    if not box or None in box:
         return True
     half = len(box) // 2
     return bool(box[0] <= lon <= box[half] and box[1] <= lat <= box[half + 1])
@@ -125,7 +136,7 @@ def _item(
     for place in places:
         options.reach.require(place, path.name)
     properties = feature.get("properties", {})
-    providers = [p.get("name", "") for p in properties.get("providers", [])]
+    providers = [str(p.get("name", "")) for p in _there(properties.get("providers", ()))]
     licence = str(properties.get("license", ""))
     source = ImagerySource(
         name=str(feature.get("id", path.stem)),
@@ -139,7 +150,9 @@ def _item(
 
 
 def _is_picture(asset: Mapping[str, Any]) -> bool:
-    kind, address = str(asset.get("type", "")).lower(), str(asset.get("href", "")).lower()
+    if not asset.get("href"):
+        return False
+    kind, address = str(asset.get("type", "")).lower(), str(asset["href"]).lower()
     named = address.partition("?")[0].endswith((".tif", ".tiff", ".jp2"))
     aside = {"thumbnail", "overview", "metadata"} & set(asset.get("roles", []))
     return (kind.startswith(_RASTER) or named) and not aside
@@ -168,8 +181,8 @@ def _chosen(
 def _band_names(asset: Mapping[str, Any]) -> list[str]:
     bands = asset.get("bands") or asset.get("eo:bands") or []
     return [
-        str(band.get("common_name") or band.get("eo:common_name") or band.get("name") or "")
-        for band in bands
+        str(said.get("common_name") or said.get("eo:common_name") or said.get("name") or "")
+        for said in (band or {} for band in bands)
     ]
 
 
@@ -185,7 +198,8 @@ def _place(asset: Mapping[str, Any], feature: Mapping[str, Any], path: Path) -> 
     href = str(asset["href"])
     if is_remote(href) or Path(href).is_absolute():
         return href
-    own = next((k["href"] for k in feature.get("links", []) if k.get("rel") == "self"), "")
+    links = [each for each in _there(feature.get("links", ())) if each.get("rel") == "self"]
+    own = next((str(each["href"]) for each in links if "href" in each), "")
     near = path.parent / href
     return urljoin(own, href) if is_remote(own) and not near.exists() else str(near)
 
