@@ -34,10 +34,9 @@ _MOST = 5
 
 def driven_through(dataset: Dataset, layer: str = "segments") -> list[tuple[int, str]]:
     """Each line of a layer (its row) that runs through an obstacle to be avoided, with its name."""
-    obstacles, lines = dataset.table("obstacles"), dataset.table(layer)
-    if not len(obstacles) or not len(lines):
+    if not (dataset.has("obstacles") and dataset.has(layer)):
         return []
-    kept = active(obstacles)
+    kept, lines = active(dataset.table("obstacles")), dataset.table(layer)
     shapes = np.asarray(kept.geometry.to_numpy(), dtype=object)
     inside = shapely.buffer(shapes, -_HAIR_M)
     thin = shapely.is_empty(inside)
@@ -53,9 +52,10 @@ def driven_through(dataset: Dataset, layer: str = "segments") -> list[tuple[int,
 
 def leaving(dataset: Dataset, layer: str = "segments") -> NDArray[np.int64]:
     """The lines of a layer (their rows) that leave the field."""
-    field, lines = dataset.table("field"), dataset.table(layer)
-    if len(field) != 1 or not len(lines):
+    field = dataset.table("field")
+    if len(field) != 1 or not dataset.has(layer):
         return np.empty(0, np.int64)
+    lines = dataset.table(layer)
     outline = shapely.buffer(field.geometry.iloc[0], _HAIR_M)
     return np.flatnonzero(~shapely.covered_by(lines.geometry.to_numpy(), outline))
 

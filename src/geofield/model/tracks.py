@@ -177,7 +177,9 @@ class Tracks:
         """The planned tracks of which another program lost what stood in columns."""
         found: set[int] = set()
         for of, rows in ((schema.TRACKS, self.lines), (schema.SEGMENTS, self.segments)):
-            found.update(track_numbers(rows[rows[of.column_names].isna().any(axis=1)]))
+            lost = rows[of.column_names].isna().any(axis=1)
+            if lost.any():
+                found.update(track_numbers(rows[lost]))
         return found if self.written is None else found & set(self.written.segments)
 
     @property

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from xml.etree import ElementTree as ET
 
 import shapely
@@ -48,10 +51,35 @@ _MAP = (
 WEB_MAP = _MAP.format(lat=_LAT, lon=_LON)
 
 
-def style_of(layer: Layer, dataset: Dataset) -> list[ET.Element | dict[str, str]]:
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """What the style of a layer takes from the dataset."""
+
+    #: Whether its rows stand in a later run where a person edits them.
+    stands: bool
+    #: Along the picture's edge, WKT.
+    strip: str
+    tip: str
+
+
+def _said(layer: Layer, dataset: Dataset) -> _Said:
+    return _Said(
+        layer.name not in _OF_TRACKS or dataset.tracks_stand,
+        frame_strip(dataset) if layer.name == "field" else "",
+        map_tip(layer, dataset),
+    )
+
+
+def style_of(layer: Layer, dataset: Dataset) -> Sequence[ET.Element | dict[str, str]]:
     """The attributes and elements that a QML file and a project's layer have in common."""
+    return _style(layer, _said(layer, dataset))
+
+
+#: Of a farm most layers of all fields have the same.
+@lru_cache(maxsize=32)
+def _style(layer: Layer, said: _Said) -> tuple[ET.Element | dict[str, str], ...]:
     look = LOOKS[layer.name]
-    rules = field_rules(frame_strip(dataset)) if layer.name == "field" else look.rules
+    rules = field_rules(said.strip) if layer.name == "field" else look.rules
     aliases = (
         node("alias", index=str(index), field=column.name, name=heading(column))
         for index, column in enumerate(layer.columns, start=1)
@@ -61,8 +89,7 @@ def style_of(layer: Layer, dataset: Dataset) -> list[ET.Element | dict[str, str]
         node("default", field=name, expression=value, applyOnUpdate="0")
         for name, value in first.items()
     )
-    closed = layer.name in _OF_TRACKS and not dataset.tracks_stand
-    open_ = None if closed else EDITABLE.get(layer.name)
+    open_ = EDITABLE.get(layer.name) if said.stands else None
     editable = (
         node("field", name=name, editable=str(int(name in (open_ or ()))))
         for name in layer.column_names
@@ -77,7 +104,7 @@ def style_of(layer: Layer, dataset: Dataset) -> list[ET.Element | dict[str, str]
         # The next planning makes the other layers anew: nothing typed there could stand.
         "readOnly": "1" if open_ is None else "0",
     }
-    return [
+    return (
         attributes,
         rule_renderer(rules, layer.name),
         *([rule_labels(look.labels, layer.name)] if look.labels else []),
@@ -89,16 +116,21 @@ def style_of(layer: Layer, dataset: Dataset) -> list[ET.Element | dict[str, str]
         node("editable", *editable),
         _actions(),
         node("previewExpression", " || ' / ' || ".join(f'"{name}"' for name in layer.key)),
-        node("mapTip", map_tip(layer, dataset)),
-    ]
+        node("mapTip", said.tip),
+    )
 
 
 def qml(layer: Layer, dataset: Dataset) -> str:
     """The style of a layer as a QML document."""
+    return _qml(layer, _said(layer, dataset))
+
+
+@lru_cache(maxsize=32)
+def _qml(layer: Layer, said: _Said) -> str:
     root = node(
         "qgis",
         {"styleCategories": "AllStyleCategories"},
-        *style_of(layer, dataset),
+        *_style(layer, said),
         node("layerGeometryType", _GEOMETRY[layer.geometry.removeprefix("Multi")]),
     )
     return document(root)

@@ -7,6 +7,7 @@ symbols of QGIS do not.
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from xml.etree import ElementTree as ET
 
 from geofield.formats.qgis.looks import LOOKS
@@ -21,6 +22,7 @@ PIXEL_MM = 0.28
 _TERM = re.compile(r"\"(\w+)\" (?:= '(\w+)'|IS (NOT )?NULL)")
 
 
+@lru_cache(maxsize=32)
 def sld(layer: Layer) -> str:
     """The style of a layer as an SLD document."""
     ET.register_namespace("sld", SLD)
