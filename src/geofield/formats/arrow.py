@@ -221,7 +221,8 @@ def layer_batches(
     if of.name != schema.TRACK_POINTS.name:
         return arrow_table(of, dataset.table(of.name), **how).to_reader()
     chunks: Iterator[Any] = iter(dataset.point_chunks() if points else ())
-    head = arrow_table(of, next(chunks, schema.empty(of, LONLAT)), **how)
+    first = next(chunks, None)
+    head = arrow_table(of, schema.empty(of, LONLAT) if first is None else first, **how)
     rest = (arrow_table(of, chunk, **how).cast(head.schema) for chunk in chunks)
     return pa.RecordBatchReader.from_batches(
         head.schema, (batch for table in chain([head], rest) for batch in table.to_batches())

@@ -70,7 +70,7 @@ def check(path: Path) -> Iterator[Finding]:
             yield Finding("error", element.tag, "guidance groups are of version 4")
     yield from _check_references(root, ids)
     for field in root.iter("PFD"):
-        yield from _check_field(field, version)
+        yield from _check_field(field)
 
 
 def _check_element(
@@ -118,7 +118,7 @@ def _check_references(root: ET.Element, ids: set[str]) -> Iterator[Finding]:
                 )
 
 
-def _check_field(field: ET.Element, version: str) -> Iterator[Finding]:
+def _check_field(field: ET.Element) -> Iterator[Finding]:
     where = f"PFD {field.get('C')}"
     if not field.get("D", "").isdigit():
         yield Finding("error", where, f"the area D={field.get('D')!r} is not whole square metres")
