@@ -308,9 +308,14 @@ class ReviewDock(QDockWidget):
         self.live.ask(question, self._show_tracks if preview else self._show_figures)
 
     def _show_tracks(self, answer: dict[str, Any]) -> None:
-        if self.review is None or not self._show_figures(answer):
+        if self.review is None:
             return
-        self.preview.show(answer, self.review.layer.crs(), plan_files.layers_of(self.path))
+        layers = plan_files.layers_of(self.path)
+        if "route" in layers:
+            waits = tr("The route is planned anew when the edits are saved.")
+            answer = {**answer, "notes": [*answer.get("notes", []), waits]}
+        if self._show_figures(answer):
+            self.preview.show(answer, self.review.layer.crs(), layers)
 
     def _show_figures(self, answer: dict[str, Any]) -> bool:
         if "error" in answer:

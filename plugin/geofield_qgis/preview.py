@@ -10,6 +10,10 @@ from qgis.core import QgsGeometry, QgsPointXY, QgsProject, QgsWkbTypes
 from .map_tools import band
 
 _LINES = QgsWkbTypes.GeometryType.LineGeometry
+#: What is not as it was before the edits; the route is planned when they are saved.
+_OUTDATED = (
+    "tracks", "segments", "gaps", "track_points", "headland_tracks", "route", "turns",
+)  # fmt: skip
 
 
 class Preview:
@@ -20,6 +24,7 @@ class Preview:
         self._bands = {
             "segments": band(canvas, _LINES, "#ffffff", 2),
             "gaps": band(canvas, _LINES, "#ff80ab", 2),
+            "headland_tracks": band(canvas, _LINES, "#ffffff", 2),
         }
         self._hidden: list[str] = []
 
@@ -29,16 +34,16 @@ class Preview:
         return bool(self._hidden)
 
     def show(self, answer: Mapping[str, Any], crs: Any, layers: Mapping[str, Any]) -> None:
-        """Draw segments and gaps, x0, y0, x1, y1 each in `crs`; `layers` are those of the plan."""
+        """Draw what was planned, places in `crs`; `layers` are those of the plan."""
         for name, sketch in self._bands.items():
             sketch.reset(_LINES)
-            ends = [[QgsPointXY(x0, y0), QgsPointXY(x1, y1)] for x0, y0, x1, y1 in answer[name]]
-            if ends:
-                sketch.addGeometry(QgsGeometry.fromMultiPolylineXY(ends), crs)
+            lines = [[QgsPointXY(x, y) for x, y in line] for line in answer[name]]
+            if lines:
+                sketch.addGeometry(QgsGeometry.fromMultiPolylineXY(lines), crs)
         if self._hidden:
             return
         root = QgsProject.instance().layerTreeRoot()
-        for name in ("tracks", "segments", "gaps", "track_points"):
+        for name in _OUTDATED:
             layer = layers.get(name)
             node = None if layer is None else root.findLayer(layer.id())
             if node is not None and node.isVisible():

@@ -139,6 +139,47 @@ def dock_review(dock, layer):
     return dock.review
 
 
+def undone(plan):
+    """Which obstacles are otherwise after each undo, and how many were looked at to know it."""
+    layers, dock = reviewed(plan)
+    layer, found = layers["obstacles"], []
+    review = dock_review(dock, layer)
+    one, other, gone = [each.id() for each in layer.getFeatures()][:3]
+    middle = layer.getFeature(other).geometry().centroid().asPoint()
+    review.set_status(one, "rejected")
+    review.move(other, QgsPointXY(middle.x() + 3, middle.y()))
+    layer.deleteFeature(gone)
+    review.add(middle, 2.0)
+    looked, features = [], layer.getFeatures
+    layer.getFeatures = lambda *words: looked.append(words) or features(*words)
+    for _ in range(5):
+        found.append(review.undo())
+    return {"ids": [one, other, gone], "found": found, "looked": len(looked)}
+
+
+def routed(plan):
+    """A plan with a route while an obstacle is rejected, and when that is saved."""
+    layers, dock = reviewed(plan)
+    root = QgsProject.instance().layerTreeRoot()
+    names = ("headland_tracks", "route", "turns")
+    nodes = [root.findLayer(layers[each].id()) for each in names]
+    for node in nodes:
+        node.setItemVisibilityChecked(True)
+    dock.open(plan)
+    settled(dock)
+    answer = {"opened": dock.labels.figures.text()}
+    dock.decide("rejected")
+    settled(dock)
+    answer["edited"] = [dock.labels.figures.text(), [each.isVisible() for each in nodes]]
+    around = dock.preview._bands["headland_tracks"]
+    answer["around_m"] = around.asGeometry().length()
+    dock.save()
+    QgsApplication.processEvents()
+    settled(dock)
+    answer["saved"] = [dock.labels.figures.text(), [each.isVisible() for each in nodes]]
+    return answer
+
+
 def clicks(picture, lon, lat, home):
     """A click whose message is closed, one with Shift in another CRS, one that is stopped."""
     from geofield_qgis.planner import Planner
@@ -170,7 +211,8 @@ def clicks(picture, lon, lat, home):
 
 
 ACTIONS = {
-    each.__name__: each for each in (saved_with_edits, filtered, read_only, without_radius, clicks)
+    each.__name__: each
+    for each in (saved_with_edits, filtered, read_only, without_radius, undone, routed, clicks)
 }
 
 if __name__ == "__main__":

@@ -60,6 +60,29 @@ def test_a_radius_of_nothing_is_none(panel, plan):
     assert panel("without_radius", plan=plan) == [None, pytest.approx(1.0)]
 
 
+def test_undo_knows_what_it_took_back(panel, plan):
+    seen = panel("undone", plan=plan)
+    one, other, gone = seen["ids"]
+    assert seen["found"] == [[], [gone], [other], [one], []]
+    assert seen["looked"] == 0
+
+
+def test_the_route_before_the_edits_is_not_shown_until_they_are_saved(panel, plan, geofield):
+    words = ("--headland", 8, "--route", "boustrophedon", "--turning-radius", 3)
+    geofield("tracks", plan, *words, "-o", plan, "--overwrite")
+    around_m = read_dataset(Path(plan)).table("headland_tracks").length.sum()
+    seen = panel("routed", plan=plan)
+    waits = "The route is planned anew when the edits are saved."
+    assert waits not in seen["opened"]
+    said, shown = seen["edited"]
+    assert waits in said
+    assert shown == [False, False, False]
+    assert seen["around_m"] == pytest.approx(around_m, rel=0.05)
+    said, shown = seen["saved"]
+    assert waits not in said
+    assert shown == [True, True, True]
+
+
 def test_clicks_go_on_whatever_becomes_of_message_and_map(panel, tmp_path):
     # What is in the way of a folder beside the project: nothing can be written there.
     (tmp_path / "geofield").write_text("")

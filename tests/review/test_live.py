@@ -13,8 +13,13 @@ import pytest
 
 from geofield.errors import ChangedError
 from geofield.formats import read_dataset
+from geofield.pipeline import run_tracks
+from geofield.plan import read_plan
+from geofield.plan_files import save_plan
 from geofield.review.desk import Desk
 from geofield.review.live import LivePlans
+from geofield.settings import Settings, TrackSettings
+from geofield.tracks import route
 
 GEOFIELD = Path(sys.executable).with_name("geofield")
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "field_1.gpkg"
@@ -84,6 +89,29 @@ def test_rejecting_what_stands_in_the_way_closes_gaps(plan):
     assert after["figures"]["length_m"] > before["figures"]["length_m"]
     drawn = [*rows_of(plan), {"wkb": rows_of(plan)[0]["wkb"]}]  # no number, no status
     assert "error" not in live.answer({**question, "obstacles": drawn})
+
+
+def test_tracks_after_an_edit_wait_for_no_route_and_saving_plans_it(plan, monkeypatch):
+    tracks = TrackSettings(spacing_m=8, headland_m=8, route="shortest", turning_radius_m=3)
+    routed = run_tracks(read_plan(plan), settings=Settings(tracks=tracks))
+    save_plan(routed, plan, read_from=plan)
+    live, asked = LivePlans(), []
+
+    def routes(tracks, **settings):
+        asked.append(settings["pattern"])
+        return tracks
+
+    monkeypatch.setattr(route, "plan_route", routes)
+    answer = live.answer({"do": "plan", "file": str(plan), "obstacles": rows_of(plan)})
+    assert asked == []
+    assert len(answer["segments"]) == len(routed.tracks.segments)
+    # With all their places, for they are bent.
+    assert [len(each) for each in answer["headland_tracks"]] == [
+        len(each.coords) for each in routed.tracks.headland_tracks.geometry
+    ]
+    live.answer({"do": "write", "file": str(plan)})
+    assert asked == ["shortest"]
+    assert read_plan(plan).settings.tracks.route == "shortest"
 
 
 def test_the_command_answers_line_by_line_and_writes(plan):

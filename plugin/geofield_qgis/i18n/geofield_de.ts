@@ -170,6 +170,11 @@
     </message>
     <message>
       <location filename="dock.py" />
+      <source>The route is planned anew when the edits are saved.</source>
+      <translation>Der Fahrweg wird beim Speichern neu geplant.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
       <source>Review the plan of the active layer</source>
       <translation>Plan des aktiven Layers durchsehen</translation>
     </message>

@@ -21,7 +21,7 @@ from geofield.errors import GeofieldError
 from geofield.plan import read_plan
 from geofield.review.session import Step, planned
 from geofield.staging import log_of
-from geofield.web.view import ends_of
+from geofield.web.view import lines_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -43,7 +43,8 @@ class LivePlans:
         ----------
         question : mapping
             ``do`` is ``plan`` (the tracks for ``obstacles`` and ``outline`` as they are in the
-            editor) or ``write`` (plan what lies in the file, and write it); ``file`` is the
+            editor, without a route, which takes seconds where obstacles are many) or ``write``
+            (plan what lies in the file, its route, too, and write it); ``file`` is the
             GeoPackage. ``obstacles`` are rows with the layer's columns and ``wkb``; ``outline``
             is the WKB of the field; both in the plan's metric CRS, hexadecimal.
         """
@@ -53,7 +54,8 @@ class LivePlans:
             path = Path(question["file"])
             if question["do"] == "write":
                 return self._written(path)
-            return _told(planned(_edited(self._read(path), question), None))
+            edited = _edited(self._read(path), question)
+            return _told(planned(edited, None, with_route=False))
         except GeofieldError as error:
             return {"error": {"message": error.message, "hint": error.hint or ""}}
         except (KeyError, ValueError, TypeError, shapely.errors.GEOSException) as error:
@@ -113,9 +115,11 @@ def _told(step: Step) -> dict[str, Any]:
     tracks = step.plan.tracks
     if tracks is None:
         raise GeofieldError("There are no tracks.")
+    around = tracks.headland_tracks
     return {
-        "segments": ends_of(tracks.segments),
-        "gaps": ends_of(tracks.gaps),
+        "segments": lines_of(tracks.segments.geometry),
+        "gaps": lines_of(tracks.gaps.geometry),
+        "headland_tracks": [] if around is None else lines_of(around.geometry),
         "figures": {
             "tracks": len(tracks.lines),
             "segments": len(tracks.segments),

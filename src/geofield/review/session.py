@@ -133,10 +133,14 @@ class Session:
         self._steps, self._at = [self.step], 0
 
 
-def planned(plan: Plan, command: Mapping[str, Any] | None) -> Step:
+def planned(plan: Plan, command: Mapping[str, Any] | None, *, with_route: bool = True) -> Step:
     """A plan with the tracks that follow from its field, obstacles and settings."""
+    settings = plan.settings or Settings()
+    if not with_route:
+        tracks = settings.tracks.model_copy(update={"route": "none"})
+        settings = settings.model_copy(update={"tracks": tracks})
     with listening() as heard:
-        after = run_tracks(plan, settings=plan.settings or Settings())
+        after = run_tracks(plan, settings=settings)
     known = () if after.tracks is None else after.tracks.notes
     notes = [each for each in dict.fromkeys(map(str, heard)) if each not in known]
     kept = after.evidence.track_edits.in_words()

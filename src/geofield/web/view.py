@@ -46,12 +46,12 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
             [*end, "" if cause is None else str(cause)]
             for end, cause in zip(ends_of(gaps), gaps["cause"], strict=True)
         ],
-        "headland": [] if around is None else _lines(around.geometry.to_numpy()),
+        "headland": [] if around is None else lines_of(around.geometry.to_numpy()),
         "route": []
         if turns is None
         else [
             {"line": line, "fits": fits != "no"}
-            for line, fits in zip(_lines(turns.geometry.to_numpy()), turns["fits"], strict=True)
+            for line, fits in zip(lines_of(turns.geometry.to_numpy()), turns["fits"], strict=True)
         ],
         "drive": [] if tracks.route is None else _drive(tracks.route),
         "figures": _figures(tracks, area_ha),
@@ -73,13 +73,13 @@ def outline_view(
         "method": method,
         "certainty": _number(certainty),
         "doubts": list(doubts),
-        "frame": _lines(frame),
+        "frame": lines_of(frame),
     }
 
 
 def rings_of(polygon: shapely.Polygon) -> list[list[list[float]]]:
     """The rings of a polygon, the outer one first, without their last place, which is the first."""
-    return [ring[:-1] for ring in _lines([polygon.exterior, *polygon.interiors])]
+    return [ring[:-1] for ring in lines_of([polygon.exterior, *polygon.interiors])]
 
 
 def obstacles_view(
@@ -107,7 +107,7 @@ def obstacles_view(
         }
         for row, centre in zip(obstacles.itertuples(), centres, strict=True)
     ]
-    for at, ring in zip(of_row.tolist(), _lines(rings), strict=True):
+    for at, ring in zip(of_row.tolist(), lines_of(rings), strict=True):
         rows[at]["rings"].append(ring[:-1])
     return rows
 
@@ -170,7 +170,7 @@ def ends_of(lines: gpd.GeoDataFrame) -> list[list[float]]:
     return rounded
 
 
-def _lines(lines: Any) -> list[list[list[float]]]:
+def lines_of(lines: Any) -> list[list[list[float]]]:
     """The coordinates of each line: lists of x, y."""
     shapes = np.asarray(lines, dtype=object)
     xy, row = shapely.get_coordinates(shapes, return_index=True)
