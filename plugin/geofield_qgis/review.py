@@ -112,16 +112,21 @@ class Review:
 
     def undo(self) -> list[int]:
         """Take the last edit back; the ids of the obstacles that are otherwise now."""
-        before = self._looks()
-        self.layer.undoStack().undo()
-        return [each for each, look in self._looks().items() if before.get(each) != look]
+        layer = self.layer
+        changed: dict[int, None] = {}
 
-    def _looks(self) -> dict[int, tuple[Any, bytes]]:
-        """Status and shape of each obstacle, by its id."""
-        return {
-            each.id(): (value(each, "status"), bytes(each.geometry().asWkb()))
-            for each in self.layer.getFeatures()
-        }
+        def note(feature_id: int, *_: Any) -> None:
+            changed[feature_id] = None
+
+        signals = (layer.attributeValueChanged, layer.geometryChanged, layer.featureAdded)
+        for signal in signals:
+            signal.connect(note)
+        try:
+            layer.undoStack().undo()
+        finally:
+            for signal in signals:
+                signal.disconnect(note)
+        return list(changed)
 
     @contextmanager
     def _step(self, name: str) -> Iterator[None]:
