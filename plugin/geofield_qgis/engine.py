@@ -139,18 +139,18 @@ def answer_of(command: str, words: list[str], wait_ms: int = 60_000) -> list[str
 def clean_environment(extra: dict[str, str | None] | None = None) -> QProcessEnvironment:
     """The environment of a command: the person's own, without what belongs to QGIS.
 
-    An `extra` variable that is None is left out.
+    An `extra` variable that is None is left out. The engine reads names in any case, so that one
+    that is written otherwise gives way, too.
     """
-    environment = QProcessEnvironment()
+    environment, extra = QProcessEnvironment(), extra or {}
+    said = {name.upper() for name in extra}
     for name, value in os.environ.items():
-        if not name.upper().startswith(_QGIS_OWN):
+        if name.upper() not in said and not name.upper().startswith(_QGIS_OWN):
             environment.insert(name, value)
     environment.insert("PYTHONUTF8", "1")
     environment.insert("PYTHONNOUSERSITE", "1")
-    for name, value in (extra or {}).items():
-        if value is None:
-            environment.remove(name)
-        else:
+    for name, value in extra.items():
+        if value is not None:
             environment.insert(name, value)
     return environment
 

@@ -124,16 +124,20 @@ def test_what_the_dialogue_shows_holds(qgis_process, sample_plan, tmp_path):
         done = subprocess.run(
             ["/usr/bin/qgis_process.bin", "run", "geofield:tracks",
              f"--INPUT={sample_plan}|layername=field", f"--OUTPUT={out}", *more],
-            env={**qgis_process, "GEOFIELD_TRACKS__HEADLAND_M": "7"},
+            env={
+                **qgis_process,
+                "GEOFIELD_TRACKS__HEADLAND_M": "7",
+                "geofield_tracks__offset_m": "0.5",  # read in any case
+            },
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr[-2000:]
         (made,) = out.glob("*.gpkg")
         tracks = read_plan(made).settings.tracks
-        spacings_m.append((tracks.spacing_m, tracks.headland_m))
+        spacings_m.append((tracks.spacing_m, tracks.headland_m, tracks.offset_m))
         said.append("does not count here" in done.stdout)
     # A file that the dialogue names does.
-    assert spacings_m == [(2.0, 0.0), (9.0, 0.0)]
+    assert spacings_m == [(2.0, 0.0, None), (9.0, 0.0, None)]
     assert said == [True, False]
 
 
