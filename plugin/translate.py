@@ -26,7 +26,8 @@ def texts() -> dict[str, str]:
                 found.setdefault(text, file.name)
     described = json.loads((PLUGIN / "description.json").read_text(encoding="utf-8"))
     rows = list(described["settings"])
-    for command in described["commands"].values():
+    for name, command in described["commands"].items():
+        found |= dict.fromkeys(description.command_help(name), "description.json")
         rows += [row for row in command["parameters"] if "name" in row]
     for row in rows:
         # Labels are read in the window, as the texts of the code are.

@@ -77,10 +77,12 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         return QIcon(str(ICONS / "geofield.svg"))
 
     def shortDescription(self) -> str:  # noqa: D102
-        return description.command_help(self.command).split(". ")[0].rstrip(".") + "."
+        return tr(description.command_help(self.command)[0])
 
     def shortHelpString(self) -> str:  # noqa: D102
-        lines = [description.command_help(self.command)]
+        lines = [tr(each) for each in description.command_help(self.command)]
+        if "defaults" in self.own:
+            lines.append(tr("What this form shows holds, whatever a plan was made with."))
         lines += [
             f"<b>{each.description()}</b>: {each.help()}"
             for each in self.parameterDefinitions()

@@ -27,9 +27,9 @@ def settings() -> dict[str, dict[str, Any]]:
     return {f"{row['section']}.{row['name']}": row for row in _all()["settings"]}
 
 
-def command_help(command: str) -> str:
-    """What a command does, in its own words."""
-    return " ".join(_all()["commands"][command]["help"].split())
+def command_help(command: str) -> list[str]:
+    """What a command does, in its own words: paragraphs, the first of one sentence."""
+    return [" ".join(part.split()) for part in _all()["commands"][command]["help"].split("\n\n")]
 
 
 def parameters(command: str) -> list[dict[str, Any]]:

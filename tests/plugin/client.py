@@ -7,6 +7,7 @@ QGIS_PLUGINPATH names the folder of the plugin, as for every QGIS.
 
 import json
 import os
+import re
 import sys
 import threading
 import time
@@ -228,11 +229,20 @@ def loaded(algorithm, values):
 
 def spoken(language):
     """What a dialogue says in another language."""
-    from geofield_qgis.algorithms import PlanAlgorithm, TracksAlgorithm
+    from geofield_qgis.algorithms import ALGORITHMS, PlanAlgorithm, TracksAlgorithm
     from geofield_qgis.words import Words
     from qgis.PyQt.QtCore import QCoreApplication
 
-    words = Words(language)
+    def helped():
+        found = set()
+        for kind in ALGORITHMS:
+            tool = kind()
+            tool.initAlgorithm()
+            paragraphs = re.findall("<p>(.*?)</p>", tool.shortHelpString())
+            found |= {tool.shortDescription(), *(each.split("</b>: ")[-1] for each in paragraphs)}
+        return found
+
+    english, words = helped(), Words(language)
     QCoreApplication.installTranslator(words)
     tracks = TracksAlgorithm()
     tracks.initAlgorithm()
@@ -241,6 +251,8 @@ def spoken(language):
         "group": tracks.group(),
         "label": tracks.parameterDefinition("SPACING_M").description(),
         "theirs": QCoreApplication.translate("QgsProcessingParameters", "%1 [optional]"),
+        "helped": len(english),
+        "still_english": sorted(english & helped()),
     }
 
 

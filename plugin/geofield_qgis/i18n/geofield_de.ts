@@ -5,6 +5,11 @@
     <name>geofield</name>
     <message>
       <location filename="algorithm.py" />
+      <source>What this form shows holds, whatever a plan was made with.</source>
+      <translation>Es gilt, was dieses Formular zeigt, womit ein Plan auch gemacht wurde.</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
       <source>Show the layers in the map</source>
       <translation>Die Layer in der Karte zeigen</translation>
     </message>
@@ -584,6 +589,116 @@
       <translation>Rechenprogramm...</translation>
     </message>
     <message>
+      <location filename="description.json" />
+      <source>From a picture and a point in a field, or its boundary, to outline, obstacles and tracks.</source>
+      <translation>Vom Bild und einem Punkt im Feld, oder seiner Grenze, zu Umriss, Hindernissen und Fahrspuren.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>IMAGERY is a GeoTIFF, a folder of them, or any other source that `geofield tiles` takes. Written are the picture used (scene.tif), field.gpkg with a QGIS project, GeoJSON, Shapefiles, RDF, a map picture and report.json.</source>
+      <translation>Das Bild ist ein GeoTIFF, ein Ordner davon oder eine andere Quelle, die auch „Luftbild holen“ nimmt. Geschrieben werden das verwendete Bild (scene.tif), field.gpkg mit einem QGIS-Projekt, GeoJSON, Shapefiles, RDF, ein Kartenbild und report.json.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Find the outline of the field around a point.</source>
+      <translation>Den Umriss des Feldes um einen Punkt finden.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline touches the window's edge, the window grows as far as the picture reaches.</source>
+      <translation>Das Bild ist eine Datei oder eine andere Quelle, die auch „Luftbild holen“ nimmt. Wo der Umriss den Rand des Ausschnitts berührt, wächst der Ausschnitt, so weit das Bild reicht.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Find the obstacles in a field.</source>
+      <translation>Die Hindernisse in einem Feld finden.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>IMAGERY is the picture that the field was found in. Rows that a person confirmed, rejected or drew in FIELD.gpkg stay as they are; the settings that it was made with hold where you say nothing else. The tracks are removed, for they no longer fit: run `geofield tracks` next.</source>
+      <translation>Das Bild ist das, in dem das Feld gefunden wurde. Was im Plan von Hand bestätigt, verworfen oder gezeichnet wurde, bleibt, wie es ist. Die Fahrspuren werden entfernt, denn sie passen nicht mehr: als Nächstes „Fahrspuren planen“ ausführen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Plan the tracks of one or many fields.</source>
+      <translation>Die Fahrspuren eines oder vieler Felder planen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>FILE is a GeoPackage of geofield, whose field and obstacles count as they are now, with all that a person changed, and whose settings hold where you say nothing else (one of several fields keeps none); or any file of polygons (Shapefile, GeoJSON, GeoPackage, ...), each of which is a field. Their columns come along, and those named like settings (spacing_m, heading_deg, ...) hold for their field.</source>
+      <translation>Die Felder sind der Layer eines Plans von geofield, dessen Feld und Hindernisse so zählen, wie sie jetzt sind, mit allem, was von Hand geändert wurde; oder beliebige Polygone (Shapefile, GeoJSON, GeoPackage, ...), von denen jedes ein Feld ist. Ihre Spalten kommen mit, und solche, die wie Einstellungen heißen (spacing_m, heading_deg, ...), gelten für ihr Feld.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Get the picture of a place as a georeferenced GeoTIFF, from any source.</source>
+      <translation>Das Bild eines Ortes als georeferenziertes GeoTIFF holen, aus einer beliebigen Quelle.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>SOURCE is the name of a source (see `geofield sources`), a tile address with {z}/{x}/{y}, the address of a WMS, WMTS or GeoTIFF, a picture, a folder of pictures, an MBTiles or a STAC file. Keys are read from the environment (GEOFIELD_KEY_NAME) or the settings file.</source>
+      <translation>Die Quelle ist der Name einer Quelle (siehe `geofield sources`), eine Kacheladresse mit {z}/{x}/{y}, die Adresse eines WMS, WMTS oder GeoTIFF, ein Bild, ein Ordner mit Bildern, eine MBTiles- oder eine STAC-Datei. Schlüssel kommen aus der Umgebung (GEOFIELD_KEY_NAME) oder der Einstellungsdatei.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>The picture is cut on the source's own pixels, so nothing is resampled and the georeference is exact. Tiles are kept in a cache where the source's terms allow it: an interrupted download goes on where it stopped.</source>
+      <translation>Das Bild wird an den Pixeln der Quelle geschnitten: nichts wird umgerechnet, und die Georeferenz ist genau. Kacheln werden zwischengespeichert, wo die Bedingungen der Quelle es erlauben: ein unterbrochener Abruf geht dort weiter, wo er aufhörte.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Write other formats from one or more plans.</source>
+      <translation>Einen Plan in anderen Formaten schreiben.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>PLAN is a GeoPackage of geofield, the folder of a farm, or any file it can import. Of several plans, formats that can hold several fields get them in one file (one ISOXML task file, one set of Shapefiles, one KML with folders, one linked dataset); the others have a file or folder per field. Columns "customer" and "farm" of the field say whose it is. All products come into place together or not at all; what a format cannot carry is said once.</source>
+      <translation>Der Plan ist ein GeoPackage von geofield oder das eines Betriebs. Von mehreren Feldern kommen Formate, die mehrere fassen, in eine Datei (eine ISOXML-Auftragsdatei, ein Satz Shapefiles, eine KML mit Ordnern, ein Linked-Data-Datensatz); die anderen haben eine Datei oder einen Ordner je Feld. Die Spalten „customer“ und „farm“ des Feldes sagen, wem es gehört. Alle Dateien erscheinen zusammen oder gar nicht; was ein Format nicht aufnehmen kann, wird einmal gesagt.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Read boundaries, obstacles and guidance lines from other programs' files.</source>
+      <translation>Grenzen, Hindernisse und Leitlinien aus Dateien anderer Programme lesen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or AgOpenGPS field, in any CRS. Several files make one field: the boundary from one, the obstacles from another. A lone polygon is the field; of several, whole words of the layers' names (boundary, trees), their columns, and what lies in what decide. What was taken as what is said on stderr.</source>
+      <translation>Eine Datei ist ein Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA oder ein Feld von AgOpenGPS, in einem beliebigen KBS. Mehrere Dateien ergeben ein Feld: die Grenze aus der einen, die Hindernisse aus der anderen. Ein einzelnes Polygon ist das Feld; bei mehreren entscheiden ganze Wörter in den Namen der Layer (boundary, trees), ihre Spalten und was worin liegt. Was wofür genommen wurde, steht im Protokoll.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Check each FILE, of any format: the format's rules, and whether the plan fits together.</source>
+      <translation>Dateien jedes Formats prüfen: die Regeln des Formats, und ob der Plan in sich stimmt.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Exit code 1 when there is an error; warnings alone leave it at 0.</source>
+      <translation>Die Zahl der Fehler und der Warnungen steht in den Ergebnissen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons, which may be a CSV.</source>
+      <translation>Erkannte Hindernisse mit einer Wahrheit aus Punkten, Rechtecken oder Polygonen vergleichen, auch aus einer CSV-Datei.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>TRUTH may be a plan that a person reviewed: what they rejected is no true obstacle. Matching is one to one. Prints precision, recall, F1 and the error of the radii with 95 % intervals. With --driving also how many true obstacles the plan's tracks run through, within 2 m of their centres, what ground false ones cost, and how many the confidences say stand among those that are merely possible.</source>
+      <translation>Die Wahrheit darf ein durchgesehener Plan sein: was darin verworfen wurde, ist kein wahres Hindernis. Zugeordnet wird eins zu eins. Das Ergebnis sind Precision, Recall, F1 und der Fehler der Radien mit Intervallen von 95 %. Auf Wunsch auch, durch wie viele wahre Hindernisse die Fahrspuren des Plans führen (höchstens 2 m neben ihrer Mitte), welchen Boden falsche kosten und wie viele wahre den Sicherheiten nach unter den nur möglichen sind.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>Plan many fields into one farm.</source>
+      <translation>Viele Felder zu einem Betrieb planen.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>PLACES is a file with a row per field: points (CSV or Parquet with columns lat and lon, or any vector file) or parcels (polygons), whose outlines are taken as they are. Columns named like settings (spacing_m, heading_deg, name, ...) hold for their field; all others come along. IMAGERY is whatever `geofield run` takes; parcels need none.</source>
+      <translation>Die Orte haben eine Zeile je Feld: Punkte oder Schläge (Polygone), deren Umrisse so genommen werden, wie sie sind. Spalten, die wie Einstellungen heißen (spacing_m, heading_deg, name, ...), gelten für ihr Feld; alle anderen kommen mit. Das Bild ist, was auch „Ein Feld planen“ nimmt; Schläge brauchen keines.</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>What a person edited in the farm's overview (farm.gpkg) is taken in first and kept. Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.</source>
+      <translation>Was in der Übersicht des Betriebs (farm.gpkg) von Hand bearbeitet wurde, wird zuerst übernommen und bleibt. Wird abgebrochen, so geht derselbe Lauf dort weiter, wo er aufhörte.</translation>
+    </message>
+    <message>
       <location filename="description.py" />
       <source>Size (m)</source>
       <translation>Fenstergröße (m)</translation>
@@ -621,7 +736,7 @@
     <message>
       <location filename="description.json" />
       <source>How the outline is found: auto (colour, near infrared, edges) or study (brightness threshold).</source>
-      <translation type="unfinished" />
+      <translation>Wie der Umriss gefunden wird: auto (Farbe, nahes Infrarot, Kanten) oder study (Helligkeitsschwelle).</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -631,7 +746,7 @@
     <message>
       <location filename="description.json" />
       <source>What becomes of crowns, huts and ponds inside: fill (the way of auto) or keep as holes (the way of study).</source>
-      <translation type="unfinished" />
+      <translation>Was aus Kronen, Hütten und Teichen im Feld wird: fill (füllen, wie bei auto) oder keep (Löcher bleiben, wie bei study).</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -661,7 +776,7 @@
     <message>
       <location filename="description.json" />
       <source>Smoothing of the picture first; diffusion is anisotropic.</source>
-      <translation type="unfinished" />
+      <translation>Glättung des Bildes vorab; diffusion ist anisotrop.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -671,7 +786,7 @@
     <message>
       <location filename="description.json" />
       <source>Further ground that belongs to the field, LON,LAT; repeat for several.</source>
-      <translation type="unfinished" />
+      <translation>Weiterer Boden, der zum Feld gehört, als LÄNGE,BREITE; mehrere durch Semikolon getrennt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -681,7 +796,7 @@
     <message>
       <location filename="description.json" />
       <source>Ground that does not belong to the field, LON,LAT; repeat for several.</source>
-      <translation type="unfinished" />
+      <translation>Boden, der nicht zum Feld gehört, als LÄNGE,BREITE; mehrere durch Semikolon getrennt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -691,7 +806,7 @@
     <message>
       <location filename="description.json" />
       <source>How obstacles are found: auto, or a way of the study.</source>
-      <translation type="unfinished" />
+      <translation>Wie Hindernisse gefunden werden: auto oder ein Verfahren der Studie.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -721,7 +836,7 @@
     <message>
       <location filename="description.json" />
       <source>auto: what driving into a thing costs, against a look at one place of the map; it decides what is detected, and what only possible.</source>
-      <translation type="unfinished" />
+      <translation>auto: was es kostet, in etwas hineinzufahren, gemessen an einem Blick auf eine Stelle der Karte; danach gilt etwas als erkannt oder nur als möglich.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -731,7 +846,7 @@
     <message>
       <location filename="description.json" />
       <source>auto: drive around what is only possible, too.</source>
-      <translation type="unfinished" />
+      <translation>auto: auch um das herumfahren, was nur möglich ist.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -741,7 +856,7 @@
     <message>
       <location filename="description.json" />
       <source>auto: confidence from which a thing is driven around, instead of the cost.</source>
-      <translation type="unfinished" />
+      <translation>auto: Sicherheit, ab der um etwas herumgefahren wird, statt der Kosten.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -751,7 +866,7 @@
     <message>
       <location filename="description.json" />
       <source>auto: crowns darker or brighter than what is around them.</source>
-      <translation type="unfinished" />
+      <translation>auto: Kronen, die dunkler oder heller sind als ihre Umgebung.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -761,7 +876,7 @@
     <message>
       <location filename="description.json" />
       <source>auto: find what is not round, too: ponds, huts, clumps.</source>
-      <translation type="unfinished" />
+      <translation>auto: auch finden, was nicht rund ist: Teiche, Hütten, Baumgruppen.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -771,7 +886,7 @@
     <message>
       <location filename="description.json" />
       <source>The study's strategies: edge method.</source>
-      <translation type="unfinished" />
+      <translation>Verfahren der Studie: wie Kanten gefunden werden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -781,7 +896,7 @@
     <message>
       <location filename="description.json" />
       <source>single: edge threshold.</source>
-      <translation type="unfinished" />
+      <translation>single: Schwelle der Kanten.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -791,7 +906,7 @@
     <message>
       <location filename="description.json" />
       <source>The study's strategies: circle transform.</source>
-      <translation type="unfinished" />
+      <translation>Verfahren der Studie: Kreistransformation.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -801,7 +916,7 @@
     <message>
       <location filename="description.json" />
       <source>The study's strategies: of the circle transform.</source>
-      <translation type="unfinished" />
+      <translation>Verfahren der Studie: Empfindlichkeit der Kreistransformation.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -811,7 +926,7 @@
     <message>
       <location filename="description.json" />
       <source>Drop discs brighter than 127.37 (absolute) or than the field (relative).</source>
-      <translation type="unfinished" />
+      <translation>Scheiben verwerfen, die heller sind als 127,37 (absolute) oder als das Feld (relative).</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -971,7 +1086,7 @@
     <message>
       <location filename="description.json" />
       <source>How far the vertices of a straight edge may stray, metres.</source>
-      <translation type="unfinished" />
+      <translation>Wie weit die Stützpunkte einer geraden Kante abweichen dürfen, Meter.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -991,7 +1106,7 @@
     <message>
       <location filename="description.json" />
       <source>Tracks left out at each turn of the route skip.</source>
-      <translation type="unfinished" />
+      <translation>Fahrspuren, die beim Fahrweg skip an jeder Wende ausgelassen werden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1051,7 +1166,7 @@
     <message>
       <location filename="description.json" />
       <source>Track points in linked data, too: most of its bytes.</source>
-      <translation type="unfinished" />
+      <translation>Spurpunkte auch in Linked Data: der größte Teil der Datei.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1061,7 +1176,7 @@
     <message>
       <location filename="description.json" />
       <source>Tiles fetched at once.</source>
-      <translation type="unfinished" />
+      <translation>Kacheln, die gleichzeitig geholt werden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1071,7 +1186,7 @@
     <message>
       <location filename="description.json" />
       <source>Folder of the tile caches; the user's cache folder by default.</source>
-      <translation type="unfinished" />
+      <translation>Ordner für zwischengespeicherte Kacheln; sonst der Cache-Ordner des Benutzers.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1081,7 +1196,7 @@
     <message>
       <location filename="description.json" />
       <source>Tiles kept per source at most, megabytes.</source>
-      <translation type="unfinished" />
+      <translation>Wie viele Kacheln je Quelle höchstens behalten werden, Megabyte.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1091,7 +1206,7 @@
     <message>
       <location filename="description.json" />
       <source>Tiles are fetched anew after, days.</source>
-      <translation type="unfinished" />
+      <translation>Nach wie vielen Tagen Kacheln neu geholt werden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1101,7 +1216,7 @@
     <message>
       <location filename="description.json" />
       <source>Folder or address that a VRT, tile index, STAC file, capabilities document or redirect may lead to; repeat for several.</source>
-      <translation type="unfinished" />
+      <translation>Ordner oder Adresse, zu der eine VRT-Datei, ein Kachelindex, eine STAC-Datei, ein Capabilities-Dokument oder eine Weiterleitung führen darf; mehrere durch Semikolon getrennt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1181,7 +1296,7 @@
     <message>
       <location filename="description.json" />
       <source>With --overwrite: forget what a person edited there.</source>
-      <translation type="unfinished" />
+      <translation>Beim Überschreiben: vergessen, was dort von Hand bearbeitet wurde.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1241,7 +1356,7 @@
     <message>
       <location filename="description.json" />
       <source>Take the parcel of this name or id instead.</source>
-      <translation type="unfinished" />
+      <translation>Stattdessen den Schlag mit diesem Namen oder dieser Kennung nehmen.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1271,7 +1386,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace the output where it exists.</source>
-      <translation type="unfinished" />
+      <translation>Das Ergebnis ersetzen, wenn es schon da ist.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1291,7 +1406,7 @@
     <message>
       <location filename="description.json" />
       <source>Take this numbered region of the study's method; repeat to join several.</source>
-      <translation type="unfinished" />
+      <translation>Diese nummerierte Region des Verfahrens der Studie nehmen; mehrere, durch Semikolon getrennt, werden verbunden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1301,7 +1416,7 @@
     <message>
       <location filename="description.json" />
       <source>Folder for the study's pictures: grey, binary, numbered regions, reconstruction.</source>
-      <translation type="unfinished" />
+      <translation>Ordner für die Bilder der Studie: grau, binär, nummerierte Regionen, Rekonstruktion.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1311,7 +1426,7 @@
     <message>
       <location filename="description.json" />
       <source>Show the most likely different outlines; the file's layer alternatives has them.</source>
-      <translation type="unfinished" />
+      <translation>Die wahrscheinlichsten anderen Umrisse zeigen; sie stehen im Layer alternatives der Datei.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1321,7 +1436,7 @@
     <message>
       <location filename="description.json" />
       <source>Take this outline of the alternatives: your word, kept on every later run.</source>
-      <translation type="unfinished" />
+      <translation>Diesen der anderen Umrisse nehmen: Ihre Entscheidung, die bei jedem weiteren Lauf gilt.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1361,7 +1476,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace another file than the one that was read.</source>
-      <translation type="unfinished" />
+      <translation>Auch eine andere Datei als die gelesene ersetzen.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1401,7 +1516,7 @@
     <message>
       <location filename="description.json" />
       <source>CRS of files that do not say theirs, e.g. EPSG:32633.</source>
-      <translation type="unfinished" />
+      <translation>KBS von Dateien, die ihres nicht nennen, z. B. EPSG:32633.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1411,7 +1526,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace files that are there already.</source>
-      <translation type="unfinished" />
+      <translation>Dateien ersetzen, die schon da sind.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1456,7 +1571,7 @@
     <message>
       <location filename="description.json" />
       <source>Zoom of tiled sources: a number, max, or fit (the largest at which --size-m or --area fits 640 px); by default as --resolution needs.</source>
-      <translation type="unfinished" />
+      <translation>Zoomstufe von Kachelquellen: eine Zahl, max oder fit (die größte, bei der der Ausschnitt in 640 Pixel passt); sonst so, wie die Auflösung es verlangt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1476,7 +1591,7 @@
     <message>
       <location filename="description.json" />
       <source>Side of the square, pixels.  [default: 640]</source>
-      <translation type="unfinished" />
+      <translation>Seitenlänge des Quadrats, Pixel; sonst 640.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1491,7 +1606,7 @@
     <message>
       <location filename="description.json" />
       <source>Keep the touched tiles whole.</source>
-      <translation type="unfinished" />
+      <translation>Berührte Kacheln ganz behalten.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1501,7 +1616,7 @@
     <message>
       <location filename="description.json" />
       <source>Layer of a WMS or WMTS.</source>
-      <translation type="unfinished" />
+      <translation>Layer eines WMS oder WMTS.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1511,7 +1626,7 @@
     <message>
       <location filename="description.json" />
       <source>What to do about tiles that cannot be had: stop, or leave no-data.</source>
-      <translation type="unfinished" />
+      <translation>Was bei Kacheln geschieht, die nicht zu haben sind: anhalten (stop) oder ohne Daten lassen (no-data).</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1521,7 +1636,7 @@
     <message>
       <location filename="description.json" />
       <source>Work from the tile cache alone.</source>
-      <translation type="unfinished" />
+      <translation>Nur mit zwischengespeicherten Kacheln arbeiten.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1531,12 +1646,12 @@
     <message>
       <location filename="description.json" />
       <source>Neither read nor keep tiles.</source>
-      <translation type="unfinished" />
+      <translation>Kacheln weder aus dem Zwischenspeicher lesen noch behalten.</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>Folder of the tile caches.</source>
-      <translation type="unfinished" />
+      <translation>Ordner für zwischengespeicherte Kacheln.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1546,7 +1661,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace an existing file.</source>
-      <translation type="unfinished" />
+      <translation>Eine vorhandene Datei ersetzen.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1586,7 +1701,7 @@
     <message>
       <location filename="description.json" />
       <source>Name of single files.</source>
-      <translation type="unfinished" />
+      <translation>Name einzelner Dateien.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1596,7 +1711,7 @@
     <message>
       <location filename="description.json" />
       <source>Picture to show, or a folder of some; by default that beside PLAN, or the farm's.</source>
-      <translation type="unfinished" />
+      <translation>Bild, das gezeigt wird, oder ein Ordner mit Bildern; sonst das neben dem Plan oder das des Betriebs.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1626,7 +1741,7 @@
     <message>
       <location filename="description.json" />
       <source>Names and columns of Shapefiles.</source>
-      <translation type="unfinished" />
+      <translation>Namen und Spalten der Shapefiles.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1636,12 +1751,12 @@
     <message>
       <location filename="description.json" />
       <source>Shapefiles or ISOXML in one archive.</source>
-      <translation type="unfinished" />
+      <translation>Shapefiles oder ISOXML in einem Archiv.</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>Track points: by default in the GeoPackage and the study's files, not in other RDF.</source>
-      <translation type="unfinished" />
+      <translation>Spurpunkte: sonst im GeoPackage und in den Dateien der Studie, nicht in anderem RDF.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1651,12 +1766,12 @@
     <message>
       <location filename="description.json" />
       <source>Further option of a format.</source>
-      <translation type="unfinished" />
+      <translation>Weitere Option eines Formats.</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>Replace products that are there already; `geofield undo` brings a GeoPackage back.</source>
-      <translation type="unfinished" />
+      <translation>Ergebnisse ersetzen, die schon da sind; `geofield undo` holt ein GeoPackage zurück.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1681,12 +1796,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace a file that is there already; `geofield undo` brings it back.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>Check each FILE, of any format: the format's rules, and whether the plan fits together.</source>
-      <translation type="unfinished" />
+      <translation>Eine Datei ersetzen, die schon da ist; `geofield undo` holt sie zurück.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1697,11 +1807,6 @@
       <location filename="description.py" />
       <source>Detected</source>
       <translation>Gefunden</translation>
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons, which may be a CSV.</source>
-      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
@@ -1741,7 +1846,7 @@
     <message>
       <location filename="description.json" />
       <source>Also what a driver loses: DETECTED is a plan with its field and tracks.</source>
-      <translation type="unfinished" />
+      <translation>Auch, was der Fahrer verliert: die erkannten Hindernisse sind dann ein Plan mit Feld und Fahrspuren.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1751,7 +1856,7 @@
     <message>
       <location filename="description.json" />
       <source>Of the bootstrap.</source>
-      <translation type="unfinished" />
+      <translation>Startwert für den Bootstrap.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1771,7 +1876,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace an existing drawing.</source>
-      <translation type="unfinished" />
+      <translation>Eine vorhandene Zeichnung ersetzen.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1801,7 +1906,7 @@
     <message>
       <location filename="description.json" />
       <source>Worker processes on this machine; one per core by default.</source>
-      <translation type="unfinished" />
+      <translation>Prozesse auf diesem Rechner; sonst einer je Kern.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1816,7 +1921,7 @@
     <message>
       <location filename="description.json" />
       <source>Plan all anew where the farm is of other work; what a person reviewed stays.</source>
-      <translation type="unfinished" />
+      <translation>Alles neu planen, wenn der Betrieb aus einem anderen Auftrag stammt; was durchgesehen wurde, bleibt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1836,7 +1941,7 @@
     <message>
       <location filename="description.json" />
       <source>Try places again that failed or were lost.</source>
-      <translation type="unfinished" />
+      <translation>Orte noch einmal versuchen, die misslangen oder verloren gingen.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1846,7 +1951,7 @@
     <message>
       <location filename="description.json" />
       <source>Of one field, seconds.</source>
-      <translation type="unfinished" />
+      <translation>Für ein Feld, Sekunden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1856,7 +1961,7 @@
     <message>
       <location filename="description.json" />
       <source>Of a worker, megabytes.</source>
-      <translation type="unfinished" />
+      <translation>Für einen Prozess, Megabyte.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1876,7 +1981,7 @@
     <message>
       <location filename="description.json" />
       <source>Column of PLACES with the id; usual names are found.</source>
-      <translation type="unfinished" />
+      <translation>Spalte der Orte mit der Kennung; übliche Namen werden gefunden.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1886,7 +1991,7 @@
     <message>
       <location filename="description.json" />
       <source>Column of PLACES with the name; usual names are found.</source>
-      <translation type="unfinished" />
+      <translation>Spalte der Orte mit dem Namen; übliche Namen werden gefunden.</translation>
     </message>
     <message>
       <location filename="description.py" />
