@@ -28,7 +28,7 @@ from .algorithm import path_of
 from .compat import QShortcut
 from .engine import EngineError
 from .jobs import Live
-from .map_tools import CircleTool, PointTool, band
+from .map_tools import BorrowedMap, CircleTool, PointTool, band
 from .preview import Preview
 from .review import OPEN, Review, by_doubt, value
 from .review_labels import ReviewLabels
@@ -53,6 +53,7 @@ class ReviewDock(QDockWidget):
         self.review: Review | None = None
         self.path = ""
         self.current: int | None = None
+        self.borrowed = BorrowedMap(self.canvas)
         self.live = Live(self)
         self.live.failed.connect(self._trouble)
         self._released: plan_files.Released | None = None
@@ -252,10 +253,10 @@ class ReviewDock(QDockWidget):
     def begin_move(self) -> None:
         """The next click on the map is the obstacle's middle."""
         if self.review is not None and self.current is not None:
-            self._use(PointTool(self.canvas, self._move_to, self._drop_tool))
+            self.borrowed.use(PointTool(self.canvas, self._move_to, self.borrowed.drop))
 
     def _move_to(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
-        self._drop_tool()
+        self.borrowed.drop()
         if self._ready and self.current is not None:
             self.review.move(self.current, self._to_layer(point))
             self._show_mark()
@@ -263,10 +264,10 @@ class ReviewDock(QDockWidget):
     def begin_draw(self) -> None:
         """The next drag on the map is a new obstacle."""
         if self.review is not None:
-            self._use(CircleTool(self.canvas, self._drawn))
+            self.borrowed.use(CircleTool(self.canvas, self._drawn, self.borrowed.drop))
 
     def _drawn(self, middle: QgsPointXY, edge: QgsPointXY) -> None:
-        self._drop_tool()
+        self.borrowed.drop()
         if not self._ready:
             return
         middle, edge = self._to_layer(middle), self._to_layer(edge)
@@ -401,16 +402,6 @@ class ReviewDock(QDockWidget):
             self.review.layer.crs(),
             QgsProject.instance(),
         ).transform(point)
-
-    def _use(self, tool: Any) -> None:
-        self._before = self.canvas.mapTool()
-        self._tool = tool
-        self.canvas.setMapTool(tool)
-
-    def _drop_tool(self) -> None:
-        self.canvas.unsetMapTool(self._tool)
-        if self._before is not None:
-            self.canvas.setMapTool(self._before)
 
     def _trouble(self, text: str) -> None:
         if self._released is not None:

@@ -6,11 +6,27 @@ from typing import Any, Callable
 
 from qgis.core import QgsGeometry, QgsPointXY, QgsWkbTypes
 from qgis.gui import QgsMapCanvas, QgsMapTool, QgsRubberBand
-from qgis.PyQt.QtCore import Qt
+from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtGui import QColor
+from qgis.PyQt.QtWidgets import QApplication
 
 
-class PointTool(QgsMapTool):
+class _Tool(QgsMapTool):
+    """A tool that Escape ends."""
+
+    def __init__(self, canvas: QgsMapCanvas, escaped: Callable[[], None]) -> None:
+        super().__init__(canvas)
+        self._escaped = escaped
+        self.setCursor(Qt.CursorShape.CrossCursor)
+
+    def keyPressEvent(self, event: Any) -> None:
+        """Escape ends what the tool began."""
+        if event.key() == Qt.Key.Key_Escape:
+            self._escaped()
+            event.accept()
+
+
+class PointTool(_Tool):
     """Tells where the map was clicked, and with which keys held.
 
     Parameters
@@ -27,9 +43,8 @@ class PointTool(QgsMapTool):
         clicked: Callable[[QgsPointXY, bool, bool], None],
         escaped: Callable[[], None],
     ) -> None:
-        super().__init__(canvas)
-        self._clicked, self._escaped = clicked, escaped
-        self.setCursor(Qt.CursorShape.CrossCursor)
+        super().__init__(canvas, escaped)
+        self._clicked = clicked
 
     def canvasReleaseEvent(self, event: Any) -> None:
         """A click: the left button alone counts."""
@@ -41,28 +56,26 @@ class PointTool(QgsMapTool):
                 bool(held & Qt.KeyboardModifier.AltModifier),
             )
 
-    def keyPressEvent(self, event: Any) -> None:
-        """Escape ends what the tool began."""
-        if event.key() == Qt.Key.Key_Escape:
-            self._escaped()
-            event.accept()
 
-
-class CircleTool(QgsMapTool):
+class CircleTool(_Tool):
     """Draws a circle: press in its middle, drag to its edge."""
 
     def __init__(
-        self, canvas: QgsMapCanvas, drawn: Callable[[QgsPointXY, QgsPointXY], None]
+        self,
+        canvas: QgsMapCanvas,
+        drawn: Callable[[QgsPointXY, QgsPointXY], None],
+        escaped: Callable[[], None],
     ) -> None:
-        super().__init__(canvas)
+        super().__init__(canvas, escaped)
         self._drawn = drawn
         self._middle: QgsPointXY | None = None
+        self._pressed = QPoint()
         self._band = band(canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#42a5f5")
-        self.setCursor(Qt.CursorShape.CrossCursor)
 
     def canvasPressEvent(self, event: Any) -> None:
-        """Begin in the middle."""
-        self._middle = event.mapPoint()
+        """Begin in the middle, with the left button alone."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._middle, self._pressed = event.mapPoint(), event.pos()
 
     def canvasMoveEvent(self, event: Any) -> None:
         """Show the circle as it would be."""
@@ -72,10 +85,11 @@ class CircleTool(QgsMapTool):
             self._band.setToGeometry(circle, None)
 
     def canvasReleaseEvent(self, event: Any) -> None:
-        """End at the edge."""
+        """End at the edge; a click with an unsteady hand draws nothing."""
         middle, self._middle = self._middle, None
         self._band.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
-        if middle is not None and middle.distance(event.mapPoint()) > 0:
+        dragged = (event.pos() - self._pressed).manhattanLength()
+        if middle is not None and dragged >= QApplication.startDragDistance():
             self._drawn(middle, event.mapPoint())
 
     def deactivate(self) -> None:
@@ -83,6 +97,29 @@ class CircleTool(QgsMapTool):
         self._middle = None
         self._band.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         super().deactivate()
+
+
+class BorrowedMap:
+    """The map in the hands of one tool; then what was there before has it back."""
+
+    def __init__(self, canvas: QgsMapCanvas) -> None:
+        self.canvas = canvas
+        self._tool: QgsMapTool | None = None
+        self._before: QgsMapTool | None = None
+
+    def use(self, tool: QgsMapTool) -> None:
+        """Take the map, also from a tool that borrowed it itself."""
+        now = self.canvas.mapTool()
+        if self._tool is None or now is not self._tool:
+            self._before = now
+        self._tool = tool
+        self.canvas.setMapTool(tool)
+
+    def drop(self) -> None:
+        """Give it back."""
+        self.canvas.unsetMapTool(self._tool)
+        if self._before is not None:
+            self.canvas.setMapTool(self._before)
 
 
 def band(canvas: QgsMapCanvas, kind: Any, colour: str, width: int = 2) -> QgsRubberBand:

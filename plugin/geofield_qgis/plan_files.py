@@ -11,9 +11,11 @@ from qgis.core import (
     QgsFeature,
     QgsGeometry,
     QgsProject,
+    QgsReadWriteContext,
     QgsVectorLayer,
     QgsWkbTypes,
 )
+from qgis.PyQt.QtXml import QDomDocument, QDomElement
 
 from .algorithm import path_of
 from .results import settled
@@ -64,21 +66,26 @@ class Released:
     """No layer of a plan holds its file; afterwards all show what lies in it then.
 
     QGIS keeps a GeoPackage open, and the engine refuses to replace a file that another program
-    has open: a write-ahead log of the old file would spoil the new one.
+    has open: a write-ahead log of the old file would spoil the new one. A project that is saved
+    meanwhile has the layers as they were.
     """
 
     def __init__(self, path: str) -> None:
         self._held: list[tuple[QgsVectorLayer, str, bool]] = []
+        self._described: dict[str, QDomElement] = {}
+        QgsProject.instance().writeMapLayer.connect(self._describe)
         for layer in all_of(path):
             editing = layer.isEditable()
             if editing:
                 layer.rollBack()  # nothing is lost: it was asked for after saving
             self._held.append((layer, layer.source(), editing))
+            self._described[layer.id()] = _described(layer)
             kind = QgsWkbTypes.displayString(layer.wkbType())
             _point_to(layer, f"{kind}?crs={layer.crs().authid()}", "memory")
 
     def back(self) -> None:
         """Take the file up again."""
+        QgsProject.instance().writeMapLayer.disconnect(self._describe)
         for layer, source, editing in self._held:
             try:
                 _point_to(layer, source, "ogr")
@@ -88,6 +95,24 @@ class Released:
             except RuntimeError:
                 continue  # removed from the project meanwhile
         self._held = []
+
+    def _describe(self, layer: Any, element: QDomElement, document: QDomDocument) -> None:
+        """Have a project that is being saved hold a layer as it was."""
+        if layer.id() in self._described:
+            whole = document.importNode(self._described[layer.id()], True)
+            while element.hasChildNodes():
+                element.removeChild(element.firstChild())
+            while whole.hasChildNodes():
+                element.appendChild(whole.firstChild())
+
+
+def _described(layer: QgsVectorLayer) -> QDomElement:
+    """A layer as a project describes it."""
+    document = QDomDocument()
+    element = document.createElement("maplayer")
+    document.appendChild(element)
+    layer.writeLayerXml(element, document, QgsReadWriteContext())
+    return element
 
 
 def _point_to(layer: QgsVectorLayer, source: str, provider: str) -> None:

@@ -18,8 +18,9 @@ from qgis.core import (
     QgsProject,
     QgsRasterLayer,
 )
-from qgis.gui import QgsMapCanvas, QgsMessageBar
-from qgis.PyQt.QtCore import QEvent
+from qgis.gui import QgsMapCanvas, QgsMapToolPan, QgsMessageBar
+from qgis.PyQt.QtCore import QEvent, QPoint, Qt
+from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QMainWindow, QTextBrowser
 
 LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
@@ -139,6 +140,61 @@ def dock_review(dock, layer):
     return dock.review
 
 
+def project_saved_meanwhile(plan, home):
+    """A project that is saved while the plan is written: its layers, opened again."""
+    layers, dock = reviewed(plan)
+    layers["tracks"].setFieldAlias(1, "Course")
+    rows = {name: each.featureCount() for name, each in layers.items() if name != "scene"}
+    dock.open(plan)
+    settled(dock)
+    dock.decide("confirmed")
+    dock.save()
+    until(lambda: dock._released is not None)
+    project = QgsProject.instance()
+    project.write(f"{home}/project.qgs")
+    settled(dock)
+    dock.close_review()
+    project.clear()
+    project.read(f"{home}/project.qgs")
+    found = {each.name().lower().replace(" ", "_"): each for each in project.mapLayers().values()}
+    return {
+        "before": rows,
+        "after": {name: found[name].featureCount() for name in rows},
+        "alias": found["tracks"].attributeAlias(1),
+        "coloured": type(found["obstacles"].renderer()).__name__,
+    }
+
+
+def tools(plan):
+    """Which tool has the map after the keys, and how many obstacles were drawn and moved."""
+    layers, dock = reviewed(plan)
+    dock.open(plan)
+    settled(dock)
+    canvas, view, hand = window.canvas, window.canvas.viewport(), QgsMapToolPan(window.canvas)
+    canvas.setMapTool(hand)
+    place, rows, found = view.rect().center(), layers["obstacles"].featureCount(), {}
+
+    def drag(pixels, button):
+        QTest.mousePress(view, button, pos=place)
+        QTest.mouseMove(view, place + QPoint(pixels, 0))
+        QTest.mouseRelease(view, button, pos=place + QPoint(pixels, 0))
+
+    dock.begin_draw()
+    QTest.keyClick(canvas, Qt.Key.Key_Escape)
+    found["escaped"] = canvas.mapTool() is hand
+    dock.begin_move()
+    dock.begin_draw()
+    dock.begin_draw()
+    drag(2, Qt.MouseButton.LeftButton)
+    drag(40, Qt.MouseButton.RightButton)
+    found["slips"] = layers["obstacles"].featureCount() - rows
+    drag(40, Qt.MouseButton.LeftButton)
+    found["drawn"] = layers["obstacles"].featureCount() - rows
+    found["given_back"] = canvas.mapTool() is hand
+    settled(dock)
+    return found
+
+
 def undone(plan):
     """Which obstacles are otherwise after each undo, and how many were looked at to know it."""
     layers, dock = reviewed(plan)
@@ -210,10 +266,11 @@ def clicks(picture, lon, lat, home):
     return {"plans": plans, "first": first, "gone": gone, "stopped": stopped}
 
 
-ACTIONS = {
-    each.__name__: each
-    for each in (saved_with_edits, filtered, read_only, without_radius, undone, routed, clicks)
-}
+_ALL = (
+    saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, tools, undone,
+    routed, clicks,
+)  # fmt: skip
+ACTIONS = {each.__name__: each for each in _ALL}
 
 if __name__ == "__main__":
     QgsApplication.setPrefixPath("/usr", True)

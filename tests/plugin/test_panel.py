@@ -60,6 +60,20 @@ def test_a_radius_of_nothing_is_none(panel, plan):
     assert panel("without_radius", plan=plan) == [None, pytest.approx(1.0)]
 
 
+def test_a_project_saved_while_a_plan_is_written_has_its_layers(panel, plan, tmp_path):
+    seen = panel("project_saved_meanwhile", plan=plan, home=str(tmp_path))
+    assert seen["after"] == seen["before"]
+    assert {"field", "obstacles", "segments", "tracks"} <= set(seen["after"])
+    assert seen["alias"] == "Course"
+    assert seen["coloured"] == "QgsRuleBasedRenderer"
+
+
+def test_the_map_is_given_back_to_the_tool_of_before(panel, plan):
+    assert panel("tools", plan=plan) == {
+        "escaped": True, "slips": 0, "drawn": 1, "given_back": True,
+    }  # fmt: skip
+
+
 def test_undo_knows_what_it_took_back(panel, plan):
     seen = panel("undone", plan=plan)
     one, other, gone = seen["ids"]
