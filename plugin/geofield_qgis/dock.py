@@ -362,13 +362,6 @@ class ReviewDock(QDockWidget):
             released.back()
             self._enable_keys()
             self._tell()
-            if self.review is None:
-                return
-            # The layer has another edit buffer and undo stack now.
-            self._connections = [each for each in self._connections if each[1] != self._edited]
-            layer = self.review.layer
-            self._connect(layer.undoStack().indexChanged, self._edited)
-            self._connect(layer.afterRollBack, self._edited)
 
     # -- the map -----------------------------------------------------------------------------
 

@@ -165,6 +165,25 @@ def project_saved_meanwhile(plan, home):
     }
 
 
+def discarded(plan):
+    """What the panel is told of an edit after saving, and of layers that go with edits."""
+    _, dock = reviewed(plan)
+    dock.open(plan)
+    settled(dock)
+    dock.decide("confirmed")
+    dock.save()
+    until(lambda: dock._released is not None)
+    settled(dock)
+    told, tell, troubles = [], dock._tell, []
+    dock._tell = lambda: (told.append(dock.windowTitle()), tell())
+    sys.excepthook = lambda *trouble: troubles.append(repr(trouble[1]))
+    dock.review.set_status(dock.current, "rejected")
+    edited = len(told)
+    settled(dock)
+    QgsProject.instance().clear()
+    return {"edited": edited, "troubles": troubles, "title": dock.windowTitle()}
+
+
 def tools(plan):
     """Which tool has the map after the keys, and how many obstacles were drawn and moved."""
     layers, dock = reviewed(plan)
@@ -267,8 +286,8 @@ def clicks(picture, lon, lat, home):
 
 
 _ALL = (
-    saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, tools, undone,
-    routed, clicks,
+    saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, discarded,
+    tools, undone, routed, clicks,
 )  # fmt: skip
 ACTIONS = {each.__name__: each for each in _ALL}
 

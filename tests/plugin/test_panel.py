@@ -68,6 +68,11 @@ def test_a_project_saved_while_a_plan_is_written_has_its_layers(panel, plan, tmp
     assert seen["coloured"] == "QgsRuleBasedRenderer"
 
 
+def test_a_project_closed_after_saving_and_editing_again(panel, plan):
+    seen = panel("discarded", plan=plan)
+    assert seen == {"edited": 1, "troubles": [], "title": "Review of a field"}
+
+
 def test_the_map_is_given_back_to_the_tool_of_before(panel, plan):
     assert panel("tools", plan=plan) == {
         "escaped": True, "slips": 0, "drawn": 1, "given_back": True,
