@@ -247,8 +247,8 @@ def main() -> None:
         "left_out_sites": sorted(set(sites.tolist())),
         "learned_with": learned_with([LEARNED / "crowns.onnx"]),
         "learned_on": "Urban Tree Detection Data (J. Ventura et al., CC BY 4.0; imagery USDA "
-        "NAIP) without the sites left out; simulated fields; painted things; two pictures of 0.1 m "
-        "in the package deepforest 2.1.0 (B. G. Weinstein et al., MIT; imagery NEON)",
+        "NAIP) without the sites left out; simulated fields; painted things; four pictures of "
+        "0.1 m in the package deepforest 2.1.0 (B. G. Weinstein et al., MIT; imagery NEON)",
     }
     FACTS.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     curves: dict[str, Any] = {}

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 import rasterio
 from crown_radii import fit_circles
-from fine_pictures import lessons
+from fine_pictures import NAMES, lessons
 
 from geofield.simulate import CLIMATES, SimulatedField, SimulationSettings, simulate_field
 
@@ -94,6 +94,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
     parser.add_argument("--fine", type=Path, help="the package with pictures of 0.1 m")
+    parser.add_argument("--without", nargs="+", choices=NAMES, default=[], help="of those")
     given = parser.parse_args()
     beside = Path(__file__).resolve().parent.parent.parent / "shared"
     folder = Path(os.environ.get("GEOFIELD_SHARED", beside)) / "data" / "trees_train"
@@ -107,7 +108,7 @@ def main() -> None:
         trees.append(trees_of(field))
         regions.append(field.field.mask(field.scene.grid))
     if given.fine:
-        more_names, more_bands, shown, more_trees = lessons(given.fine)
+        more_names, more_bands, shown, more_trees = lessons(given.fine, given.without)
         names, bands, trees = names + more_names, bands + more_bands, trees + more_trees
         regions += shown
     number = np.repeat(np.arange(len(names)), [len(t) for t in trees])

@@ -31,7 +31,7 @@ CALM, HARD, ROOF_PX = 7.0, 14.0, 9000
 """Grey differs by less on calm ground, by more at hard edges; so many pixels may be a roof."""
 SPOILED = 0.65
 """Share of the samples that are of another camera, light or file than the chips."""
-FINE_SHARE = 0.12
+FINE_SHARE = 0.2
 """Share of the samples that are of fine pictures."""
 BORDER_PX = 2.0
 """Crowns on the picture's border may be cut off, their centres outside."""
@@ -82,7 +82,10 @@ class Pictures:
         weight[self.left_out] = 0
         if self.fine.any():
             others = weight[~self.fine].sum()
-            weight[self.fine] = others * FINE_SHARE / (1 - FINE_SHARE) / self.fine.sum()
+            # Parts of one picture are much alike.
+            names = [str(name).rsplit("_", 2)[0] for name in self.names[self.fine]]
+            rare = np.array([3.0 if names.count(name) == 1 else 1.0 for name in names])
+            weight[self.fine] = others * FINE_SHARE / (1 - FINE_SHARE) * rare / rare.sum()
         return weight / weight.sum()
 
 
@@ -225,7 +228,8 @@ class Sampler:
                     (rgb @ np.array([0.299, 0.587, 0.114], np.float32))[..., None], 3, axis=2
                 )
             x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
-        return {"x": x} | targets(trees, valid, other, known * open_land)
+        kept = np.float32(not self.fine[number])
+        return {"x": x, "kept": kept} | targets(trees, valid, other, known * open_land)
 
     def _moved(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return a crop turned, mirrored and scaled, with its valid pixels and trees."""

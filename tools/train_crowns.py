@@ -112,6 +112,8 @@ KNOWN_RATE = 0.3
 AVERAGE = 0.9985
 MORE = 1.0
 """How much more a cell counts where something stands; 3 makes it see barns on plain ground, too."""
+KEEP = 2.0
+"""How much staying with another network counts."""
 SMOOTHED_CELLS = 1.2
 JUDGE_EVERY = 3
 """Of the chips left out, so that judging does not cost the training its time."""
@@ -144,6 +146,27 @@ def loss_of(out: Tensor, want: dict[str, Tensor]) -> tuple[Tensor, list[float]]:
     parts = [focal, offset, radius, cover, other]
     total = focal + 0.5 * offset + 0.7 * radius + 0.5 * cover + 1.0 * other
     return total, [float(v.detach()) for v in parts]
+
+
+def strayed(out: Tensor, was: Tensor, kept: Tensor) -> Tensor:
+    """Return how far answers lie from those of a network that they should stay with.
+
+    Learning without forgetting (Li and Hoiem 2016), for samples (`kept`) of what it knows well.
+    """
+    each = kept[:, None, None]
+    p = torch.sigmoid(was[:, 0]) * each
+    centres, cells = p.sum().clamp(min=1), (torch.ones_like(p) * each).sum().clamp(min=1)
+
+    def apart_from(at: int) -> Tensor:
+        likely = torch.sigmoid(was[:, at])
+        entropy = functional.binary_cross_entropy_with_logits
+        more = entropy(out[:, at], likely, reduction="none")
+        return ((more - entropy(was[:, at], likely, reduction="none")) * each).sum()
+
+    moved = functional.smooth_l1_loss(out[:, 1:3], was[:, 1:3], reduction="none").sum(1)
+    size = functional.smooth_l1_loss(out[:, 3], was[:, 3], beta=0.2, reduction="none")
+    at_centres = apart_from(0) + 0.5 * (moved * p).sum() + 0.7 * (size * p).sum()
+    return at_centres / centres + (0.5 * apart_from(4) + apart_from(5)) / cells
 
 
 def peaks(out: np.ndarray, least: float) -> np.ndarray:
@@ -234,6 +257,14 @@ def export(net: CrownNetwork, path: Path) -> None:
     finish(path)
 
 
+def written(file: Path | None, sampler: Sampler) -> CrownNetwork:
+    """Return a network, with the weights of a file if there is one."""
+    net = CrownNetwork().to(memory_format=torch.channels_last)
+    if file:
+        take_over(net, file, (torch.from_numpy(sampler.batch(BATCH)["x"]) for _ in range(8)))
+    return net
+
+
 def learned(net: CrownNetwork, standing: bool) -> list[nn.Module]:
     """Return what learns: all, or what tells things that stand there alone; the rest stays."""
     if not standing:
@@ -267,6 +298,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--judge-every", type=int, default=500, help="steps")
     parser.add_argument("--start", type=Path, help="a network (ONNX) to go on from")
+    parser.add_argument("--keep", type=Path, help="a network to stay with where it knows well")
     parser.add_argument("--rate", type=float, default=RATE)
     parser.add_argument("--standing", action="store_true", help="learn what is no tree alone")
     parser.add_argument("--painted", type=float, default=PAINTED, help="share of open land")
@@ -277,9 +309,8 @@ def main() -> None:
     torch.manual_seed(given.seed)
     pictures = Pictures.read(given.pictures)
     sampler = Sampler(pictures, given.seed, given.painted)
-    net = CrownNetwork().to(memory_format=torch.channels_last)
-    if given.start:
-        take_over(net, given.start, (torch.from_numpy(sampler.batch(BATCH)["x"]) for _ in range(8)))
+    net = written(given.start, sampler)
+    stays = torch.compile(written(given.keep, sampler).eval()) if given.keep else None
     learning = learned(net, given.standing)
     fast = torch.compile(net)
     averaged = copy.deepcopy(net)
@@ -292,14 +323,21 @@ def main() -> None:
         for group in optimiser.param_groups:
             group["lr"] = rate * group["share"]
         for each in learning:
-            each.train()
+            each.train(stays is None)  # what stays near another network keeps its norms
         t = time.time()
         batch = {k: torch.from_numpy(v) for k, v in sampler.batch(BATCH).items()}
         spent += time.time() - t
+        kept = batch.pop("kept")
         x = batch.pop("x").to(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16, enabled=halves):
             out = fast(x)
         loss, values = loss_of(out.float(), batch)
+        if stays is not None:
+            with torch.no_grad(), torch.autocast("cpu", torch.bfloat16, enabled=halves):
+                was = stays(x)
+            far = strayed(out.float(), was.float(), kept)
+            loss = loss + KEEP * far
+            values.append(float(far.detach()))
         optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(net.parameters(), 5.0)
