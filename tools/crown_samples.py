@@ -228,7 +228,7 @@ class Sampler:
                     (rgb @ np.array([0.299, 0.587, 0.114], np.float32))[..., None], 3, axis=2
                 )
             x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
-        kept = np.float32(not self.fine[number])
+        kept = np.array(not self.fine[number], np.float32)
         return {"x": x, "kept": kept} | targets(trees, valid, other, known * open_land)
 
     def _moved(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

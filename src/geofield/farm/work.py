@@ -209,9 +209,10 @@ def _on_picture(
             picture.path, lat=place.lat, lon=place.lon, settings=seen, previous=previous,
             boundary=boundary, window=window, fetch_wider=picture.wider,
         )  # fmt: skip
-        farm = {} if previous is None else previous.evidence.farm
+        farm = {} if previous is None else dict(previous.evidence.farm)
+        farm.pop(_PICTURES, None)
         if imagery.digest:
-            farm = {**farm, _PICTURES: imagery.digest}
+            farm[_PICTURES] = imagery.digest
         plan = replace(plan, evidence=replace(plan.evidence, farm=farm))
         plan = run_obstacles(_around(plan, job), plan.scene or window, settings=seen)
         if previous is not None and _is_other(plan.source, imagery, previous):
@@ -228,8 +229,9 @@ def _on_picture(
 
 def _is_other(source: ImagerySource, imagery: Imagery, reviewed: Plan) -> bool:
     """Whether a picture is another one than a plan was made on, whatever it is called."""
-    noted = reviewed.evidence.farm.get(_PICTURES, imagery.digest)
-    return noted != imagery.digest or not source.is_same_picture(reviewed.source)
+    noted = reviewed.evidence.farm.get(_PICTURES)
+    shows_other = bool(noted and imagery.digest) and noted != imagery.digest
+    return shows_other or not source.is_same_picture(reviewed.source)
 
 
 def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Imagery | None) -> bool:

@@ -22,8 +22,6 @@ from geofield.strangers import check_vector, database
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
-#: Of a set no more than about so many are looked into to know it again.
-_MOST_SAMPLED = 100
 
 
 def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneReader:
@@ -57,38 +55,26 @@ def open_reader(path: str, *, allow: Sequence[str] = (), **known: Any) -> SceneR
 
 
 def pictures_digest(path: Path, *, allow: Sequence[str] = ()) -> str:
-    """A fingerprint of what the user's own picture, or set of pictures, shows, and where.
+    """A fingerprint of what the user's own picture shows, and where; none of a set of them.
 
-    It stays where files are moved, packed anew or given overviews. Of a large set it looks into
-    some, and knows the others by their names; of what lies on servers it knows no more.
+    It stays where the file is moved, packed anew or given overviews. To a set others may come: of
+    fields that none showed.
 
     Raises
     ------
     ImageryError
-        When a picture that is alone cannot be opened.
+        When the picture cannot be opened.
     """
-    if _is_stac(path):
-        return hashlib.sha256(path.read_bytes()).hexdigest()
     reach = Reach(tuple(allow))
-    several = _several(path, reach)
-    if not several:
-        return hashlib.sha256(_looked_at(str(path), reach)).hexdigest()
-    digest = hashlib.sha256("\n".join(map(display_name, several)).encode())
-    for each in several[:: -(-len(several) // _MOST_SAMPLED)]:
-        if not is_remote(each):
-            with suppress(ImageryError):  # as is one that cannot be opened
-                digest.update(_looked_at(each, reach))
-    return digest.hexdigest()
-
-
-def _looked_at(path: str, reach: Reach) -> bytes:
-    """Where a picture lies and its pixels here and there."""
-    with gdal_env(path), open_picture(path, reach.of(path)) as dataset:
-        date = source_from_tags(dataset.tags(), path).date
+    if _is_stac(path) or _several(path, reach):
+        return ""
+    name = str(path)
+    with gdal_env(name), open_picture(name, reach.of(name)) as dataset:
+        date = source_from_tags(dataset.tags(), name).date
         about = repr((dataset.shape, dataset.dtypes, tuple(dataset.transform), date)).encode()
-        with suppress(ImageryError), reading(path):  # damage is told where it lies
+        with suppress(ImageryError), reading(name):  # damage is told where it lies
             about += sampled(dataset, list(dataset.indexes)).tobytes()
-    return about
+    return hashlib.sha256(about).hexdigest()
 
 
 def _is_stac(file: Path) -> bool:
