@@ -88,8 +88,8 @@ def pictures_of(folder: Path) -> Path | None:
 
 
 def _shows(path: Path, digest: str) -> bool:
-    """Whether pictures show what others did, or cannot be opened, which is told later."""
+    """Whether a picture shows what another did; not known of a set, nor of one that is damaged."""
     try:
-        return pictures_digest(path) == digest
+        return pictures_digest(path) in ("", digest)
     except ImageryError:
         return True

@@ -118,7 +118,8 @@ def _as_filled(frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
     suffix = path.suffix.lower()
     if suffix not in (".kml", ".kmz", ".gpx"):
         return frame
-    made = [name for name in frame if suffix == ".gpx" or name in KML_SAID]
+    said = frame.columns.drop(frame.geometry.name)
+    made = [name for name in said if suffix == ".gpx" or name in KML_SAID]
     empty = [name for name in made if frame[name].isna().all()]
     looks = KML_LOOKS if suffix != ".gpx" else ()
     return frame.drop(columns=[*empty, *frame.columns.intersection(looks)])

@@ -261,8 +261,9 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
     sound = frame.copy()
     sound.loc[bad, sound.geometry.name] = np.array(shapes, dtype=object)
     warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
-    sound = sound.explode(index_parts=False, ignore_index=True)
-    return sound[sound.geom_type.isin(["Polygon", "Point", "LineString"])]
+    sound = sound.explode(index_parts=False)
+    spurs = sound.index.isin(frame.index[bad]) & (sound.geom_type != "Polygon")
+    return sound[~spurs].reset_index(drop=True)
 
 
 def _joined(frames: list[Any]) -> Any:
