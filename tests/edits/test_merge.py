@@ -57,6 +57,27 @@ def test_what_hardly_reaches_out_of_a_reviewed_obstacle_is_part_of_it(status: st
     assert after.geometry[4].centroid.y == pytest.approx(5_600_057, abs=0.1)
 
 
+@pytest.mark.parametrize("said", ["confirmed", "rejected", "possible", "deleted"])
+def test_a_tree_far_larger_than_what_is_driven_through_is_another(said: str) -> None:
+    """A shrub was rejected, and the tree that a later picture shows there was driven into."""
+    other = (190, 50, 3)
+    before = found((30, 50, 4), (80, 50, 4), (150, 50, 4), other)
+    edited = with_status(before, *[said.replace("deleted", "rejected")] * 3, "detected")
+    edited = edited[3:] if said == "deleted" else edited
+    # Without its margin the first has less than twice the area of what was said, the others more.
+    again = found((31, 50, 5.6), (82, 50, 5.7), (150, 50, 9), other, buffer_m=1.5)
+    again["status"] = ["detected", "detected", "possible", "detected"]
+    table, written = reconcile(edited, Written.of(before, np.zeros(4, bool)), GRID)
+    after, _, changes = merge(again, table, written, FIELD, GRID)
+    new = () if said == "confirmed" else (5,)
+    assert changes.new == new
+    assert after["status"][after["obstacle_no"].isin(new)].tolist() == ["detected"] * len(new)
+    assert changes.stay_deleted == (2 if said == "deleted" else 0)
+    # One of another shape may be anything.
+    _, _, changes = merge(again.assign(radius_m=np.nan), table, written, FIELD, GRID)
+    assert changes.new == ()
+
+
 def test_what_stands_outside_the_field_is_not_sought() -> None:
     before = found((50, 50, 4), (-10, 50, 4))
     _, changes = searched_again(before, with_status(before, "confirmed", "confirmed"))

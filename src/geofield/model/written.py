@@ -6,7 +6,7 @@ that differs from its record was changed by a person; a row that is missing was 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -223,17 +223,26 @@ def same_shapes(one: Any, other: Any, tolerance_m: float = SAME_M) -> NDArray[np
     return result
 
 
-def matches(shapes: Any, others: Any, *, once: bool = False) -> NDArray[np.int64]:
+def matches(
+    shapes: Any,
+    others: Any,
+    *,
+    once: bool = False,
+    apart: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]] | None = None,
+) -> NDArray[np.int64]:
     """For each shape the nearest other that is the same object, by position; -1 for none.
 
     Two shapes are the same object when the centre of one lies in the other; that of a bent shape
-    is a point in it. With `once` the nearest pairs come first, and no other is two shapes' match.
+    is a point in it. With `once` the nearest pairs come first, and no other is two shapes' match;
+    `apart` tells of pairs, by position, which are two objects anyway.
     """
     mine, theirs = np.asarray(shapes, dtype=object), np.asarray(others, dtype=object)
     result = np.full(len(mine), -1, dtype=np.int64)
     rows, candidates = shapely.STRtree(theirs).query(mine, predicate="intersects")
     centre, other = _middles(mine)[rows], _middles(theirs)[candidates]
     same = shapely.intersects(centre, theirs[candidates]) | shapely.intersects(other, mine[rows])
+    if apart is not None:
+        same &= ~apart(rows, candidates)
     distance = shapely.distance(centre, other)
     met = np.zeros(len(theirs), dtype=bool)
     for index in np.argsort(distance, kind="stable"):
