@@ -64,6 +64,15 @@ def is_geopackage(path: Path) -> bool:
         return file.read(72)[68:] in (b"GPKG", b"GP10", b"GP11")
 
 
+def picture_file(picture: str | Path) -> Path:
+    """The file of a picture: its path, or that in GDAL's name of one among several pictures.
+
+    So are those of a GeoPackage called, ``GPKG:file:table``.
+    """
+    inner = re.fullmatch("GPKG:(.+):[^:]+", str(picture), re.IGNORECASE)
+    return Path(inner[1] if inner else picture)
+
+
 def unreadable(path: Path, error: Exception) -> FormatError:
     """That a library cannot read a file, in its own words without what programmers may try."""
     reason = re.split("[.;]+ It might help", str(error))[0].rstrip(".")

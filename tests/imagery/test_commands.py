@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 import rasterio.warp
 from shapely.geometry import box
 
 from geofield.cli import main
-from geofield.errors import TermsError
+from geofield.errors import FormatError, TermsError
 from geofield.imagery import read_scene
+from geofield.staging import staged_file
 
 from .pictures import ground, write
 from .test_fetch import expected
@@ -167,6 +169,29 @@ def test_options_of_tiles_with_a_picture_are_told(capsys: pytest.CaptureFixture[
     assert "--resolution changes nothing here" in capsys.readouterr().err
     assert run("tiles", picture, *POINT, "--size", 20, "-o", "b.tif") == 0
     assert "changes nothing" not in capsys.readouterr().err
+
+
+def test_one_of_several_pictures_in_a_geopackage_is_named_as_gdal_does(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    samples = Path(__file__).parents[2] / "sample_data"
+    for table in ("June", "July"):
+        more = {"RASTER_TABLE": table, "APPEND_SUBDATASET": "YES", "TILE_FORMAT": "PNG"}
+        rasterio.shutil.copy(samples / "field_1.tif", "a.gpkg", driver="GPKG", **more)
+    place = ["--lat", 35.075373, "--lon", 33.531142]
+    assert run("field", "a.gpkg", *place, "-o", "b.gpkg") == 1
+    assert "Name one of them, as in 'GPKG:a.gpkg:JUNE'" in capsys.readouterr().err
+    july = "GPKG:a.gpkg:JULY"
+    assert run("tiles", july, *place, "--size", 20, "-o", "b.tif") == 0
+    assert run("field", july, *place, "-o", "b.gpkg") == 0
+    assert run("export", "b.gpkg", "-f", "map", "--out", "m", "--picture", july) == 0
+    capsys.readouterr()
+    assert run("info", july) == 0
+    assert "480 x 480 px" in capsys.readouterr().out
+    with pytest.raises(FormatError, match="is an input"), staged_file("a.gpkg", inputs=[july]):
+        pass
+    assert run("info", "GPKG:none.gpkg:JULY") == 1
+    assert "no picture none.gpkg" in capsys.readouterr().err
 
 
 def test_what_a_picture_does_not_say_is_said_to_tiles(capsys: pytest.CaptureFixture[str]) -> None:

@@ -130,8 +130,10 @@ def test_unknown_names_get_the_nearest_one() -> None:
     with pytest.raises(ImageryError, match="There is no picture"):
         find_source("folder/none.tif")
     with pytest.raises(ImageryError, match="one picture of a file") as caught:
-        find_source("GPKG:/fields/a.gpkg:ortho")  # as QGIS names it
+        find_source("NETCDF:/fields/a.nc:ortho")  # as GDAL names it
     assert "gdal_translate" in str(caught.value.hint)
+    with pytest.raises(ImageryError, match=r"no picture /fields/a\.gpkg"):
+        find_source("GPKG:/fields/a.gpkg:ortho")
 
 
 @pytest.mark.parametrize(
@@ -748,10 +750,17 @@ def test_a_geopackage_that_is_the_picture_itself(tmp_path: Path) -> None:
     rasterio.shutil.copy(plain, tmp_path / "tiled.gpkg", **more)
     with pytest.raises(ImageryError, match="2 others") as caught:
         read_scene(tmp_path / "tiled.gpkg")
-    assert "gdal_translate 'GPKG:" in caught.value.hint
+    name = f"GPKG:{tmp_path / 'tiled.gpkg'}:B"
+    assert "Name one of them, as in 'GPKG:" in caught.value.hint
     told = CliRunner().invoke(cli, ["info", str(tmp_path / "tiled.gpkg")])
     assert "pictures in it:" in told.stdout
-    assert f"GPKG:{tmp_path / 'tiled.gpkg'}:B" in told.stdout
+    assert name in told.stdout
+    assert np.array_equal(read_scene(name).bands[:3, :height, :width], there.bands)
+    assert isinstance(find_source(name), PictureSource)
+    told = CliRunner().invoke(cli, ["info", name])
+    assert "bands: red uint8" in told.stdout
+    with pytest.raises(ImageryError, match="Cannot find table 'c'"):
+        read_scene(f"{name[:-1]}c")
 
 
 def test_an_index_and_a_vrt(tmp_path: Path) -> None:

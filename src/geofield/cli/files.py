@@ -10,6 +10,7 @@ import click
 
 from geofield.cli.console import say_note
 from geofield.staging import claimed
+from geofield.strangers import picture_file
 from geofield.wording import command
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -19,6 +20,7 @@ class NamedPath(click.Path):
     """A path; no name at all, as of a variable that is not set, is not the working folder.
 
     A link to a GeoPackage is what it leads to: there the plan is saved, with its log and products.
+    Of a picture in a file (`picture_file`) the file must be there.
     """
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -29,6 +31,9 @@ class NamedPath(click.Path):
             self.fail("standard input and output are not used here: give a name.", param, ctx)
         if isinstance(param, click.Option) and str(value).startswith("-") and not self.exists:
             self.fail(f"{value} is an option: give a name, or ./{value} if it is one.", param, ctx)
+        if self.exists and (file := picture_file(value)) != Path(value):
+            super().convert(str(file), param, ctx)
+            return Path(value)
         path = super().convert(value, param, ctx)
         if isinstance(path, Path) and path.suffix.lower() == ".gpkg" and path.is_symlink():
             return path.resolve()

@@ -11,6 +11,7 @@ import click
 from geofield.cli.console import echo_json
 from geofield.cli.files import PATH
 from geofield.errors import CRSError, FormatError, GridError, ImageryError
+from geofield.strangers import picture_file
 
 
 @click.command(
@@ -45,7 +46,8 @@ def _facts(file: Path, crs: str | None) -> dict[str, Any]:
     from geofield.formats import detect
     from geofield.imagery.pictures import holds_tiles
 
-    if file.suffix.lower() in (".tif", ".tiff") or holds_tiles(file):
+    inner = picture_file(file) != file
+    if inner or file.suffix.lower() in (".tif", ".tiff") or holds_tiles(file):
         return _picture(file)
     try:
         title = detect(file).title

@@ -20,6 +20,7 @@ from geofield.errors import CRSError, ImageryError
 from geofield.imagery.damage import made_up
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.vrt import check_beside, check_vrt
+from geofield.strangers import picture_file
 
 #: Sent with every request: servers answer 403 without one.
 USER_AGENT = f"geofield/{__version__} (farm field mapping; python-urllib3)"
@@ -105,10 +106,10 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) 
     """
     name = display_name(path)
     if not is_remote(path) and not path.startswith(("/vsi", "<")) and "://" not in path:
-        file = Path(path)
+        file = picture_file(path)
         if not file.exists():
             raise ImageryError(
-                f"There is no picture {path}.", hint="Check the path; it must name a raster file."
+                f"There is no picture {file}.", hint="Check the path; it must name a raster file."
             )
         if file.is_file() and file.stat().st_size == 0:
             raise ImageryError(f"The picture {path} is empty (0 bytes).", hint="Copy it again.")
@@ -166,7 +167,7 @@ def _drivers_for(path: str, reach: Reach) -> list[str]:
     if path.startswith("<"):
         check_vrt(path.encode(), "stacked bands", Path(), reach)
         return ["VRT"]
-    file = Path(path)
+    file = picture_file(path)
     if is_remote(path) or not file.is_file():
         return _DRIVERS
     with file.open("rb") as stream:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from geofield.errors import GeofieldError, ImageryWarning
 from geofield.notes import warn
+from geofield.strangers import picture_file
 
 if TYPE_CHECKING:
     from geofield.imagery.acquisition import Acquired
@@ -142,4 +143,5 @@ def is_own_picture(what: str) -> bool:
     """Whether what the user names is a picture or a set of pictures on a disk."""
     if not what or "{" in what:  # no name at all would be the working folder
         return False
-    return Path(what).exists() and Path(what).suffix.lower() != ".mbtiles"
+    file = picture_file(what)
+    return file.exists() and file.suffix.lower() != ".mbtiles"

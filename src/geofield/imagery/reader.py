@@ -113,7 +113,7 @@ class SceneReader:
                 inner, told, hint = dataset.subdatasets, "", "Give a raster file."
                 if inner:
                     told = f", but {counted(len(inner), 'other')}"
-                    hint = f"Take one out of it: gdal_translate {inner[0]!r} picture.tif"
+                    hint = f"Name one of them, as in {inner[0]!r}."
                 raise ImageryError(
                     f"The file {display_name(path)} holds no picture itself{told}.", hint=hint
                 )

@@ -22,6 +22,7 @@ from geofield.notes import warn
 from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.staging.folders import cannot_write, made_folder
 from geofield.staging.leftovers import MOVING, alone, sweep, unstopped, working_folder
+from geofield.strangers import picture_file
 
 _SQLITE_MAGIC = b"SQLite format 3\x00"
 
@@ -162,7 +163,7 @@ def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
 
 def _refuse(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
     """Refuse a place that may not be written or replaced."""
-    if place.resolve() in {Path(path).resolve() for path in inputs}:
+    if place.resolve() in {picture_file(path).resolve() for path in inputs}:
         raise FormatError(
             f"{place} is an input of this work and would be overwritten.",
             hint="Write to another file or folder.",

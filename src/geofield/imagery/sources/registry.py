@@ -21,6 +21,7 @@ from geofield.imagery.sources.wms import open_wms
 from geofield.imagery.sources.wmts import open_wmts
 from geofield.imagery.sources.xyz import XYZSource
 from geofield.imagery.terms import Terms
+from geofield.strangers import picture_file
 from geofield.wording import nearest
 
 #: The user's own pictures, and addresses whose owner's terms we do not know: the user answers
@@ -132,7 +133,7 @@ def kind_of(what: str) -> tuple[str, str]:
     if "{" in what and "}" in what:
         return "xyz", what
     # No name at all, as of a variable that is not set, would be the working folder.
-    return _kind_of_file(Path(what)) if what else "", what
+    return _kind_of_file(picture_file(what)) if what else "", what
 
 
 def _kind_of_address(address: str) -> str:
@@ -164,16 +165,18 @@ def _kind_of_file(file: Path) -> str:
 
 
 def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
-    if re.match("[A-Z][A-Z0-9_]+:", what):  # as QGIS and GDAL name what lies in a file
+    file = picture_file(what)
+    # As QGIS and GDAL name what lies in a file.
+    if file == Path(what) and re.match("[A-Z][A-Z0-9_]+:", what):
         return ImageryError(
             f"{what} is one picture of a file; only whole files are read.",
             hint=f"Take it out: gdal_translate {what!r} picture.tif",
         )
     near = nearest(what.lower(), catalogue, cutoff=0.5)
-    looks_like_path = "/" in what or "\\" in what or Path(what).suffix != ""
+    looks_like_path = "/" in what or "\\" in what or file.suffix != ""
     if looks_like_path and not near:
         return ImageryError(
-            f"There is no picture {what}.",
+            f"There is no picture {file}.",
             hint="Check the path. `geofield sources` lists the sources known by name.",
         )
     return ImageryError(
