@@ -173,6 +173,7 @@ def test_what_is_dropped_is_said_once_and_only_if_it_is_there(dataset, tmp_path)
     write_dataset(bare, tmp_path / "bare", ["shapefile"])
 
 
+@pytest.mark.filterwarnings("ignore:.* no radius:geofield.errors.FormatWarning")
 def test_columns_of_a_persons_own_come_back_or_it_is_told(dataset, tmp_path):
     """Linked data left them out without a word, and with them a plan that was imported from it."""
     layers = ("field", "obstacles", "tracks", "segments")

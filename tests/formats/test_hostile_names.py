@@ -162,7 +162,7 @@ def read_back(out: Path):
         "rdf-study": "second/field.rdf",
     }
     for name, each in FORMATS.items():
-        if each.reader is not None:
+        if each.reader is not None and "field" in each.layers:
             place = out / places.get(name, name)
             if name == "agopengps":
                 (place,) = (place / "Fields").iterdir()

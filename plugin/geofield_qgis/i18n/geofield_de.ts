@@ -660,8 +660,8 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or AgOpenGPS field, in any CRS. Several files make one field: the boundary from one, the obstacles from another. A lone polygon is the field; of several, whole words of the layers' names (boundary, trees), their columns, and what lies in what decide. What was taken as what is said on stderr.</source>
-      <translation>Eine Datei ist ein Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA oder ein Feld von AgOpenGPS, in einem beliebigen KBS. Mehrere Dateien ergeben ein Feld: die Grenze aus der einen, die Hindernisse aus der anderen. Ein einzelnes Polygon ist das Feld; bei mehreren entscheiden ganze Wörter in den Namen der Layer (boundary, trees), ihre Spalten und was worin liegt. Was wofür genommen wurde, steht im Protokoll.</translation>
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA, AgOpenGPS field, or a CSV table with lat and lon (or WKT), in any CRS. Several files make one field: the boundary from one, the obstacles from another. A lone polygon, or GPX line that ends where it began, is the field; of several, whole words of the layers' names (boundary, trees), their columns, and what lies in what decide. What was taken as what is said on stderr.</source>
+      <translation type="unfinished" />
     </message>
     <message>
       <location filename="description.json" />
@@ -1780,7 +1780,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or AgOpenGPS field, in any CRS.</source>
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA, AgOpenGPS field, or a CSV table with lat and lon (or WKT), in any CRS.</source>
       <translation type="unfinished" />
     </message>
     <message>

@@ -21,6 +21,7 @@ Examples (the first two on the project's own sample):
   geofield import others/shapefile/boundary.shp others/shapefile/obstacles.shp -o mine.gpkg
   geofield import boundary.shp -o field.gpkg
   geofield import boundary.shp trees.geojson -o field.gpkg --crs EPSG:32633
+  geofield import walk_round.gpx trees.csv -o field.gpkg
   geofield import TASKDATA/ -o field.gpkg && geofield tracks field.gpkg --spacing 3 -o field.gpkg
 """,
 )
@@ -44,11 +45,11 @@ def import_(
 ) -> None:
     """Read boundaries, obstacles and guidance lines from other programs' files.
 
-    FILE is a Shapefile, GeoPackage, GeoJSON, KML, GeoParquet, FlatGeobuf, ISOXML TASKDATA or
-    AgOpenGPS field, in any CRS. Several files make one field: the boundary from one, the
-    obstacles from another. A lone polygon is the field; of several, whole words of the layers'
-    names (boundary, trees), their columns, and what lies in what decide. What was taken as what
-    is said on stderr.
+    FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA,
+    AgOpenGPS field, or a CSV table with lat and lon (or WKT), in any CRS. Several files make one
+    field: the boundary from one, the obstacles from another. A lone polygon, or GPX line that ends
+    where it began, is the field; of several, whole words of the layers' names (boundary, trees),
+    their columns, and what lies in what decide. What was taken as what is said on stderr.
     """
     from geofield.formats import read_dataset, write_dataset
     from geofield.formats.importing import merged, recorded

@@ -53,7 +53,7 @@ def parcel_and_point(
     from geofield.field import field_from_boundary
     from geofield.formats.antimeridian import joined
     from geofield.formats.catalogue import PARQUET
-    from geofield.formats.foreign import layer_names, read_vector
+    from geofield.formats.foreign import has_rows, layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
 
     in_layers = path.suffix.lower() not in CSV
@@ -61,11 +61,13 @@ def parcel_and_point(
     try:
         layers = layer_names(path) if in_layers and layer is None and not is_own(path) else []
         if len(layers) > 1:
+            layers = [each for each in layers if has_rows(path, each)] or layers[:1]
+            layer = layers[0]
+        if len(layers) > 1:
             say_note(
                 f"{path.name}: of its layers {', '.join(layers)} the first is taken for the "
                 "parcels; name another with --boundary-layer."
             )
-            layer = layers[0]
         table = read_vector(path, layer) if in_layers else read_table(path, layer)
     except FormatError as error:
         of_layers = "`ogrinfo` shows the layers of a file; name one with --boundary-layer."

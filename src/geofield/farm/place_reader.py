@@ -26,7 +26,9 @@ from geofield.farm.place_files import RawPlaces, raw_of, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
 from geofield.formats.antimeridian import joined
+from geofield.formats.foreign import RawLayer, files_in, read_foreign
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
+from geofield.model import Dataset
 from geofield.model.place import position_words
 from geofield.settings import Settings
 from geofield.wording import cell_text, counted, nearest, some_of, unlike
@@ -139,13 +141,23 @@ def read_table(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
         x, y = (_numbers(raw, str(name)) for name in names)
     else:
         x, y = (_degrees(raw, str(name), of) for name, of in zip(names, ("EW", "NS"), strict=True))
-        _check_positions(raw, y, x, np.arange(len(x)), LONLAT)
+        if len(x):
+            _check_positions(raw, y, x, np.arange(len(x)), LONLAT)
     known = np.isfinite(x) & np.isfinite(y)
     points = np.full(len(x), None)
     points[known] = shapely.points(x[known], y[known])
     crs = LONLAT if names == lonlat else None
-    rest = raw.table.drop_columns(list(names)).to_pandas()
+    # Those of our own tables stay.
+    rest = raw.table.drop_columns(
+        [each for each in names if each not in ("lat", "lon")]
+    ).to_pandas()
     return gpd.GeoDataFrame(rest, geometry=points, crs=crs)
+
+
+def read_csv(path: Path, *, crs: CRS | None = None) -> Dataset:
+    """The dataset in a table of shapes or positions, or in a folder of some."""
+    tables = [RawLayer(file.stem, read_table(file)) for file in files_in(path, ".csv", ".tsv")]
+    return read_foreign(tables, path, crs=crs)
 
 
 def _plain(table: pa.Table) -> pa.Table:

@@ -114,8 +114,7 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
         return read_vector(path, schema.OBSTACLES.name), []
     if path.suffix.lower() in CSV:
         return read_table(path), []
-    # The points of a GPX file's lines are told by the lines.
-    names = [name for name in layer_names(path) if name not in ("route_points", "track_points")]
+    names = layer_names(path)
     if is_own(path):
         raise FormatError(
             f"{path} is a plan in which no obstacle stands.",

@@ -159,7 +159,9 @@ CATALOGUE: tuple[Format, ...] = (
         ("{stem}.gpx",),
         ("obstacles", "tracks", "segments"),
         "geofield.formats.gpx:write",
+        "geofield.formats.gpx:read",
         suffixes=(".gpx",),
+        precision_m=0.0002,
         drops=(
             _PASSED,
             Drop("the shape and status of obstacles (it has their centres)", "obstacles"),
@@ -175,6 +177,11 @@ CATALOGUE: tuple[Format, ...] = (
         ("csv/track_points.csv", "csv/obstacles.csv"),
         ("track_points", "obstacles"),
         "geofield.formats.tables_csv:write",
+        "geofield.farm.place_reader:read_csv",
+        suffixes=(".csv", ".tsv"),
+        precision_m=0.0002,
+        asks_crs=True,
+        reads_folders=True,
         drops=(Drop("the outlines of obstacles that are not round", "polygons"), _OWN, _ORIGIN),
     ),
     Format(

@@ -194,7 +194,7 @@ def refuse_layer(path: Path, layer: str | None) -> None:
 
 
 def layer_names(path: Path) -> list[str]:
-    """The layers of a file, in order."""
+    """The layers of a file, in order; without the points of a GPX file's lines."""
     import pyogrio
     from pyogrio.errors import DataSourceError
 
@@ -202,9 +202,11 @@ def layer_names(path: Path) -> list[str]:
         return [path.stem]
     _look_at(path)
     try:
-        return [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        names = [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
     except DataSourceError as error:
         raise unreadable(path, error) from error
+    points = ("route_points", "track_points") if path.suffix.lower() == ".gpx" else ()
+    return [name for name in names if name not in points]
 
 
 def has_rows(path: Path, layer: str) -> bool:
@@ -254,12 +256,17 @@ def read_foreign(
                 hint="Look at it in QGIS: is its CRS the right one, does a shape lie far off?",
             )
         layer = _own_layer(each)
-        if layer is None:
+        if layer is not None:
+            is_own = frame.geom_type.str.removeprefix("Multi") == layer.geometry.removeprefix(
+                "Multi"
+            )
+            mine, frame = frame[is_own], frame[~is_own]
+            if len(mine):
+                own.setdefault(layer.name, []).append(_own(layer, mine))
+                are = counted(len(mine), "row is", "rows are")
+                notes.append(f"{each.name}: {are} geofield's own layer {layer.name}")
+        if len(frame):
             foreign.append(RawLayer(each.name, frame))
-        else:
-            own.setdefault(layer.name, []).append(_own(layer, frame, path))
-            are = counted(len(frame), "row is", "rows are")
-            notes.append(f"{each.name}: {are} geofield's own layer {layer.name}")
     tables = {
         name: parts[0]
         if len(parts) == 1
@@ -347,17 +354,7 @@ def _own_layer(layer: RawLayer) -> schema.Layer | None:
     return max(fitting, key=lambda each: len(each.columns), default=None)
 
 
-def _own(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> gpd.GeoDataFrame:
+def _own(of: schema.Layer, frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     if of.geometry in ("Polygon", "LineString"):
         frame = frame.explode(index_parts=False, ignore_index=True)
-    wanted = of.geometry.removeprefix("Multi")
-    fits = frame.geom_type.str.removeprefix("Multi") == wanted
-    if not fits.all():
-        warn(
-            f"{path.name}: "
-            f"{counted(int((~fits).sum()), 'geometry', 'geometries')} of {of.name!r} that "
-            f"{'is' if (~fits).sum() == 1 else 'are'} no {wanted}: left out.",
-            FormatWarning,
-            stacklevel=4,
-        )
-    return schema.conform(of, frame[fits], extras=True)
+    return schema.conform(of, frame, extras=True)

@@ -136,8 +136,9 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
         tables["obstacles"] = schema.conform(schema.OBSTACLES, found, extras=True)
     lines = [part for part in lines if part not in fences]
     lines = _with_length(_without_asides(lines, tables, notes), notes)
+    taken = "left out, beside the plan's own tracks" if "tracks" in tables else "taken as guidance"
+    notes += [part.told(len(part.frame), taken) for part in lines]
     if lines and "tracks" not in tables:
-        notes += [part.told(len(part.frame), "taken as guidance") for part in lines]
         drawn = _joined([part.frame for part in lines])
         tables["tracks"], tables["segments"] = line_tables(drawn, metric, extras=True)
     elif "segments" in tables and "tracks" not in tables:
