@@ -12,7 +12,8 @@ import pytest
 import shapely
 from formats_plan import make_dataset
 
-from geofield.formats import read_dataset, write_dataset
+from geofield.formats import FORMATS, read_dataset, write_dataset
+from geofield.formats.export import dropped
 from geofield_command import run_geofield as geofield
 
 BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
@@ -259,3 +260,30 @@ def test_folders_of_files_in_capitals(tmp_path, name):
         for part in list(folder.iterdir()):
             part.rename(folder / part.name.upper())
     assert len(read_dataset(folder).table("field")) == 1
+
+
+def test_a_hole_of_another_file_keeps_its_name(tmp_path):
+    """Only what was in its own columns came along."""
+    pond = write(tmp_path / "duck pond.shp", [POND], depth=[3])
+    _, _, plan = imported(tmp_path, write(tmp_path / "field.shp", [BOX]), pond)
+    assert plan.table("obstacles")["name"].tolist() == ["duck pond"]
+    assert plan.table("obstacles")["depth"].tolist() == [3]
+
+
+def test_columns_of_imported_lines_are_of_the_tracks_too(tmp_path):
+    """They lay in the segments alone, which KML has not."""
+    lines = write(tmp_path / "ab.gpkg", LINES, note=["a", "b"], swath=[7, 8], code=[2**60, 1])
+    imported(tmp_path, write(tmp_path / "field.shp", [BOX]), lines)
+    done = geofield(
+        "export", tmp_path / "plan.gpkg", "-f", "kml,shapefile", "--out", tmp_path / "o"
+    )
+    assert (done.returncode, "of your own" in done.stderr) == (0, False)
+    for place in (tmp_path / "plan.gpkg", tmp_path / "o/field.kml", tmp_path / "o/shapefile"):
+        plan = read_dataset(place)
+        for layer in ("tracks", "segments"):
+            assert plan.table(layer)["note"].tolist() == ["a", "b"]
+            assert [int(code) for code in plan.table(layer)["code"]] == [2**60, 1]
+    tables = dict(plan.tables, segments=plan.table("segments").assign(note=["a", "c"]))
+    write_with = replace(plan, tables=tables)
+    assert dropped(write_with, FORMATS["kml"])[-1] == "columns of your own in segments"
+    assert "columns of your own in tracks" in dropped(write_with, FORMATS["shapefile"])

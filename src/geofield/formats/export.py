@@ -237,10 +237,22 @@ def _present(dataset: Dataset, when: str, into: Format) -> bool:
         return not active(obstacles).intersects(outline).all()
     layer, _, column = when.partition(".")
     if column == "own":
-        return bool(schema.own_columns(schema.layer(layer), dataset.table(layer)))
+        return _own_alone(dataset, layer)
     if not column:
         return dataset.has(layer)
     return bool(dataset.table(layer)[column].notna().any())
+
+
+def _own_alone(dataset: Dataset, layer: str) -> bool:
+    """Whether a layer of tracks has columns of a person's that the other does not tell as well."""
+    here = dataset.table(layer)
+    there = dataset.table("segments" if layer == "tracks" else "tracks")
+    own = schema.own_columns(schema.layer(layer), here)
+    if not set(own) <= set(there.columns):
+        return True
+    of_track = there.drop_duplicates("track_no").set_index("track_no")
+    told = of_track[own].reindex(here["track_no"]).astype("string").fillna("").to_numpy()
+    return bool((here[own].astype("string").fillna("").to_numpy() != told).any())
 
 
 def unknown_option(chosen: Iterable[Format], given: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -189,10 +189,11 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
 def line_tables(
     frame: gpd.GeoDataFrame, crs: CRS, *, extras: bool = False
 ) -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
-    """Lines as layers `tracks` and `segments`, these with their further columns where `extras`.
+    """Lines as layers `tracks` and `segments`, with their further columns where `extras`.
 
     Lines with the same track number are segments of one track; without numbers each line is
-    a track. Where rows say of which of several fields they are, each field has its own tracks.
+    a track. What says the same of all segments of each track is told of the track, too. Where rows
+    say of which of several fields they are, each field has its own tracks.
     """
     owners = column_like(frame, ("field_id",))
     if owners is not None and owners.notna().all() and owners.nunique() > 1:
@@ -228,7 +229,14 @@ def line_tables(
         "gap_count": [len(part) - 1 for part in each],
         "length_m": [part["length_m"].sum() for part in each],
     }
-    return schema.table(schema.TRACKS, data, wholes, crs), segments
+    first, of_track = segments.drop_duplicates("track_no"), segments.groupby("track_no")
+    same = {
+        name: first[name].array
+        for name in schema.own_columns(schema.SEGMENTS, segments)
+        if str(name).lower() not in schema.TRACKS.column_names
+        and (of_track[name].nunique(dropna=False) == 1).all()
+    }
+    return schema.table(schema.TRACKS, data, wholes, crs).assign(**same), segments
 
 
 def heading_deg(track: shapely.Geometry, crs: CRS) -> float:

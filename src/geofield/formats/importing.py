@@ -138,7 +138,8 @@ def _with_inner_fields_as_obstacles(
         dataset = moved[number]
         rest = {k: t for k, t in dataset.tables.items() if k != schema.FIELD.name}
         own = schema.own_columns(schema.FIELD, fields[number])
-        inner = obstacle_table(fields[number][[*own, "geometry"]], crs, Path(dataset.name))
+        # Its own name, or that of its file, is all that tells what it is.
+        inner = obstacle_table(fields[number][["name", *own, "geometry"]], crs, Path(dataset.name))
         if schema.OBSTACLES.name in rest:
             raise FormatError(
                 f"{dataset.name} lies in another of the fields.", hint="Import one of them."

@@ -146,7 +146,9 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
         tables["tracks"], tables["segments"] = line_tables(own, metric, extras=True)
     if "tracks" in tables and "segments" not in tables:
         tables["tracks"] = numbered(tables["tracks"], "track_no")
-        tables["segments"] = line_tables(tables["tracks"].explode(ignore_index=True), metric)[1]
+        known = ["track_no", *schema.own_columns(schema.TRACKS, tables["tracks"]), "geometry"]
+        pieces = tables["tracks"][known].explode(ignore_index=True)
+        tables["segments"] = line_tables(pieces, metric, extras=True)[1]
     return notes
 
 
