@@ -13,11 +13,11 @@ from qgis.core import (
 )
 
 try:  # Qt 6
-    from qgis.PyQt.QtGui import QAction, QShortcut
+    from qgis.PyQt.QtGui import QAction
 except ImportError:  # Qt 5
-    from qgis.PyQt.QtWidgets import QAction, QShortcut
+    from qgis.PyQt.QtWidgets import QAction
 
-__all__ = ["QAction", "QShortcut"]
+__all__ = ["QAction"]
 
 
 def _enum(owner: Any, scope: str, *names: str) -> Any:

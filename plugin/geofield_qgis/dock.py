@@ -13,8 +13,7 @@ from qgis.core import (
     QgsVectorLayer,
     QgsWkbTypes,
 )
-from qgis.PyQt.QtCore import QEvent, Qt, QTimer
-from qgis.PyQt.QtGui import QKeySequence
+from qgis.PyQt.QtCore import QTimer
 from qgis.PyQt.QtWidgets import (
     QDockWidget,
     QGridLayout,
@@ -25,9 +24,9 @@ from qgis.PyQt.QtWidgets import (
 
 from . import plan_files, sources
 from .algorithm import path_of
-from .compat import QShortcut
 from .engine import EngineError
 from .jobs import Live
+from .keys import Keys
 from .map_tools import BorrowedMap, CircleTool, PointTool, band
 from .preview import Preview
 from .review import OPEN, Review, by_doubt, value
@@ -61,7 +60,6 @@ class ReviewDock(QDockWidget):
         self._mark = band(self.canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
         self.preview = Preview(self.canvas)
         self._build()
-        self._keys()
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(_PAUSE_MS)
@@ -98,44 +96,16 @@ class ReviewDock(QDockWidget):
                 grid.addWidget(button, 0, 0, 1, 2)
             else:
                 grid.addWidget(button, (number + 1) // 2, (number + 1) % 2)
-        self._actions = {name: (key, action) for name, _, key, action in rows if key}
+        self._keys = Keys(
+            self,
+            self.canvas,
+            {key: action for *_, key, action in rows if key},
+            lambda: self.isVisible() and self._ready,
+        )
         box.addLayout(grid)
         box.addStretch(1)
         self.setWidget(body)
         self._tell()
-
-    def _keys(self) -> None:
-        """The keys work where the hands are: on the map and in the panel."""
-        self._shortcuts = []
-        for place in (self.canvas, self):
-            for key, action in self._actions.values():
-                shortcut = QShortcut(QKeySequence(key), place)
-                shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-                shortcut.activated.connect(action)
-                self._shortcuts.append(shortcut)
-            place.installEventFilter(self)
-        self.visibilityChanged.connect(self._enable_keys)
-        self._enable_keys(False)
-
-    def eventFilter(self, watched: Any, event: Any) -> bool:
-        """A key that QGIS has a shortcut for as well is the panel's here.
-
-        Qt does nothing where two shortcuts have one key; in German QGIS has J, R and U.
-        """
-        kinds = QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress
-        if event.type() in kinds and self.isVisible() and self._ready:
-            held = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-            for key, action in self._actions.values():
-                if held == Qt.KeyboardModifier.NoModifier and event.text().upper() == key:
-                    event.accept()
-                    if event.type() == QEvent.Type.KeyPress:
-                        action()
-                    return True
-        return super().eventFilter(watched, event)
-
-    def _enable_keys(self, _: bool = True) -> None:
-        for shortcut in self._shortcuts:
-            shortcut.setEnabled(self.isVisible() and self._ready)
 
     @property
     def _ready(self) -> bool:
@@ -175,7 +145,6 @@ class ReviewDock(QDockWidget):
         self._connect(layer.undoStack().indexChanged, self._edited)
         self._connect(layer.afterCommitChanges, self._saved)
         self._connect(layer.afterRollBack, self._edited)
-        self._enable_keys()
         self.current = None
         self._tell()
         self.step(1)
@@ -199,7 +168,6 @@ class ReviewDock(QDockWidget):
         self._timer.stop()
         self.preview.clear()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
-        self._enable_keys()
         self._tell()
 
     def _layers_go(self, ids: list[str]) -> None:
@@ -210,10 +178,8 @@ class ReviewDock(QDockWidget):
         """Leave nothing in the window."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._layers_go)
         self.close_review()
-        self.canvas.removeEventFilter(self)
+        self._keys.remove()
         self.live.close()
-        for shortcut in self._shortcuts:
-            shortcut.deleteLater()
         self.preview.remove()
         self.canvas.scene().removeItem(self._mark)
         self.iface.removeDockWidget(self)
@@ -342,7 +308,6 @@ class ReviewDock(QDockWidget):
         self._timer.stop()
         self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
         self._released = plan_files.Released(self.path)
-        self._enable_keys()
         self._tell()
         self.live.ask({"do": "write", "file": self.path}, self._written)
 
@@ -360,7 +325,6 @@ class ReviewDock(QDockWidget):
         released, self._released = self._released, None
         if released is not None:
             released.back()
-            self._enable_keys()
             self._tell()
 
     # -- the map -----------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from qgis.core import (
 from qgis.gui import QgsMapCanvas, QgsMapToolPan, QgsMessageBar
 from qgis.PyQt.QtCore import QEvent, QPoint, Qt
 from qgis.PyQt.QtTest import QTest
-from qgis.PyQt.QtWidgets import QMainWindow, QTextBrowser
+from qgis.PyQt.QtWidgets import QAction, QMainWindow, QTextBrowser
 
 LONLAT = QgsCoordinateReferenceSystem("EPSG:4326")
 
@@ -214,6 +214,36 @@ def tools(plan):
     return found
 
 
+def keys(plan):
+    """What keys do on the map and on a button of the panel, and with the panel hidden."""
+    layers, dock = reviewed(plan)
+    window.main.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
+    dock.open(plan)
+    settled(dock)
+    layer, found = layers["obstacles"], {}
+    first, theirs = dock.current, QAction(window.main)
+    theirs.setShortcut("R")
+    window.main.addAction(theirs)
+    radius_m = layer.getFeature(first)["radius_m"]
+    # As keyboards of the United States and of Germany write it.
+    for place, held in (
+        (window.canvas, Qt.KeyboardModifier.ShiftModifier),
+        (dock.buttons["next"], Qt.KeyboardModifier.NoModifier),
+    ):
+        QTest.keyClick(place, "+", held)
+    found["larger_m"] = layer.getFeature(first)["radius_m"] - radius_m
+    QTest.keyClick(dock.buttons["next"], "r")
+    found["rejected"] = layer.getFeature(first)["status"]
+    steps = layer.undoStack().index()
+    QTest.keyClick(window.canvas, "r", Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClick(window.canvas, "r", Qt.KeyboardModifier.ShiftModifier)
+    dock.hide()
+    QTest.keyClick(window.canvas, "r")
+    found["others"] = layer.undoStack().index() - steps
+    settled(dock)
+    return found
+
+
 def undone(plan):
     """Which obstacles are otherwise after each undo, and how many were looked at to know it."""
     layers, dock = reviewed(plan)
@@ -287,7 +317,7 @@ def clicks(picture, lon, lat, home):
 
 _ALL = (
     saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, discarded,
-    tools, undone, routed, clicks,
+    tools, keys, undone, routed, clicks,
 )  # fmt: skip
 ACTIONS = {each.__name__: each for each in _ALL}
 

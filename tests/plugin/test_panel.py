@@ -79,6 +79,11 @@ def test_the_map_is_given_back_to_the_tool_of_before(panel, plan):
     }  # fmt: skip
 
 
+def test_keys_are_the_panels_on_the_map_and_in_the_panel(panel, plan):
+    seen = panel("keys", plan=plan)
+    assert seen == {"larger_m": pytest.approx(0.5), "rejected": "rejected", "others": 0}
+
+
 def test_undo_knows_what_it_took_back(panel, plan):
     seen = panel("undone", plan=plan)
     one, other, gone = seen["ids"]
