@@ -130,9 +130,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
                 values = self._placed(values, context)
                 words, environment = self.words(values, context, feedback, folder)
                 rows = self.rows()
-                # What the dialogue shows holds: no variable says otherwise behind it.
-                unsaid = {parameters.variable_name(row): None for row in rows if "setting" in row}
-                environment = {**unsaid, **environment}
+                environment = {**parameters.unsaid(rows), **environment}
                 variables = parameters.without_option(
                     self.command, description.parameters(self.command)
                 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from contextlib import suppress
 from typing import Any
 
 from qgis.core import (
@@ -159,6 +160,28 @@ def variable(
 def variable_name(row: dict[str, Any]) -> str:
     """The variable that says a setting: GEOFIELD_TRACKS__SPACING_M."""
     return f"GEOFIELD_{row['setting']}".replace(".", "__").upper()
+
+
+def unsaid(rows: list[dict[str, Any]]) -> dict[str, str | None]:
+    """The variables that say what a form shows, without that: what the form shows holds.
+
+    A variable may say one setting, or those of a whole section; the engine reads names in any
+    case. Of a section what no form shows stays, such as keys.
+    """
+    found: dict[str, str | None] = {}
+    shown: dict[str, set[str]] = {}
+    for row in rows:
+        if "setting" in row:
+            found[variable_name(row)] = None
+            shown.setdefault(f"GEOFIELD_{row['section']}".upper(), set()).add(row["name"])
+    for name, text in os.environ.items():
+        section = name.upper()
+        if section in shown:
+            with suppress(ValueError, AttributeError):  # what is no section, the engine refuses
+                said = json.loads(text).items()
+                rest = {key: value for key, value in said if key.lower() not in shown[section]}
+                found[section] = json.dumps(rest) if rest else None
+    return found
 
 
 def _kind(row: dict[str, Any]) -> str:

@@ -101,6 +101,34 @@ def test_nothing_of_qgis_reaches_the_engine(qgis, tmp_path):
     assert "MINE" in names
 
 
+def test_of_a_section_in_a_variable_stays_what_no_form_shows(qgis, tmp_path):
+    command = engine(tmp_path / "env", f"env > {tmp_path}/environment; exit 0")
+    qgis(
+        "several",
+        variables={
+            "GEOFIELD_FETCH": '{"keys": {"survey": "k"}, "Cache_Max_MB": 5}',
+            "GEOFIELD_EXPORT": '{"points": true}',
+            "GEOFIELD_FIELD": "no section",
+        },
+        requests=[
+            {"do": "setting", "name": "geofield/engine", "value": command},
+            {"do": "run", "algorithm": "geofield:plan", "values": {
+                "IMAGERY": str(SAMPLE), "POINT": POINT, "OUTPUT": str(tmp_path / "out")}},
+            {"do": "setting", "name": "geofield/engine", "value": ""},
+        ],
+    )  # fmt: skip
+    reached = dict(
+        line.split("=", 1)
+        for line in (tmp_path / "environment").read_text().splitlines()
+        if line.startswith("GEOFIELD_")
+    )
+    # What cannot be read is the engine's to refuse.
+    assert reached == {
+        "GEOFIELD_FETCH": '{"keys": {"survey": "k"}}',
+        "GEOFIELD_FIELD": "no section",
+    }
+
+
 def test_web_layers_are_told_by_address_and_terms(qgis, geofield, tmp_path):
     xyz, wms = qgis(
         "web_layers",

@@ -118,7 +118,7 @@ def test_plan_by_qgis_process(qgis_process, plan, tmp_path):
 def test_what_the_dialogue_shows_holds(qgis_process, sample_plan, tmp_path):
     """A geofield.toml in QGIS's working folder and variables won where a default was shown."""
     (tmp_path / "geofield.toml").write_text("[tracks]\nspacing_m = 9\n")
-    spacings_m, said = [], []
+    made_with, said = [], []
     for more in ([], [f"--SETTINGS_FILE={tmp_path}/geofield.toml"]):
         out = tmp_path / f"out{len(more)}"
         done = subprocess.run(
@@ -128,16 +128,20 @@ def test_what_the_dialogue_shows_holds(qgis_process, sample_plan, tmp_path):
                 **qgis_process,
                 "GEOFIELD_TRACKS__HEADLAND_M": "7",
                 "geofield_tracks__offset_m": "0.5",  # read in any case
+                "GEOFIELD_TRACKS": '{"spacing_m": 5, "min_segment_m": 30}',
+                "geofield_Tracks": '{"SPACING_M": 5}',
             },
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr[-2000:]
         (made,) = out.glob("*.gpkg")
         tracks = read_plan(made).settings.tracks
-        spacings_m.append((tracks.spacing_m, tracks.headland_m, tracks.offset_m))
+        made_with.append(
+            (tracks.spacing_m, tracks.headland_m, tracks.offset_m, tracks.min_segment_m)
+        )
         said.append("does not count here" in done.stdout)
     # A file that the dialogue names does.
-    assert spacings_m == [(2.0, 0.0, None), (9.0, 0.0, None)]
+    assert made_with == [(2.0, 0.0, None, 0.0), (9.0, 0.0, None, 0.0)]
     assert said == [True, False]
 
 
